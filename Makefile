@@ -8,9 +8,9 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# Each test file stays with one worker, and files run in the order of their names; by default files with few tests, some of
-# them the longest, would run last and leave one worker idle. For one process: make test WORKERS=
-WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
+# What stays with one worker, and in which order it runs, is in tests/order.py. Three workers, because many tests wait for
+# processes in real time. For one process: make test WORKERS=
+WORKERS ?= -n 3 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

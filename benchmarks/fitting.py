@@ -26,13 +26,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.figures import Figure, at_least, show
 from benchmarks.mock_arm import FRICTION_ARMS, board_text, plant_text, recorded
 from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Never
+from model.arrays import Floats
 from model.fitting.fit import fit_problem
 from model.fitting.least_squares import Search, solve
 from model.fitting.nelder_mead import climb
@@ -40,8 +40,6 @@ from model.fitting.options import FitOptions
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.whitening import white
 from model.machine_model.model import Model, base_model
-
-Floats = NDArray[np.float64]
 
 PERIOD = 0.02
 SUBSTEP = 1e-3

@@ -5,18 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model import layout as at
+from model.arrays import Floats
 from model.inverse_dynamics.supplied_torque import friction_levels, needed_torque
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
-
-Floats = NDArray[np.float64]
 
 ORDER = 3
 """Order of the local polynomial (Savitzky and Golay 1964)."""

@@ -38,10 +38,10 @@ from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
 from model import layout as at
+from model.arrays import Floats
 from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
 from model.machine_model.model import Model, base_model
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Place = tuple[str, int | None]
 """An effect, and the joint (from 1) it is on; None for the whole machine."""

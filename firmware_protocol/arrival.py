@@ -1,4 +1,4 @@
-"""Which commands are obeyed: the bridge's half of the rules about sessions, and about time in lock-step."""
+"""Decides which commands are obeyed: the bridge's part of the rules on sessions, and on time in lock-step."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Arrival(Enum):
 class Session:
     """The session of the host that sent the last `Hello`: twelve bytes of state.
 
-    Within a session commands are numbered upwards and never wrap, so that nothing recorded is ever new again.
+    Within a session commands are numbered upwards and never wrap, so that no recorded command can count as new again.
     """
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ class Session:
 class AdvanceOrder:
     """Lock-step only: which `Advance` lets time pass, by sequence numbers on a circle of 2^16.
 
-    Time passes on the bench alone, where no arm is: a circle is enough, and lets an `Advance` go without a session.
+    Lock-step exists only on a bench without an arm: there a circle is enough, and an `Advance` needs no session.
     """
 
     def __init__(self) -> None:

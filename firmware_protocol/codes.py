@@ -1,4 +1,4 @@
-"""The numbers with a meaning: capabilities, status flags, reasons of refusal."""
+"""Numeric codes: capabilities, status flags, reasons of refusal."""
 
 from enum import IntEnum, IntFlag
 
@@ -46,4 +46,4 @@ class Refusal(IntEnum):
     """A command without a session or from one that has ended: replayed, delayed, or sent by a host that was
     replaced."""
     OTHER_STOP = 10
-    """A `Release` that names a stop which is not the newest: the newest one holds."""
+    """A `Release` that names a stop which is not the newest: only the newest can be ended."""

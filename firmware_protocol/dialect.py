@@ -1,7 +1,7 @@
-"""The seam for another line protocol under the same driver.
+"""The interface for another line protocol under the same driver.
 
-The real line protocol of the MA2000 is not public, so our frames are our own. A laboratory whose bridge speaks
-otherwise writes a `LinkDialect` and names it in its configuration; driver, safety and runner stay as they are.
+The real line protocol of the MA2000 is not public, so our frames are our own. A laboratory whose bridge uses
+another protocol writes a `LinkDialect` and names it in its configuration; driver, safety and runner stay as they are.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from firmware_protocol.framing import FrameDecoder, encode_frame
 
 IDLE_MARK = b"\0\0\0\0"
 """In lock-step the bridge ends each turn with this mark: it sends nothing more until the next request. Frames never
-make it: where one ends and the next begins, two zeros meet."""
+contain it: at most two zeros follow each other, where one frame ends and the next begins."""
 
 
 class LinkDialect(Protocol):
     """Turns requests into bytes and bytes into numbered replies. Holds the state of one connection, no more."""
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """Bytes that ask `request` under a sequence number (0–65535). Called once a request: a repeat is the same
+        """Bytes that ask `request` under a sequence number (0–65535). Called once per request: a repeat sends the same
         bytes again."""
         ...
 

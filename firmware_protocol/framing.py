@@ -16,7 +16,7 @@ from firmware_protocol.errors import ProtocolError
 
 DELIMITER = b"\0"
 MAX_PAYLOAD = 48
-"""Bytes of payload in one frame; six joints' full snapshot fits exactly."""
+"""Most bytes of payload in one frame; a snapshot of all six joints fits exactly."""
 HEADER = 4
 CRC_BYTES = 2
 MAX_BODY = HEADER + MAX_PAYLOAD + CRC_BYTES

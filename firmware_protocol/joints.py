@@ -74,7 +74,7 @@ class JointReading:
     power: int
 
     def __post_init__(self) -> None:
-        # Six are made on either side in every period: what is in range is found so at once.
+        # Six are made on each side in every period, so values in range take one quick test.
         if (
             0 <= self.set_point <= SET_POINT_REGISTER_MAX
             and 0 <= self.position < ADC_COUNTS
@@ -93,7 +93,7 @@ JointReadings = tuple[tuple[int, JointReading], ...]
 
 
 def pack_readings(readings: JointReadings) -> bytes:
-    """Mask, then seven bytes a joint."""
+    """Mask, then seven bytes per joint."""
     return bytes((mask_of(joint for joint, _ in readings),)) + b"".join(
         struct.pack("<" + JointReading.LAYOUT, r.set_point, r.position, r.error, r.power) for _, r in readings
     )

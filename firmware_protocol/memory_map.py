@@ -10,6 +10,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from firmware_protocol.errors import MemoryMapError, UnitsError
+from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
 """Joints that the controller serves (section 6.2)."""
@@ -173,11 +174,9 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
     except RecursionError:
         raise MemoryMapError(f"{origin}: not a memory map: it is nested too deeply") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "registers"
-        found = first["input"]
-        value = f" (found {found!r:.60})" if isinstance(found, bool | int | float | str) else ""
-        raise MemoryMapError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
+        first = first_invalid(error)
+        found = f" (found {first.value!r:.60})" if isinstance(first.value, bool | int | float | str) else ""
+        raise MemoryMapError(f"{origin}: {first.where('registers')}: {first.message}{found}") from error
     except ValueError as error:  # malformed TOML, or an integer with thousands of digits
         raise MemoryMapError(f"{origin}: not TOML: {error}") from error
 

@@ -42,7 +42,7 @@ def unpack(layout: str, payload: bytes, what: str) -> tuple[int, ...]:
 class Message:
     """Base of every request and reply.
 
-    A subclass with plain integer fields names their `LAYOUT` (a `struct` format, one letter a field); a subclass
+    A subclass with plain integer fields names their `LAYOUT` (a `struct` format, one letter per field); a subclass
     with anything else has its own `pack` and `parse`. Construction raises ProtocolError when a value does not fit.
     """
 

@@ -113,7 +113,7 @@ class Gains(Reply):
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Exactly three bytes a joint."""
+        """Exactly three bytes per joint."""
         values = unpack(f"<{3 * JOINTS}B", payload, cls.__name__)
         return cls(tuple((values[i], values[i + 1], values[i + 2]) for i in range(0, 3 * JOINTS, 3)))
 
@@ -136,18 +136,18 @@ class ErrorsPositionsPowers(Reply):
         check_ascending("ErrorsPositionsPowers", tuple(joint for joint, _ in self.joints))
 
     def pack(self) -> bytes:
-        """Mask, then seven bytes a joint."""
+        """Mask, then seven bytes per joint."""
         return pack_readings(self.joints)
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Mask, then seven bytes a joint."""
+        """Mask, then seven bytes per joint."""
         return cls(parse_readings(cls.__name__, payload))
 
 
 @dataclass(frozen=True)
 class Snapshot(Reply):
-    """One period of the controller, consistent over joints: the set points it took, what it measured and put out.
+    """One period of the controller, consistent over joints: the set points it took, its measurements and its outputs.
 
     A new set point has been missed when it differs from what was sent; then position + error shows the old one.
     """
@@ -163,12 +163,12 @@ class Snapshot(Reply):
         check_ascending("Snapshot", tuple(joint for joint, _ in self.joints))
 
     def pack(self) -> bytes:
-        """Tick, status, mask, seven bytes a joint: 48 bytes for six joints."""
+        """Tick, status, mask, seven bytes per joint: 48 bytes for six joints."""
         return struct.pack("<IB", self.tick, self.status) + pack_readings(self.joints)
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Tick, status, mask, seven bytes a joint."""
+        """Tick, status, mask, seven bytes per joint."""
         if len(payload) < _TICK_AND_STATUS:
             raise PayloadLengthError(f"Snapshot: payload of {len(payload)} bytes, expected at least 13")
         tick, status = unpack("<IB", payload[:_TICK_AND_STATUS], cls.__name__)
@@ -237,7 +237,7 @@ class GripperSet(Reply):
 class Status(Reply):
     """Tick, status flags, count of board resets, periods whose set points were missed, number of the newest stop.
 
-    `stop` is 0 while the bridge has obeyed none since it started.
+    `stop` is 0 if the bridge has obeyed none since it started.
     """
 
     OPCODE = 0xB3

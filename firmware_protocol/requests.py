@@ -36,9 +36,9 @@ def _check_block(what: str, address: int, count: int, most: int) -> None:
 
 @dataclass(frozen=True)
 class Hello(Request):
-    """Who is there? With a nonce that is not the present session's, a new session begins.
+    """The greeting. With a nonce that is not the present session's, a new session begins.
 
-    nonce: chosen by the host at random, another one for each greeting that is not a repeat.
+    nonce: chosen by the host at random; only a repeated greeting has the same one.
     A host of version 1 sends no payload at all, and one of a later version may send more: both begin no session.
     """
 
@@ -115,7 +115,7 @@ class WriteSetPoints(Request):
                 raise ProtocolError(f"joint {joint}: set point of {posture} posture units: allowed are 0 to {limit}")
 
     def pack(self) -> bytes:
-        """Mask, then one 16-bit value a joint."""
+        """Mask, then one 16-bit value per joint."""
         mask = mask_of(joint for joint, _ in self.postures)
         return struct.pack(f"<B{len(self.postures)}H", mask, *(posture for _, posture in self.postures))
 

@@ -48,7 +48,7 @@ def counts_to_posture(counts: int) -> int:
 
 @dataclass(frozen=True)
 class JointCalibration:
-    """How one joint's counts and posture units stand for an angle.
+    """Conversion of one joint's counts and posture units to an angle.
 
     angle = angle_at_zero + direction · range · counts / 4096  (rad)
     """
@@ -109,8 +109,8 @@ class JointCalibration:
 class DriveScale:
     """Volts for the controller's DAC counts.
 
-    `full_scale_v` is the DAC's output at 127 counts (not given by the source: an assumption of whoever makes
-    the object); `amplifier_gain` is 28 on joints 1–3 (section 6.2).
+    `full_scale_v` is the DAC's output at 127 counts (the source does not give it: an assumption of the
+    caller); `amplifier_gain` is 28 on joints 1–3 (section 6.2).
     """
 
     full_scale_v: float

@@ -11,7 +11,7 @@ from mock_controller.server import Server
 
 
 def main(arguments: list[str]) -> int:
-    """Runs the mock until it is interrupted; the exit code."""
+    """Runs the mock until it is interrupted; returns the exit code."""
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         Server(read_options(arguments)).run()

@@ -1,6 +1,6 @@
 """The commands of the control port, by which a test, a benchmark or a person controls the mock unseen by the host.
 
-One JSON object a line in, one a line out: `{"do": "counts"}` → `{"ok": true, …}`; what cannot be done is answered by
+One JSON object per line in, one per line out: `{"do": "counts"}` → `{"ok": true, …}`; a failure is answered by
 `{"ok": false, "error": "…"}` and changes nothing.
 """
 
@@ -28,19 +28,19 @@ class Process(Protocol):
     """What the control port can do to the process and its line."""
 
     def disconnect(self, seconds: float | None) -> None:
-        """Cuts the line; it comes back after `seconds` of the clock, or not by itself."""
+        """Cuts the line; it comes back after `seconds` of the host's clock, or only by `reconnect`."""
         ...
 
     def reconnect(self) -> None:
-        """The line is back now."""
+        """Restores the line now."""
         ...
 
     def kill(self) -> None:
-        """The process ends at once, without a word."""
+        """Ends the process at once, without an answer."""
         ...
 
     def clock(self) -> Answer:
-        """How board time and the host's clock go together."""
+        """The relation of board time and the host's clock."""
         ...
 
     def lost_bytes(self) -> int:
@@ -90,7 +90,7 @@ class Control:
     # --- commands
 
     def _help(self, _: Answer) -> Answer:
-        """What commands there are."""
+        """Lists the commands."""
         return {"commands": {name: (command.__doc__ or "").strip() for name, command in self._commands.items()}}
 
     def _state(self, _: Answer) -> Answer:
@@ -151,11 +151,11 @@ class Control:
         return {"faults": self._device.faults.listing()}
 
     def _modifications(self, _: Answer) -> Answer:
-        """Hidden physical effects that this mock was started with; those of a secret are not told."""
+        """Hidden physical effects that this mock was started with; those of a secret arm are not listed."""
         return {"modifications": list(self._device.modifications)}
 
     def _brown_out(self, _: Answer) -> Answer:
-        """The board's supply fails for a moment."""
+        """Interrupts the board's supply for a moment."""
         return self._fault_on({"fault": "brown_out"})
 
     def _inputs(self, request: Answer) -> Answer:
@@ -176,12 +176,12 @@ class Control:
         return {"seconds": seconds}
 
     def _reconnect(self, _: Answer) -> Answer:
-        """The line is back now."""
+        """Restores the line now."""
         self._process.reconnect()
         return {}
 
     def _kill(self, _: Answer) -> Answer:
-        """The process ends at once, without an answer."""
+        """Ends the process at once, without an answer."""
         self._process.kill()
         return {}
 

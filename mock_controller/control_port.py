@@ -29,7 +29,7 @@ class ControlPort:
 
     @property
     def watched(self) -> list[int]:
-        """File descriptors on which something may come in."""
+        """File descriptors to wait on for input."""
         return [self._listener.fileno(), *self._clients]
 
     def serve(self, readable: int) -> None:

@@ -1,6 +1,6 @@
 """`python -m mock_controller.detectability SEED… --experiment FILE`: how well the effects of a secret arm can be seen.
 
-One line of JSON an arm: d′ of all its effects together and of each with the others acting, after a refit of the
+Prints one line of JSON per arm: d′ of all its effects together and of each with the others acting, after a refit of the
 tolerance parameters. It reveals what the seeds hide, and is meant for scoring answers. Exit code 2 for wrong options.
 """
 
@@ -48,7 +48,7 @@ def load_tangents(
 def detectability(arm: HiddenArm, experiment: Experiment, known: Tangents, refits: int = MOST_REFITS) -> dict[str, Any]:
     """d′ of all effects of an arm together (0 for a clean one), and of each while the others act.
 
-    Where there are several, that of all together is told as the tangents give it: nobody decides by it.
+    With several effects, d′ of all together is the tangents' estimate alone, because no decision depends on it.
     """
     plant, board = default_plant(), default_board()
     if not arm.effects:
@@ -95,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
         "--experiment",
         default="reference-set",
         metavar="FILE",
-        help=f"CSV, a line a period, set_point_1 to set_point_6 in posture units; or {' or '.join(BUILT_IN)}",
+        help=f"CSV, one line per period, set_point_1 to set_point_6 in posture units; or {' or '.join(BUILT_IN)}",
     )
     parser.add_argument("--gains", type=int, nargs=3, default=(2, 0, 0), metavar=("P", "I", "D"), help="(2 0 0)")
     parser.add_argument(
@@ -106,7 +106,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--refits", type=int, default=MOST_REFITS, help=f"({MOST_REFITS})")
     parser.add_argument("--processes", type=int, default=1, help="for the tangents (1)")
-    parser.add_argument("--cache", type=Path, metavar="FOLDER", help="where tangents are kept for the next time")
+    parser.add_argument("--cache", type=Path, metavar="FOLDER", help="keeps tangents for later runs")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""One mock put together: arm, board, faults, bridge and link."""
+"""Builds one mock: arm, board, faults, bridge and link."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class Device:
 def build_device(options: Options, disconnect: Callable[[float], None]) -> Device:
     """Arm, board and bridge as the options say, at board time 0, with the faults switched on.
 
-    `disconnect` cuts the line for so many seconds. Raises ValueError with one clear line for what cannot be.
+    `disconnect` cuts the line for a number of seconds. Raises ValueError with one clear line for options that cannot
+    be met.
     """
     parameters = _board_parameters(options)
     plant_parameters = _plant_parameters(options)

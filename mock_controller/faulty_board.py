@@ -11,7 +11,7 @@ _HELD_US = 10
 
 
 class FaultyBoard:
-    """A board as the faults see it. `disconnect` cuts the line for so many seconds of the host's clock."""
+    """A board as the faults see it. `disconnect` cuts the line for a number of seconds of the host's clock."""
 
     def __init__(self, board: Board, disconnect: Callable[[float], None]) -> None:
         self._board = board
@@ -23,33 +23,33 @@ class FaultyBoard:
         return self._board.time_us
 
     def hold_memory_at_fetch(self) -> None:
-        """The host's side keeps the shared memory busy while the controller wants it next."""
+        """Keeps the shared memory busy, on the host's side, at the controller's next fetch."""
         self._board.hold_memory(_HELD_US)
 
     def brown_out(self) -> None:
-        """The supply fails for a moment."""
+        """Interrupts the supply for a moment."""
         self._board.brown_out()
 
     def stall_joint(self, joint: int) -> None:
-        """A joint jams where it is."""
+        """Jams a joint where it is."""
         self._board.plant.stall(joint)
 
     def free_joint(self, joint: int) -> None:
-        """A jammed joint moves again."""
+        """Frees a jammed joint."""
         self._board.plant.release(joint)
 
     def stick_potentiometer(self, joint: int) -> None:
-        """A joint's reading stays what it is."""
+        """Holds a joint's reading at its present value."""
         self._board.sensors.stick(joint)
 
     def crackle_potentiometer(self, joint: int, counts: float) -> None:
-        """A joint's reading gets noise of so many ADC counts rms."""
+        """Adds noise of `counts` ADC counts rms to a joint's reading."""
         self._board.sensors.crackle(joint, counts)
 
     def repair_potentiometer(self, joint: int) -> None:
-        """A joint's reading is right again."""
+        """Restores a joint's reading."""
         self._board.sensors.repair(joint)
 
     def disconnect(self, seconds: float) -> None:
-        """The line is cut, and back after `seconds`."""
+        """Cuts the line for `seconds` of the host's clock."""
         self._disconnect(seconds)

@@ -55,7 +55,7 @@ class LockStepPace:
         return 0.0 if self._in_turn or self._pieces else None
 
     def work(self) -> bytes:
-        """Does what there is to do, for at most SLICE_US of board time or so; the bytes for the host."""
+        """Does the work that is due, for about SLICE_US of board time at most; returns the bytes for the host."""
         output = bytearray()
         slice_ends = self._link.time_us + SLICE_US
         while self._link.time_us < slice_ends and (self._in_turn or self._pieces):
@@ -73,7 +73,7 @@ class LockStepPace:
         self._patience_ends_us = self._link.time_us + HOST_PATIENCE_US
 
     def _go_on(self, output: bytearray, slice_ends: int) -> bool:
-        """One step of a turn; whether that was the last."""
+        """Does one step of a turn; returns whether it was the last."""
         link = self._link
         if link.owes:
             link.run_until(min(link.next_event_us() or 0, slice_ends))

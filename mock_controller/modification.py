@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 @runtime_checkable
 class Modification(Protocol):
-    """Anything that changes plant or board; `name` is what it is requested by."""
+    """Anything that changes plant or board; it is requested by its `name`."""
 
     name: ClassVar[str]
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from firmware_protocol.invalid import first_invalid
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
 
@@ -71,9 +72,9 @@ def read_options(arguments: list[str]) -> Options:
     try:
         options = Options.model_validate(chosen)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = " ".join(str(part) for part in first["loc"]).replace("_", "-")
-        raise OptionsError(f"{where}: {first['msg'].lower()}, is {_shown(first['input'])}") from None
+        first = first_invalid(error)
+        where = " ".join(map(str, first.place)).replace("_", "-")
+        raise OptionsError(f"{where}: {first.message.lower()}, is {_shown(first.value)}") from None
     if options.pty and options.tcp:
         raise OptionsError("pty and tcp: give one of them")
     if not (options.pty or options.tcp):
@@ -138,7 +139,7 @@ def _parser() -> argparse.ArgumentParser:
         default=None,
         help="board time moves only when the host asks; runs repeat to the bit",
     )
-    time.add_argument("--baud", type=int, metavar="N", help="bytes take their time on a line of N baud (off)")
+    time.add_argument("--baud", type=int, metavar="N", help="bytes take as long as on a line of N baud (off)")
     time.add_argument(
         "--no-sample",
         dest="sample",
@@ -148,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     machine = parser.add_argument_group("the machine")
-    machine.add_argument("--seed", type=int, metavar="N", help="of everything random (0)")
+    machine.add_argument("--seed", type=int, metavar="N", help="seed of all random numbers (0)")
     machine.add_argument("--start", type=_numbers, metavar="P1,…,P6", help="start posture, six posture units 0-999")
     machine.add_argument("--gains", type=_numbers, metavar="P,I,D", help="default gains of all joints, 0-20 (2,0,0)")
     machine.add_argument("--memory-map", type=Path, metavar="FILE", help="another memory map (TOML)")
@@ -161,7 +162,7 @@ def _parser() -> argparse.ArgumentParser:
         "--secret",
         type=int,
         metavar="SEED",
-        help="an arm with tolerances and hidden effects that nobody is told; python -m mock_controller.reveal SEED is",
+        help="an arm with secret tolerances and effects; python -m mock_controller.reveal SEED shows them",
     )
 
     parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")

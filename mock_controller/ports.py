@@ -31,12 +31,12 @@ class Port(ABC):
     @property
     @abstractmethod
     def url(self) -> str:
-        """How the host names it."""
+        """Address by which the host opens it."""
 
     @property
     @abstractmethod
     def watched(self) -> list[int]:
-        """File descriptors on which something may come in."""
+        """File descriptors to wait on for input."""
 
     @property
     @abstractmethod
@@ -49,7 +49,7 @@ class Port(ABC):
 
     @abstractmethod
     def cut(self) -> None:
-        """Cuts the line: the host sees it go."""
+        """Cuts the line; the host notices it."""
 
     @abstractmethod
     def restore(self) -> None:
@@ -61,7 +61,7 @@ class Port(ABC):
         return [] if self._line is None or not self._unsent else [self._line]
 
     def send(self, data: bytes) -> None:
-        """Sends, or keeps for later what cannot be sent now."""
+        """Sends the data; keeps for later what cannot be sent now."""
         if self._line is None:
             return
         self._unsent += data

@@ -1,6 +1,6 @@
 """Real time: the board's time follows the clock, and never drifts from it.
 
-The board is moved on at the very moments when something happens: a period begins, the drive changes, a snapshot is
+The board advances at exactly the moments when something happens: a period begins, the drive changes, a snapshot is
 complete, bytes have left the line, the host has spoken. Between two of them lies little to simulate (some 0.5 ms of
 work at most). A process that was not given the processor in time catches up event by event, listening in between, and
 counts what was late.
@@ -45,17 +45,17 @@ class RealTimePace:
         self._link.hang_up()
 
     def receive(self, data: bytes) -> None:
-        """Takes what the host has sent: it has arrived now, or, if the board is behind, as early as can be."""
+        """Takes what the host has sent: it has arrived now, or, if the board is behind, as early as possible."""
         self._move_on()
         self._link.receive(data)
 
     def work(self) -> bytes:
-        """Does what is due; the bytes for the host."""
+        """Does what is due; returns the bytes for the host."""
         self._move_on()
         return self._link.take_output()
 
     def timeout_s(self) -> float:
-        """How long nothing is due."""
+        """Time (s) until something is due."""
         due = self._board.next_event_us
         event = self._link.next_event_us()
         if event is not None:
@@ -66,7 +66,7 @@ class RealTimePace:
         return self._clock_us() - self.zero_us
 
     def _move_on(self) -> None:
-        """Moves the board on to the present, or by a few events if it is far behind."""
+        """Advances the board to the present, or by a few events if it is far behind."""
         for _ in range(EVENTS_AT_ONCE):
             due, now = self._board.next_event_us, self._now_us()
             if due > now:

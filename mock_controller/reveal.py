@@ -13,7 +13,7 @@ from mock_controller.hidden.arm import draw_arm
 
 
 def main(arguments: list[str]) -> int:
-    """Prints the truth; the exit code."""
+    """Prints the truth; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m mock_controller.reveal", description=__doc__)
     parser.add_argument("seeds", type=int, nargs="+", metavar="SEED")
     try:

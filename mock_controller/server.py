@@ -29,7 +29,7 @@ def _clock_us() -> int:
 
 
 class Server:
-    """One mock with its port and control port. Raises ValueError with one clear line for what cannot be."""
+    """One mock with its port and control port. Raises ValueError with one clear line for options that cannot be met."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -63,13 +63,13 @@ class Server:
     # --- what the control port can do
 
     def disconnect(self, seconds: float | None) -> None:
-        """Cuts the line; it comes back after `seconds`, or not by itself."""
+        """Cuts the line; it comes back after `seconds`, or only by `reconnect`."""
         self._port.cut()
         self._pace.hang_up()
         self._back_at = None if seconds is None else time.monotonic() + seconds
 
     def reconnect(self) -> None:
-        """The line is back now, or as soon as its address is free."""
+        """Restores the line, now or as soon as its address is free."""
         try:
             self._port.restore()
             self._back_at = None
@@ -78,11 +78,11 @@ class Server:
             self._back_at = time.monotonic() + _RETRY_S
 
     def kill(self) -> None:
-        """The process ends at once."""
+        """Ends the process at once."""
         os.kill(os.getpid(), signal.SIGKILL)
 
     def clock(self) -> dict[str, Any]:
-        """How board time and the clock go together."""
+        """The relation of board time and the clock."""
         if isinstance(self._pace, LockStepPace):
             return {"mode": "lock_step"}
         late = self._pace.lateness
@@ -100,7 +100,7 @@ class Server:
     # --- the loop
 
     def _turn(self) -> bool:
-        """Waits for something, deals with it; whether to go on."""
+        """Waits for an event and handles it; returns whether to continue."""
         control = [] if self._control is None else self._control.watched
         port = self._port.watched
         owner = [_STDIN] if self._options.owned else []
@@ -133,7 +133,7 @@ class Server:
         return left if timeout is None else min(timeout, left)
 
     def _cut_soon(self, seconds: float) -> None:
-        """A fault cuts the line: done after the work at hand, which is in the middle of it."""
+        """Cuts the line for a fault, after the present work, which still uses it."""
         self._cut_wanted = seconds
 
     def _cut_and_restore(self) -> None:

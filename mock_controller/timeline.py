@@ -24,7 +24,7 @@ class Timeline:
         return self.board.time_us
 
     def next_period_us(self) -> int:
-        """When the controller's next period begins, as far as the last one tells; else when it next does anything."""
+        """When the controller's next period begins, as far as the last one tells; else the controller's next event."""
         newest = self.board.snapshots.newest()
         if newest is None:
             return self.board.next_event_us

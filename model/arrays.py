@@ -1,4 +1,4 @@
-"""Names for the types of arrays, with the shape said where they are used."""
+"""Types of arrays; their shapes are stated where they are used."""
 
 from __future__ import annotations
 
@@ -9,5 +9,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 """An array of real numbers."""
+Integers = NDArray[np.int64]
+"""An array of whole numbers."""
+Mask = NDArray[np.bool_]
+"""An array of truth values, such as which samples count."""
 Array = NDArray[Any]
 """An array in compiled code: real numbers, or dual numbers (complex128)."""

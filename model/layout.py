@@ -1,6 +1,6 @@
-"""Where every number of a model lies in the flat vector that compiled code reads.
+"""The place of every number of a model in the flat vector that compiled code reads.
 
-The vector is `SHARED` numbers of the whole machine, then `PER_JOINT` numbers a joint. Every effect of the library has
+The vector is `SHARED` numbers of the whole machine, then `PER_JOINT` numbers per joint. Every effect of the library has
 its place; an effect that is not in a model lies at its null value there, where it does nothing.
 """
 
@@ -44,7 +44,7 @@ SHARED = 10
     BACK_EMF,  # V·s/rad
     BACK_EMF_ERROR,  # relative
     ROTOR_INERTIA,  # kg·m², motor side
-    GEAR,  # motor turns a joint turn
+    GEAR,  # motor turns per joint turn
     VOLTS_PER_COUNT,  # V at the motor for a DAC count
     SUPPLY,  # V
     DEAD_ZONE,  # V at the motor
@@ -66,7 +66,7 @@ SHARED = 10
     CONTACT_COMPLIANCE,  # rad/(N·m), always in series in a transmission that has play or gives
     RIPPLE_SINE,  # N·m
     RIPPLE_COSINE,
-    RIPPLE_CYCLES,  # a joint turn
+    RIPPLE_CYCLES,  # per joint turn
     SPRING,  # N·m/rad
     SPRING_REST,  # rad
     DISTURBANCE_SINE,  # N·m
@@ -122,5 +122,5 @@ def slot(joint: int, column: int) -> int:
 
 
 def column(slot: int) -> int:
-    """The column of a joint that an index in the vector beyond `SHARED` is."""
+    """The column of a joint at an index of the vector beyond `SHARED`."""
     return (slot - SHARED) % PER_JOINT

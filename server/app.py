@@ -1,4 +1,4 @@
-"""The web application: routes, problems, and the life of the services behind them."""
+"""The web application: its routes, its problems, and the start and end of the services behind them."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from server.page import page_router
 from server.services import Services
 
 API = "/api/v1"
-DESCRIPTION = """Experiments on a robot arm: queued, run one at a time, recorded, kept.
+DESCRIPTION = """Experiments on a robot arm are queued, run one at a time, recorded and kept.
 
 Angles are in rad, times in s, joints are numbered from 1. Errors are application/problem+json and say what to do.
 """
 
 
 def make_app(services: Services, gate: Gate) -> FastAPI:
-    """The application over services that are not yet started, behind its gate."""
+    """Makes the application, behind its gate, for services that are not yet started."""
     app = bare_app(services)
     app.add_middleware(gate.middleware)
     services.metrics.registry.register(StateMetrics(services))
@@ -46,7 +46,7 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
 
 
 def bare_app(services: Services | None) -> FastAPI:
-    """The routes; without services it can only be asked for its OpenAPI description."""
+    """Makes the application without its gate. Without services, it can only return its OpenAPI description."""
 
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncIterator[None]:
@@ -84,5 +84,5 @@ def bare_app(services: Services | None) -> FastAPI:
 
 
 def _name(route: APIRoute) -> str:
-    """Operations are called as their functions: clients are generated from them."""
+    """Names an operation like its function, since clients are generated from these names."""
     return route.name

@@ -1,4 +1,4 @@
-"""Clocks: wall time for people and schedules, monotonic time for everything that is measured."""
+"""Clocks: wall time for people and schedules, monotonic time for everything else."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ class Clock(Protocol):
     """Wall clock and monotonic clocks. Only the wall clock may be set back."""
 
     def utc(self) -> datetime:
-        """The wall clock."""
+        """Returns the time of the wall clock, in UTC."""
         ...
 
     def monotonic(self) -> float:
-        """s from an arbitrary start, never running backwards."""
+        """Returns the time (s) since an arbitrary start. It never runs backwards."""
         ...
 
     def elapsed(self) -> float:
-        """As `monotonic`, but it goes on while the computer sleeps."""
+        """Returns the same, including the time while the computer was asleep."""
         ...
 
 
@@ -28,13 +28,13 @@ class SystemClock:
     """The clocks of this computer."""
 
     def utc(self) -> datetime:
-        """Now, UTC."""
+        """Returns the current time in UTC."""
         return datetime.now(UTC)
 
     def monotonic(self) -> float:
-        """`time.monotonic()`, the same for all processes of this computer."""
+        """Returns `time.monotonic()`, which is the same for all processes of this computer."""
         return time.monotonic()
 
     def elapsed(self) -> float:
-        """Time including sleep (CLOCK_BOOTTIME), by which leases and confirmed presence expire."""
+        """Returns the time including sleep (CLOCK_BOOTTIME), by which leases and confirmed presence expire."""
         return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()

@@ -1,17 +1,18 @@
-"""What a database says, in one line that names the table. Needs no library of a database."""
+"""Errors of the database, in one line that names the table. Imports no database library."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 
 if TYPE_CHECKING:
     from sqlalchemy.exc import DatabaseError
 
-BRING_BACK = "`daq restore FILE --overwrite` brings a backup back"
-TRY_AGAIN = "try again; where it stays so, look at the database's own log"
+BRING_BACK = "`daq restore FILE --overwrite` restores a backup"
+TRY_AGAIN = "try again; if this goes on, see the database's own log"
 _DAMAGE = (
     "disk image is malformed",
     "malformed database schema",
@@ -21,34 +22,33 @@ _DAMAGE = (
     "duplicate column name",
     "already exists",
 )
-"""What SQLite says where its file, or what was made in it, is not as it was left. The last two are said by
-migrations."""
+"""Parts of SQLite's messages that mean that the file or its tables are damaged. The last two come from migrations."""
 _TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
 _LONGEST = 200
 
 
 class DamagedError(DaqError):
-    """What the database holds cannot be what was written there."""
+    """The database is damaged: this program cannot have written what it holds."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 def table_of(statement: str | None) -> str:
-    """The table that a statement is about; empty where it names none."""
+    """Returns the name of the table in a statement; empty if it names none."""
     found = _TABLE.search(statement or "")
     return found[1] if found else ""
 
 
 def line_of(error: DatabaseError) -> str:
-    """What the database says, and about which table."""
+    """Returns the table and the database's message in one line."""
     table = table_of(error.statement)
     return f"{f'table {table}: ' if table else ''}{one_line(error.orig or error)}"
 
 
 def advice_of(line: str) -> str:
-    """What helps against it: a backup against proven damage, room on the disk, patience against the rest.
+    """Returns what helps: a backup against damage, disk space if the disk is full, patience against anything else.
 
-    Whoever brings back a backup loses what came after it, so only SQLite's own word of damage advises that.
+    A restored backup loses everything written after it, so only SQLite's own messages about damage lead to this advice.
     """
     if "full" in line:
         return "make room on its disk"
@@ -56,5 +56,5 @@ def advice_of(line: str) -> str:
 
 
 def one_line(error: object) -> str:
-    """The beginning of what something says."""
+    """Returns the beginning of an error's text, in one line."""
     return " ".join(str(error).split())[:_LONGEST]

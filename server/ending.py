@@ -1,7 +1,8 @@
 """Ends the service in time, whatever still computes, waits or blocks.
 
-What can be ended in order has been by then: the robot's owner freezes the arm and closes its trace by itself, and what
-the database was told is on the disk. What is left are threads and processes that nobody can interrupt.
+By then, everything that can end in order has ended: the process that owns the robot's port freezes the arm and closes
+the trace by itself, and the database's transactions are on the disk. Only threads and processes that cannot be
+interrupted are left.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ import threading
 from collections.abc import Callable
 
 END_WITHIN = 4.2
-"""s from the signal to the end of this process."""
+"""Time (s) from the signal to the end of this process."""
 LAST_RESORT = 4.7
-"""s after which the kernel ends it, even where its interpreter does not answer any more."""
+"""Time (s) after which the kernel ends the process, even if its interpreter no longer runs."""
 FORCED = 1
 """Exit code of a forced end, so that the supervisor of the service notices it."""
 log = logging.getLogger("server")

@@ -1,4 +1,4 @@
-"""The sockets that the service listens at: its own, and that of its stop listener beside it."""
+"""The sockets on which the service and its stop listener listen."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from daq.config.service import ServiceSettings
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.service.system import stop_port_after
 
 TRIES = 50
-"""Pairs of neighbouring ports that are tried where any free one may be had."""
+"""Number of pairs of neighbouring ports that are tried if the configuration allows any free port."""
 
 
 class ListenError(DaqError):
-    """An address cannot be listened at."""
+    """The service cannot listen on an address."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 @contextmanager
 def listening(section: ServiceSettings) -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Bound sockets for the service and its stop listener. Raises ListenError."""
+    """Binds sockets for the service and its stop listener. Raises ListenError."""
     own, beside = _both(section)
     with own, beside:
         yield own, beside

@@ -1,4 +1,4 @@
-"""Logs: readable lines at a terminal, otherwise one JSON object a line with the id of its request."""
+"""Logs: readable lines in a terminal, otherwise one JSON object per line with the id of its request."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _OF_EVERY_RECORD = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asc
 
 
 class JsonLines(logging.Formatter):
-    """One JSON object a line: at, level, logger, text, request, and what the caller added."""
+    """Formats a record as one JSON object: at, level, logger, text, request, and the caller's extra fields."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line."""
+        """Returns the line."""
         line: dict[str, object] = {
             "at": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
@@ -37,10 +37,10 @@ class JsonLines(logging.Formatter):
 
 
 class PlainLines(logging.Formatter):
-    """Lines for a terminal. Control characters and line breaks in what clients send are escaped."""
+    """Formats a record for a terminal. Control characters and line breaks that clients send are escaped."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line."""
+        """Returns the line."""
         moment = datetime.fromtimestamp(record.created).astimezone().strftime("%H:%M:%S")
         text = f"{moment} {record.levelname.lower():7} {_printable(record.getMessage())}"
         if not record.exc_info:
@@ -49,12 +49,12 @@ class PlainLines(logging.Formatter):
 
 
 def _printable(text: str) -> str:
-    """`text` with every character that is not printable written as its escape."""
+    """Replaces every character of `text` that is not printable by its escape."""
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
 class StandardError(io.TextIOBase):
-    """Stands for `sys.stderr` where logs are JSON: what anything prints there becomes a record, line by line."""
+    """Replaces `sys.stderr` if logs are JSON: every line printed there becomes a record."""
 
     encoding = "utf-8"
 
@@ -64,8 +64,8 @@ class StandardError(io.TextIOBase):
         self._writing = threading.local()
 
     def write(self, text: str) -> int:
-        """Lines that are whole are logged; the rest waits for its end. What fails to be logged is lost: logging tells
-        of its own failures here, and would be called again for each."""
+        """Logs complete lines, and keeps the rest until its end comes. A line that cannot be logged is lost: logging
+        prints its own failures here, and logging these again would never end."""
         if getattr(self._writing, "active", False):
             return len(text)
         self._writing.active = True
@@ -79,21 +79,21 @@ class StandardError(io.TextIOBase):
         return len(text)
 
     def fileno(self) -> int:
-        """The descriptor of the real stream."""
+        """Returns the descriptor of the real stream."""
         return self.real.fileno()
 
     def isatty(self) -> bool:
-        """Never."""
+        """Always False."""
         return False
 
     def writable(self) -> bool:
-        """Always."""
+        """Always True."""
         return True
 
 
 def begin(stream: TextIO | None = None, level: int = logging.INFO) -> None:
-    """All logs of this process, from now on, to `stream`: standard error. Where that is no terminal they are JSON, and
-    so is whatever else is written there by this process: warnings, what ends a thread, what a library prints."""
+    """Sends all logs of this process to `stream`, by default standard error. If that is not a terminal, they are JSON,
+    and so is everything else that this process prints there: warnings, uncaught errors, output of libraries."""
     if stream is None:
         stream = sys.stderr.real if isinstance(sys.stderr, StandardError) else sys.stderr
     handler = logging.StreamHandler(stream)

@@ -1,4 +1,4 @@
-"""`python -m server.openapi`: the description of the API, from which the types of the page are generated."""
+"""`python -m server.openapi` prints the description of the API, from which the types of the page are generated."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from server.app import bare_app
 
 
 def main() -> None:
-    """One JSON document on standard output."""
+    """Writes the description as one JSON document to standard output."""
     json.dump(bare_app(None).openapi(), sys.stdout, indent=1, ensure_ascii=False)
     sys.stdout.write("\n")
 

@@ -1,4 +1,4 @@
-"""The dashboard's built page: its files, read once, served in the compressed forms that the build made of them."""
+"""Serves the files of the dashboard's built page. They are read once; the build has made their compressed forms."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ TYPES = {
     ".webmanifest": "application/manifest+json",
 }
 FOREVER = "public, max-age=31536000, immutable"
-"""For files whose name holds the hash of their content."""
+"""Cache header of files whose name contains the hash of their content."""
 ASK_AGAIN = "no-cache"
+"""Cache header of all other files: browsers ask each time whether the file has changed."""
 PACKINGS = {"br": ".br", "gzip": ".gz"}
-"""Content encodings, the smallest first, and how the build ends the names of files in them."""
+"""Content encodings, the smallest first, and the suffixes of the build's files in them."""
 
 
 @dataclass(frozen=True)
 class PageFile:
-    """One file of the page. `packed` are its compressed forms that the build made, by encoding, the smallest first."""
+    """One file of the page. `packed`: its compressed forms by encoding, the smallest first."""
 
     content: bytes
     packed: dict[str, bytes]
@@ -41,7 +42,7 @@ class PageFile:
     cache: str
 
     def response(self, request: Request) -> Response:
-        """The file as this browser takes it; 304 when it has it already."""
+        """Returns the file in an encoding that the browser accepts; a 304 if the browser has it already."""
         headers = {"Cache-Control": self.cache, "ETag": self.tag, "Vary": "Accept-Encoding"}
         if request.headers.get("if-none-match") == self.tag:
             return Response(status_code=304, headers=headers)
@@ -54,7 +55,7 @@ class PageFile:
 
 
 def encodings(accepted: str) -> set[str]:
-    """What the header Accept-Encoding names and does not refuse (`;q=0`)."""
+    """Returns the encodings that the header Accept-Encoding names and does not refuse (`;q=0`)."""
     found = set()
     for one in accepted.lower().split(","):
         name, _, weight = one.partition(";")
@@ -64,13 +65,13 @@ def encodings(accepted: str) -> set[str]:
 
 
 def is_built(folder: Path = FOLDER) -> bool:
-    """Whether there is a page to serve."""
+    """Whether the page has been built."""
     return (folder / INDEX).is_file()
 
 
 def page_router(folder: Path = FOLDER) -> APIRouter:
-    """Routes of every file of the page; `/` is its index, `/docs` the reference of the API. Without a built page, both
-    say how to build it."""
+    """Returns the routes of all files of the page; `/` is its index, `/docs` the reference of the API. If the page is
+    not built, both say how to build it."""
     router = APIRouter(include_in_schema=False)
     files = _files(folder) if is_built(folder) else {}
 

@@ -8,9 +8,11 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
+from firmware_protocol.invalid import message_of
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of
 
 if TYPE_CHECKING:
@@ -43,15 +45,14 @@ TITLES = {
 }
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""What the system says when nothing more can be written."""
-
+"""Error numbers of the operating system that mean that the disk is full."""
 
 NO_FIELD = re.compile(r"(constrained|function)-.*|(dict|list|set|tuple)\[.*\]|\[key\]")
-"""Parts of a place of pydantic's that say which of a union's types was tried, or that a key is meant."""
+"""Parts of pydantic's error locations that are not fields: the type of a union that was tried, or the mark of a key."""
 
 
 class ProblemError(Exception):
-    """A request that is not carried out. `kind` is the end of its type's address in docs/service.md."""
+    """A request is not carried out. `kind` is the anchor of the problem's type in docs/service.md."""
 
     def __init__(
         self,
@@ -72,17 +73,17 @@ class ProblemError(Exception):
 
 
 def not_found(what: str, advice: str = "") -> ProblemError:
-    """A 404 about something that has no such name."""
+    """Returns a 404: `what` does not exist."""
     return ProblemError(404, "not-found", f"there is no {what}", advice)
 
 
 def conflict(kind: str, detail: str, advice: str) -> ProblemError:
-    """A 409: what is asked for is right, but not now."""
+    """Returns a 409: the request is valid, but not possible now."""
     return ProblemError(409, kind, detail, advice)
 
 
 def of_error(error: DaqError) -> ProblemError:
-    """The problem that an error of the host side is."""
+    """Returns the problem for an error of this program's other packages."""
     if isinstance(error, PortBusyError):
         return conflict("port-in-use", str(error), "end the other program, then connect again")
     if isinstance(error.__cause__, OSError) and error.__cause__.errno in NO_ROOM:
@@ -91,7 +92,7 @@ def of_error(error: DaqError) -> ProblemError:
 
 
 def of_database(error: DatabaseError) -> ProblemError:
-    """A 503 that names the table, or a 507."""
+    """Returns a 503 that names the table, or a 507 if the disk is full."""
     line = line_of(error)
     log.error("database: %s", line)
     if "full" in str(error.orig):
@@ -100,30 +101,30 @@ def of_database(error: DatabaseError) -> ProblemError:
 
 
 def of_damage(error: DamagedError) -> ProblemError:
-    """A 503 that names the table."""
+    """Returns a 503 that names the table."""
     log.error("database: %s", error)
     return ProblemError(503, "database", f"the database: {error}", BRING_BACK)
 
 
 def no_room(error: OSError) -> ProblemError:
-    """A 507: the disk takes no more."""
+    """Returns a 507: the disk is full."""
     log.error("disk: %s", error)
     return ProblemError(507, "no-room", f"the disk: {error.strerror}", "free some space on it")
 
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
-    """The problem that another process has told in a line, with the exit code of the command line."""
-    if exit_code == 2:
+    """Returns the problem for another process's error, from its line and its exit code (docs/command-line.md)."""
+    if exit_code == exit_codes.WRONG_INPUT:
         return ProblemError(422, "not-valid", line, "correct the request")
-    if exit_code == 3:
+    if exit_code == exit_codes.NOT_REACHED:
         return ProblemError(503, "not-reached", line, "check cable and supply, then connect again")
-    if exit_code == 6:
+    if exit_code == exit_codes.STOPPED:
         return ProblemError(409, "stopped", line, "reset the robot when it is safe")
     return ProblemError(409, "not-safe", line, "remove the cause, then try again")
 
 
 def details_of(problem: ProblemError, request_id: str | None = None) -> ProblemDetails:
-    """A problem as it is told."""
+    """Returns the body of a problem's answer."""
     return ProblemDetails(
         type=f"docs/service.md#{problem.kind}",
         title=TITLES.get(problem.status, "Problem"),
@@ -136,7 +137,7 @@ def details_of(problem: ProblemError, request_id: str | None = None) -> ProblemD
 
 
 def response(request: Request, problem: ProblemError) -> JSONResponse:
-    """A problem on its way out."""
+    """Returns the answer for a problem."""
     from fastapi.responses import JSONResponse
 
     details = details_of(problem, getattr(request.state, "request_id", None))
@@ -144,8 +145,8 @@ def response(request: Request, problem: ProblemError) -> JSONResponse:
 
 
 def install(app: FastAPI) -> None:
-    """Every error of `app` leaves it as a problem."""
-    # Here alone: the stop listener tells problems too, and starts without the web framework and the database's.
+    """Makes `app` answer every error with a problem."""
+    # Imported here, because the stop listener uses this file and starts without web framework and database library.
     from fastapi.exceptions import RequestValidationError
     from sqlalchemy.exc import DatabaseError
     from starlette.exceptions import HTTPException
@@ -191,11 +192,11 @@ def install(app: FastAPI) -> None:
     async def fault(request: Request, error: Exception) -> JSONResponse:
         log.exception("fault in %s %s", request.method, request.url.path, exc_info=error)
         detail = f"{type(error).__name__}: an error of this program"
-        return response(request, ProblemError(500, "fault", detail, "the log has details under the id of this request"))
+        return response(request, ProblemError(500, "fault", detail, "the log has details under this request's id"))
 
 
 def field_of(place: Sequence[int | str]) -> str:
-    """A field as a client writes it: what pydantic says about unions, keys and bodies is left out."""
+    """Returns the name of a field as a client writes it, without pydantic's parts for unions, keys and bodies."""
     parts = [str(part) for part in place if part not in ("body", "query", "path", "header")]
     return ".".join(part for part in parts if not NO_FIELD.fullmatch(part)) or "body"
 
@@ -205,7 +206,7 @@ def _where(error: Mapping[str, Any]) -> str:
 
 
 def _what(error: Mapping[str, Any]) -> str:
-    message = str(error["msg"]).removeprefix("Value error, ")
+    message = message_of(error)
     given = error.get("input")
     if isinstance(given, str | int | float | bool) and error["type"] != "json_invalid":
         return f"{message} (got {given!r:.80})"
@@ -216,4 +217,4 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
     status: {"model": ProblemDetails, "description": TITLES[status], "content": {MEDIA_TYPE: {}}}
     for status in (400, 401, 403, 404, 409, 413, 422, 429, 503, 507)
 }
-"""For every route's `responses`: what may come instead of its answer."""
+"""The problems with which any route may answer, for its `responses`."""

@@ -1,4 +1,4 @@
-"""Starts the service: the database brought up to date, a socket to listen at, the web server over it."""
+"""Starts the service: its sockets, its stop listener, its database and its web server."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from server.stopping.messages import Begin, Stopped
 from server.store.lock import sole_use, sqlite_file
 
 KEEP_ALIVE = 60
-"""s that a silent connection stays open. Clients hang up after a few seconds of their own accord (httpx: 5 s); were the
-service as quick, a request could meet its hanging up."""
+"""Time (s) for which an idle connection stays open. Clients close theirs after a few seconds (httpx: 5 s); if the
+service were as quick, a request could arrive just as it closes the connection."""
 GRACE = 1
-"""s for requests under way when the service ends; streams are told to end before."""
+"""Time (s) to answer requests under way when the service ends; streams are told to end before."""
 
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
-    """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, InUseError, StoreError,
+    """Serves until a signal comes. Calls `ready` with the address. Raises ListenError, InUseError, StoreError,
     SpecError, StopDoorError."""
     section = settings.server
     with (
         sole_use(section.database_url),
         listening(section) as (listener, beside),
-        # Begun first: it gets ready beside this process, and ends when this one does, however that comes about.
+        # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
     ):
         services = Services(settings)
@@ -74,21 +74,21 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             services.uploads.close()
             services.motions.close()
 
-        # The web server raises its signal again when it has ended in order; the rest ends in order after it.
+        # The web server raises the signal again when it has ended; the with-blocks then end everything else.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         door.wait_ready()
-        with suppress(KeyboardInterrupt):  # the service has ended in order by then
+        with suppress(KeyboardInterrupt):  # by then the web server has ended in order
             _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
 
 
 def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
-    """Raises SpecError where tokens are needed and there is none."""
+    """Makes the gate. Raises SpecError if tokens are needed and there is none."""
     loopback = is_loopback(section.host)
     local = _is_open_here(section)
     if not local and all(token.revoked is not None for token in services.tokens.all()):
         why, instead = 'server.tokens is "always"', 'say "remote"'
         if not loopback:
-            why = f"server.host {section.host}: others than this computer's users could reach the robot"
+            why = f"server.host {section.host}: people at other computers could reach the robot"
             instead = "listen at 127.0.0.1"
         make = "make one with `daq token add NAME --role operator`"
         raise SpecError(f"{why}, and there is no token: {make}, or {instead}")
@@ -99,15 +99,15 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
 
 
 def _is_open_here(section: ServiceSettings) -> bool:
-    """Whether this computer's users need no token."""
+    """Whether users of this computer need no token."""
     return is_loopback(section.host) and section.tokens != "always"
 
 
 def _begin(settings: Settings, listener: socket.socket) -> Begin:
-    """What the stop listener knows from its first moment on."""
+    """Returns the first message to the stop listener."""
     section = settings.server
     return Begin(
-        descriptor=-1,  # the door's
+        descriptor=-1,  # the door sets it
         service_port=listener.getsockname()[1],
         open_on_loopback=_is_open_here(section),
         names=tuple(name.lower() for name in section.names),
@@ -118,11 +118,11 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
 
 
 def _connect(services: Services, door: StopDoor, listener: socket.socket) -> None:
-    """The service hears of stops at the listener, which hears how each robot is reached."""
+    """Connects the service and the stop listener: stops go to the service, and each robot's port to the listener."""
 
     def stopped(news: Stopped) -> None:
         services.robot(news.robot).queue.stop_asked(news.actor)
-        with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
+        with suppress(RuntimeError):  # the service is ending, and records no more events
             services.record_event_later(news.robot, "stop", news.text, actor=news.actor)
 
     services.stop_port = listener.getsockname()[1]
@@ -132,7 +132,7 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
 
 
 class _Server(uvicorn.Server):
-    """Says when it answers, and when it begins to end."""
+    """uvicorn's server, with calls when it is ready and when it begins to end."""
 
     def __init__(
         self,
@@ -147,18 +147,18 @@ class _Server(uvicorn.Server):
         self._told_to_end = told_to_end
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """As uvicorn's. From now on the end comes in time."""
+        """Handles a signal as uvicorn does, after it has started the time limit for the end."""
         self._told_to_end()
         super().handle_exit(sig, frame)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn's, then ready."""
+        """Starts as uvicorn does, and then calls `ready`."""
         await super().startup(sockets)
         if self.started:
             keep_steady()
             self._ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn's, which gives what is under way a moment only."""
+        """Calls `ending`, and then shuts down as uvicorn does, which grants requests under way GRACE s only."""
         self._ending()
         await super().shutdown(sockets)

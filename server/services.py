@@ -56,7 +56,8 @@ from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
 
 SHUTDOWN, TIDYING = 2.0, 0.5
-"""s for the arm to be frozen and the trace to be closed when the service ends; the arm's owner goes on alone then."""
+"""Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
+robot's port finishes alone if it needs longer."""
 log = logging.getLogger("server")
 
 
@@ -80,15 +81,15 @@ class RobotServices:
         return status_of(self.robot, self.control.status(), self.queue.status())
 
     def require_motion(self, lease: str | None) -> None:
-        """Raises a 409 unless this lease has the control now, and with it the operator's word for a real arm."""
+        """Raises a 409 unless this lease has control now and, for a real arm, the operator's consent."""
         held = self.control.require(lease)
         identity = self.robot.identity
         if identity is not None and not identity.simulated and not held.moves_real_arm:
-            line = f"{self.robot.place.url} is a real arm: it moves only with the operator's word"
+            line = f"{self.robot.place.url} is a real arm: it moves only with the operator's consent"
             raise conflict("consent-needed", line, "take control again, with moves_real_arm")
 
     def word(self, lease: str | None, said: float) -> Word:
-        """The request of a client with this lease to move the arm by hand."""
+        """Returns the request of a client with this lease to move the arm by hand."""
         return Word(said, lambda: self.require_motion(lease))
 
 
@@ -112,7 +113,7 @@ class Services:
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
         self.stop_port = 0
-        """Port of the stop listener, once there is one."""
+        """Port of the stop listener; 0 until it is known."""
         self.lanes = Lanes()
         self.readiness = Readiness(self.clock)
         self.metrics = Metrics()
@@ -126,11 +127,11 @@ class Services:
         self._robots = {settings.robot.name: self._make_robot(settings)}
 
     def robots(self) -> list[RobotServices]:
-        """All of them: one, for now."""
+        """Returns all robots; at present there is one."""
         return list(self._robots.values())
 
     def robot(self, name: str) -> RobotServices:
-        """Raises a 404."""
+        """Returns the services of a robot. Raises a 404."""
         if name not in self._robots:
             raise not_found(f"robot {name!r:.60}", f"this service has {', '.join(self._robots)}")
         return self._robots[name]
@@ -146,12 +147,12 @@ class Services:
             rig.keeper.start(connect=self.settings.server.connect_at_start)
 
     def close(self) -> None:
-        """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s; what is not done by then
-        ends with this process."""
+        """Freezes arms, closes traces, ends threads and processes, within SHUTDOWN + TIDYING s. Anything left then ends
+        with this process."""
         self.end_processes()
         every = self.robots()
         for rig in every:
-            rig.queue.take_no_more()  # first: the end of the connection is no reason to find the queue held
+            rig.queue.take_no_more()  # first, or the end of the connection would pause the queue
         _all_within(
             SHUTDOWN,
             [partial(end, SHUTDOWN) for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)],
@@ -162,8 +163,8 @@ class Services:
         self.store.close()
 
     def end_processes(self) -> None:
-        """Those that read and plan for somebody, at once. The owner of a robot's port ends by itself, jobs with this
-        process."""
+        """Ends the processes that read uploads and plan motions, at once. The owner of a robot's port ends by itself,
+        and workers of jobs end with this process."""
         self.uploads.close()
         self.motions.close()
 
@@ -254,7 +255,7 @@ class Services:
         event: ServiceEvent | None = None
         try:
             event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
-        except Exception:  # without its row it has no number, by which pages tell events apart: the log alone has it
+        except Exception:  # only the log has it: without its row it has no number, by which pages tell events apart
             log.exception("%s: %s: could not be written", robot, kind)
         rig = self._robots.get(robot)
         if rig is not None:
@@ -267,7 +268,7 @@ class Services:
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
-        """As `record_event`, on a thread, for callers that must not wait for the disk."""
+        """Does the same as `record_event` on a thread, for callers that must not wait for the disk."""
         self._later.submit(self.record_event, robot, kind, text, actor=actor)
 
     def _lapsed(self, robot: Robot, holder: str) -> None:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
 
 from tests.left_running import Running, mark_this_process
+from tests.order import UnitScheduling, alternate, is_against_the_clock
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
@@ -15,19 +17,6 @@ SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
 # The same examples in every run, and no test that fails because the machine was busy.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
-AGAINST_THE_CLOCK = (
-    "contract",
-    "daq/acquisition",
-    "daq_cli",
-    "daq/client",
-    "daq/transport",
-    "mock/process",
-    "server",
-)
-"""Folders of tests with processes in real time. A machine that gives them no processor for half a second makes them
-fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. They
-are tried again, and the summary names each that was: one that comes up again and again is a race, not a busy machine.
-What runs on a real arm is never repeated by itself."""
 DETERMINISTIC = (
     "daq/acquisition/test_freezer.py",
     "daq/acquisition/test_guardian.py",
@@ -75,15 +64,20 @@ def lab_data(request: pytest.FixtureRequest) -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    folders = [ROOT / "tests" / folder for folder in AGAINST_THE_CLOCK]
     for item in items:
-        if item.config.getoption("--port") or not any(item.path.is_relative_to(folder) for folder in folders):
+        if item.config.getoption("--port") or not is_against_the_clock(item):
             continue
         if item.path.relative_to(ROOT / "tests").as_posix() in DETERMINISTIC:
             continue
         if not item.get_closest_marker("hardware"):
             item.add_marker("against_the_clock")
             item.add_marker(pytest.mark.flaky(reruns=ATTEMPTS - 1))
+    alternate(items)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> UnitScheduling | None:
+    return UnitScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

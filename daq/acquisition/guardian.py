@@ -31,13 +31,13 @@ CLIENT_PATIENCE = 0.1
 
 
 class EndCause(Enum):
-    """Why a run is ended from outside."""
+    """Why a run is ended from outside: what stands behind "stopped:"."""
 
-    STOP = "stopped on request, by daq stop or through the service"
+    STOP = "on request, by daq stop or through the service"
     """Through the stop socket, which does not tell who asks."""
-    PARENT = "stopped by Ctrl-C, or by the program that started the run"
-    CANCELLED = "stopped by the service: what ran was cancelled, or nobody had the control any more"
-    SIGNAL = "stopped by a signal"
+    PARENT = "by Ctrl-C, or by the program that started the run"
+    CANCELLED = "by the service: what ran was cancelled, or nobody had the control any more"
+    SIGNAL = "by a signal"
     ORPHANED = "the process that started this run is gone"
     DEAF = "this run could no longer be stopped from outside"
 

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from daq.acquisition.messages import Job
 from daq.contracts.errors import SpecError
 from daq.runner import StoppedError
+from firmware_protocol.invalid import first_invalid
 
 LONGEST_JOB = 256 << 20
 """Bytes: a recorded path of hours."""
@@ -29,10 +30,9 @@ def read_job(descriptor: int) -> Job:
             raise SpecError(f"job: longer than {LONGEST_JOB} bytes")
     line, _, rest = bytes(data).partition(b"\n")
     if rest:
-        raise StoppedError("stopped before it began; nothing moved")
+        raise StoppedError("by the program that started the run", "stopped before it began; nothing moved")
     try:
         return Job.model_validate_json(line)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "text"
-        raise SpecError(f"job: {where}: {first['msg']}") from error
+        first = first_invalid(error)
+        raise SpecError(f"job: {first.where('text')}: {first.message}") from error

@@ -42,6 +42,6 @@ def owned_robot(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -
         control = session.take_control()
         if (cause := session.ended()) is not None:
             control.stop(cause)
-            raise StoppedError(f"the arm has been stopped: {cause}")
+            raise StoppedError(cause)
         with control.frozen_on_error():
             yield OwnedRobot(session, control)

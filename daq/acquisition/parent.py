@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from daq.acquisition.messages import REPORT, EventHappened, Failed, Finished, Job, Progress, Sampled
+from daq.contracts import exit_codes
 
 GRACE = 8.0
 """Seconds that the process has to close its trace once its parent wants to leave: a second more of samples, a stop that
@@ -69,7 +70,10 @@ class Acquisition:
         code = self._process.wait()
         end = f"signal {-code}" if code < 0 else f"exit code {code}"
         line_left = "the arm holds its last set point; `daq traces salvage` finishes what was recorded"
-        yield Failed(message=f"the acquisition process ended without a word ({end}): {line_left}", exit_code=1)
+        yield Failed(
+            message=f"the acquisition process ended without a word ({end}): {line_left}",
+            exit_code=exit_codes.PROGRAM_FAULT,
+        )
 
     def stop(self) -> None:
         """Asks for a stop: the process freezes the arm at once, records a second more, and reports the end.

@@ -72,7 +72,7 @@ def run_job(job: Job, speaker: Speaker) -> RunResult:
         if (cause := session.ended()) is not None:
             # It came while there was nothing to freeze. Now there is.
             control.stop(cause)
-            raise StoppedError(f"{cause} before it began; nothing moved")
+            raise StoppedError(cause, f"stopped before it began ({cause}); nothing moved")
         requests = StopRequests(ended=session.ended, interrupted=lambda: session.guardian.cause is EndCause.ORPHANED)
         run = RunSetup(controller, control, job.spec, job.machine, job.limits, job.folder, speaker, requests, job.robot)
         result = run_experiment(run, Consent(job.moves_real_arm))

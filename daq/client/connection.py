@@ -18,6 +18,7 @@ from daq.client.errors import ServiceError, ServiceNotReachedError, reason_of
 from daq.contracts.errors import SpecError
 from daq.contracts.service.base import Page
 from daq.contracts.service.problems import ProblemDetails
+from firmware_protocol.invalid import first_invalid
 
 API = "/api/v1"
 CONNECT_WITHIN = 5.0
@@ -89,11 +90,9 @@ class Connection:
             adapter: TypeAdapter[T] = _adapter(cast(Any, answer))
             return adapter.validate_json(response.content, extra="ignore")
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "answer"
-            raise ServiceNotReachedError(
-                f"{self.url}: answers, but not as this version's service: {where}: {first['msg']}"
-            ) from error
+            first = first_invalid(error)
+            line = f"answers, but not as this version's service: {first.where('answer')}: {first.message}"
+            raise ServiceNotReachedError(f"{self.url}: {line}") from error
 
     def do(self, request: Request) -> None:
         """A request whose answer says nothing. Raises ServiceError, ServiceNotReachedError."""

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from daq.client.connection import Connection, Request
 from daq.client.errors import ServiceError, ServiceNotReachedError
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.service.queue import ControlLease, ControlRequest
@@ -27,7 +28,7 @@ JOIN_WITHIN = 10.0
 class ControlLostError(DaqError):
     """The lease has lapsed, or the service is gone: the arm holds."""
 
-    exit_code = 4
+    exit_code = exit_codes.REFUSED
 
 
 class HeldControl:

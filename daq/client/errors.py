@@ -5,11 +5,11 @@ from __future__ import annotations
 import httpx
 
 from daq.contracts.errors import DaqError, ReachError
+from daq.contracts.exit_codes import NOT_REACHED, PROGRAM_FAULT, REFUSED, STOPPED, WRONG_INPUT
 from daq.contracts.service.problems import ProblemDetails
 
-EXIT_WRONG_INPUT, EXIT_NOT_REACHED, EXIT_REFUSED, EXIT_STOPPED, EXIT_FAULT = 2, 3, 4, 6, 1
-_OF_KIND = {"beyond-limits": EXIT_REFUSED, "port-in-use": EXIT_NOT_REACHED, "stopped": EXIT_STOPPED}
-_OF_STATUS = {409: EXIT_REFUSED, 429: EXIT_NOT_REACHED, 500: EXIT_FAULT, 503: EXIT_NOT_REACHED, 507: EXIT_REFUSED}
+_OF_KIND = {"beyond-limits": REFUSED, "port-in-use": NOT_REACHED, "stopped": STOPPED}
+_OF_STATUS = {409: REFUSED, 429: NOT_REACHED, 500: PROGRAM_FAULT, 503: NOT_REACHED, 507: REFUSED}
 
 
 class ServiceError(DaqError):
@@ -21,7 +21,7 @@ class ServiceError(DaqError):
         super().__init__(f"{problem.detail}{advice}")
         self.problem = problem
         self.kind = problem.type.rpartition("#")[2]
-        of_status = _OF_STATUS.get(problem.status, EXIT_WRONG_INPUT)
+        of_status = _OF_STATUS.get(problem.status, WRONG_INPUT)
         self.exit_code = _OF_KIND.get(self.kind, of_status)  # type: ignore[misc]
 
     @property

@@ -16,6 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 from daq.client.connection import API, CONNECT_WITHIN, Connection, is_loopback
 from daq.client.errors import ServiceNotReachedError
 from daq.contracts.service.live import LiveFrame, LiveMessage, LiveRequest, SampleRate, Topic
+from firmware_protocol.invalid import first_invalid
 
 LARGEST_FRAME = 64 << 20
 """Size limit (bytes) of a frame: the history of an hour fits."""
@@ -86,8 +87,8 @@ class LiveStream:
         try:
             return _FRAME.validate_json(text, extra="ignore")
         except ValidationError as error:
-            line = f"{self._url}: a frame is not as this version's service sends them: {error.errors()[0]['msg']}"
-            raise ServiceNotReachedError(line) from error
+            line = f"a frame is not as this version's service sends them: {first_invalid(error).message}"
+            raise ServiceNotReachedError(f"{self._url}: {line}") from error
 
     def __iter__(self) -> Iterator[LiveFrame]:
         while (frame := self.next_frame()) is not None:

@@ -8,7 +8,7 @@ from daq.contracts.machine import Machine
 
 
 def merged_limits(machine: Machine, given: Limits) -> Limits:
-    """The machine's limits with every one replaced that `given` sets, joint by joint. Raises SpecError.
+    """The machine's limits, with those that `given` sets replaced, joint by joint. Raises SpecError.
 
     To take a limit away, write a machine file without it.
     """

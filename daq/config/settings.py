@@ -23,6 +23,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace_limits import TraceLimits
+from firmware_protocol.invalid import first_invalid
 
 APP = "ma2000-daq"
 LOCAL_FILE = "daq.toml"
@@ -131,7 +132,7 @@ def _parse(path: Path) -> Settings:
     data = parse_toml(read_text(path, what), what)
     server = data.get("server")
     given = server.get("unattended") if isinstance(server, dict) else None
-    if isinstance(given, str):  # text is allowed from the environment only, which has nothing else
+    if isinstance(given, str):  # only the environment, which holds nothing but text, may give text
         raise SpecError(f"{what}: server.unattended = {shown(given)}: must be true or false, without quotation marks")
     return _validated(data, str(path))
 
@@ -145,18 +146,17 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
     except RecursionError:
         raise SpecError("environment: a section is nested too deeply; write keys, such as DAQ_ROBOT__PORT") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        if first["type"] == "extra_forbidden":
-            message = f"no such key; allowed here: {', '.join(_keys_at(first['loc'][:-1]))}"
-        where = _variable_of(first["loc"]) or f"configuration {origin}"
-        value = "" if isinstance(first["input"], dict) else f" = {shown(first['input'])}"
-        raise SpecError(f"{where}: {key}{value}: {message}") from error
+        first = first_invalid(error)
+        message = first.message
+        if first.kind == "extra_forbidden":
+            message = f"no such key; allowed here: {', '.join(_keys_at(first.place[:-1]))}"
+        where = _variable_of(first.place) or f"configuration {origin}"
+        value = "" if isinstance(first.value, dict) else f" = {shown(first.value)}"
+        raise SpecError(f"{where}: {first.where()}{value}: {message}") from error
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:
-    """The environment variable that a value came from, since that goes before the file; None where there is none."""
+    """The environment variable that overrides the file at this key; None where there is none."""
     name = "DAQ_" + "__".join(str(part) for part in where).upper()
     found = next((one for one in os.environ if one.upper() == name != SERVER_VARIABLE), None)
     return None if found is None else f"environment {found}"

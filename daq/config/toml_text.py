@@ -1,4 +1,4 @@
-"""Settings written as the TOML file that says the same."""
+"""Writes settings as the TOML file from which they can be loaded again."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from daq.config.settings import Settings
 
 
 def settings_text(settings: Settings) -> str:
-    """A daq.toml that loads to these settings; what is not set stands in it as a comment, for TOML has no null."""
+    """A daq.toml that loads to these settings. A setting without a value becomes a comment, for TOML has no null."""
     data = settings.model_dump(mode="json")
     lines = _lines("", {key: value for key, value in data.items() if not isinstance(value, dict)})
     for name, table in data.items():
@@ -20,7 +20,7 @@ def settings_text(settings: Settings) -> str:
 
 
 def _lines(name: str, table: dict[str, Any]) -> list[str]:
-    """A table's own keys, then the tables in it."""
+    """The table's own keys, then its subtables."""
     lines = [f"[{name}]"] if name else []
     lines += [f"# {key} is not set" for key, value in table.items() if value is None]
     lines += [f"{key} = {_value(value)}" for key, value in table.items() if not isinstance(value, dict | NoneType)]

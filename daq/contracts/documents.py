@@ -63,7 +63,7 @@ def read_text(path: Path, what: str) -> str:
             content = stream.read(LARGEST + 1)
     except OSError as error:
         raise SpecError(f"{what}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:  # a name with a NUL in it
+    except ValueError as error:  # the path contains a NUL
         raise SpecError(f"{what}: cannot be read: {error}") from error
     if len(content) > LARGEST:
         raise SpecError(f"{what}: cannot be read: it is larger than {LARGEST >> 20} MiB")
@@ -76,8 +76,8 @@ def read_text(path: Path, what: str) -> str:
 
 
 def parse_json(text: str, what: str) -> Any:
-    """Plain data from JSON. Raises SpecError in one line for what is no JSON, or is nested deeper than DEEPEST
-    or holds a whole number of more than MOST_BITS."""
+    """Plain data from JSON. Raises SpecError in one line for text that is not JSON, is nested deeper than DEEPEST, or
+    holds a whole number of more than MOST_BITS."""
     try:
         data = json.loads(text)
     except RecursionError:
@@ -88,8 +88,8 @@ def parse_json(text: str, what: str) -> Any:
 
 
 def parse_toml(text: str, what: str) -> dict[str, Any]:
-    """Plain data from TOML. Raises SpecError in one line for what is no TOML, or is nested deeper than DEEPEST
-    or holds a whole number of more than MOST_BITS."""
+    """Plain data from TOML. Raises SpecError in one line for text that is not TOML, is nested deeper than DEEPEST, or
+    holds a whole number of more than MOST_BITS."""
     if _LONG_KEY.search(text):
         raise SpecError(f"{what}: a key has more than {MOST_KEY_PARTS} parts; no key here needs them")
     try:

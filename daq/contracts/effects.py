@@ -13,7 +13,7 @@ UNKNOWN_EFFECT = "unknown_effect"
 
 @dataclass(frozen=True)
 class EffectName:
-    """One effect: the field's term, where it acts, the family in which effects are easily confused, one line."""
+    """One effect: its usual name, where it acts, the family in which effects are easily confused, and one line."""
 
     name: str
     acts_on: str
@@ -29,5 +29,5 @@ def effect_names() -> dict[str, EffectName]:
 
 
 def shared_name(name: str) -> str:
-    """`name` where it is a shared one, else UNKNOWN_EFFECT."""
+    """`name` if it is a shared name, else UNKNOWN_EFFECT."""
     return name if name in effect_names() else UNKNOWN_EFFECT

@@ -1,6 +1,6 @@
 """Errors that a user meets: one clear line each, saying what is wrong, where, and what is allowed.
 
-`exit_code` is what the command line ends with, one of `daq.contracts.exit_codes`.
+`exit_code` is the exit code of the command line, one of `daq.contracts.exit_codes`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from daq.contracts import exit_codes
 
 
 class DaqError(Exception):
-    """Base of every error that is the user's to see; its text is one line."""
+    """Base of every error that is shown to the user; its text is one line."""
 
     exit_code: ClassVar[int] = exit_codes.PROGRAM_FAULT
 
@@ -23,7 +23,7 @@ class SpecError(DaqError):
 
 
 class TraceError(DaqError):
-    """A trace that cannot be what it claims to be."""
+    """A trace that cannot be read, written or found, or whose content contradicts itself."""
 
     exit_code = exit_codes.WRONG_INPUT
 

@@ -1,4 +1,4 @@
-"""What a process of this project ends with: one table for every program (docs/command-line.md explains each)."""
+"""Exit codes, the same for every program of this project (docs/command-line.md explains each)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ COMPLETE: Final = 0
 PROGRAM_FAULT: Final = 1
 WRONG_INPUT: Final = 2
 NOT_REACHED: Final = 3
-"""The robot or the service was not reached, or did not confirm what it was asked."""
+"""The robot or the service was not reached, or did not confirm the request."""
 REFUSED: Final = 4
 """Refused for safety; nothing moved."""
 FAULT: Final = 5
@@ -18,4 +18,4 @@ INTERRUPTED: Final = 130
 """What shells report for a process that Ctrl-C has ended."""
 
 OF_OUTCOME: Final[dict[str, int]] = {"complete": COMPLETE, "fault": FAULT, "interrupted": FAULT, "stopped": STOPPED}
-"""Exit code by the outcome of a run that left a trace."""
+"""Exit code for each outcome of a run that left a trace."""

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, Vali
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
 GAIN_PLACE = 3
@@ -35,7 +36,7 @@ GainValue = Annotated[int, Field(ge=0, le=20)]
 Gain = tuple[GainValue, GainValue, GainValue]
 """P, I, D of one joint, each 0–20 (section 6.2)."""
 Amplitude = Angle | dict[JointNumber, Angle]
-"""One value for all joints of the experiment, or one a joint."""
+"""One value for all joints of the experiment, or one per joint."""
 
 
 class _Part(BaseModel):
@@ -115,8 +116,8 @@ class Cubic(_Part):
 class Via(_Part):
     """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
 
-    `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
-    passed, the last being the end. Position, velocity and acceleration are continuous.
+    `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
+    last is the end. Position, velocity and acceleration are continuous.
     """
 
     kind: Literal["via"] = "via"
@@ -156,7 +157,7 @@ class Path(_Part):
     kind: Literal["path"] = "path"
     times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2, max_length=MOST_POINTS)]
     positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2, max_length=MOST_POINTS)]
-    """One row a time, one column a joint."""
+    """One row per time, one column per joint."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -244,7 +245,7 @@ class ExperimentSpec(_Part):
 
 @dataclass(frozen=True)
 class OfferedExperiment:
-    """An experiment that a diagnosis may ask for. general: whether it is made for effects of every kind."""
+    """An experiment that a diagnosis may ask for. `general`: whether it suits effects of every kind."""
 
     name: str
     description: str
@@ -262,28 +263,27 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 def _one_line(error: ValidationError) -> str:
     """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-    first = error.errors()[0]
-    where, value = [str(part) for part in first["loc"]], first["input"]
+    first = first_invalid(error)
+    where, value, message = [str(part) for part in first.place], first.value, first.message
     # Pydantic's names for the branches of a union mean nothing to a user.
     where = [
         part
         for i, part in enumerate(where)
         if not part.startswith("constrained-") and (i != 1 or where[0] != "trajectory")
     ]
-    message = first["msg"].removeprefix("Value error, ")
     if "gains" in where[:1] and len(where) == GAIN_PLACE:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
-    bound = next((first.get("ctx", {})[key] for key in ("le", "ge") if key in first.get("ctx", {})), None)
+    bound = next((first.bounds[key] for key in ("le", "ge") if key in first.bounds), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and _fits_a_float(value):
         message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
     elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
         value = shown(value)
-    given = "" if isinstance(first["input"], dict | BaseModel) else f" (got {value})"
+    given = "" if isinstance(first.value, dict | BaseModel) else f" (got {value})"
     return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
 
 
 def _fits_a_float(value: object) -> bool:
-    """Whether it is a number that can be converted to degrees; whole numbers may be larger than any float."""
+    """Whether the value is a number that can be converted to degrees; whole numbers may be larger than any float."""
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 

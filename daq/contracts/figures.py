@@ -1,4 +1,4 @@
-"""A trace in a few figures a joint: how far, how fast, how much over, how exact."""
+"""Key figures of a trace, joint by joint: travel, speed, overshoot and accuracy."""
 
 from __future__ import annotations
 

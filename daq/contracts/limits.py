@@ -1,4 +1,4 @@
-"""What an arm may do. A limit that is not set is None, never 0: nothing is guessed, and nothing is free by accident."""
+"""Limits of an arm. A limit that is not set is None, never 0: nothing is guessed, and None is not taken for a value."""
 
 from __future__ import annotations
 

@@ -7,30 +7,30 @@ from collections.abc import Mapping
 from daq.contracts.errors import SafetyError
 
 JUMP_WITHIN = 16
-"""ADC counts of error up to which gains are written: an assumption. A limp joint that becomes stiff jumps by its whole
-error, so 1° at most on joints 1 to 3; what a held joint hangs below its set point is less."""
+"""Largest positional error (ADC counts) at which gains are written: an assumption. A limp joint that becomes stiff
+jumps by its whole error, here by 1° at most on joints 1 to 3. The static error of a held joint is smaller."""
 
 
 def limp_joints(gains: Mapping[int, tuple[int, int, int]]) -> list[int]:
-    """Those whose proportional gain is 0."""
+    """Joints whose proportional gain is 0."""
     return [joint for joint, (p, _, _) in sorted(gains.items()) if p == 0]
 
 
 def limp_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
-    """One line about them; empty when there are none."""
+    """One line that names the limp joints; empty when there are none."""
     limp = limp_joints(gains)
     return f"JOINTS {', '.join(map(str, limp))} ARE LIMP (gain P is 0): nothing holds them" if limp else ""
 
 
 def require_drive(gains: Mapping[int, tuple[int, int, int]]) -> None:
-    """Raises SafetyError when a joint is limp: neither keys nor programs move such an arm."""
+    """Raises SafetyError when a joint is limp: neither keys nor programs may move such an arm."""
     line = limp_line(gains)
     if line:
         raise SafetyError(f"{line}; hold the arm, `daq reset --here`, then `daq gains set` them; nothing moved")
 
 
 def require_no_jump(errors: Mapping[int, int], wanted: Mapping[int, tuple[int, int, int]]) -> None:
-    """Raises SafetyError when a joint that gets a drive is too far from its set point; `errors` in ADC counts."""
+    """Raises SafetyError when a limp joint to be driven again is too far off its set point; `errors` in ADC counts."""
     far = [
         f"joint {joint} is {errors[joint]} ADC counts"
         for joint, gain in sorted(wanted.items())

@@ -30,6 +30,7 @@ from daq.contracts.quantity import (
     Volt,
     in_unit,
 )
+from firmware_protocol.invalid import first_invalid
 from firmware_protocol.units import DriveScale, JointCalibration
 
 Unitful = Annotated[Quantity, Field()]
@@ -115,8 +116,9 @@ class PlainGain(_Part):
 
 
 class Friction(_Part):
-    """Friction known beforehand. Viscous as in (7.30), on the motor's side, times the motor's speed; `coulomb_arm` is
-    μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` a plain torque at the joint."""
+    """Friction that is known beforehand. `viscous` is that of (7.30), on the motor's side, and multiplies the motor's
+    speed; `coulomb_arm` is μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` is a plain
+    torque at the joint."""
 
     viscous_motor_side: Annotated[Quantity, in_unit("N·m·s/rad", at_least=0.0)] | None = None
     viscous: Quantity | None = None
@@ -166,7 +168,7 @@ class BoardPid(_Part):
 
 
 class SampledPid(_Part):
-    """PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) a joint. `velocity_gains` closes
+    """PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
     an inner loop (cascade): the outer output is then a speed set point for it.
 
     The output is in the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to
@@ -199,7 +201,7 @@ DEVIATIONS_ARE_USED_OF = (
 
 
 class NoController(_Part):
-    """No controller in the loop, or none that is known: the recorded drive is the input."""
+    """No controller in the loop, or an unknown one: the recorded drive is the input."""
 
     kind: Literal["none"]
 
@@ -291,9 +293,8 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
     try:
         return Machine.model_validate(parse_toml(text, origin))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"]) or "machine"
-        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+        first = first_invalid(error)
+        raise SpecError(f"{origin}: {first.where('machine', first=1)}: {first.message}") from error
 
 
 def load_machine(name_or_path: str) -> Machine:

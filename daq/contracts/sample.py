@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class SampleRow:
-    """One control period of some joints, in SI units, one value a joint in the order of the trace's joints.
+    """One control period of some joints, in SI units, one value per joint, in the order of the trace's joints.
 
     `time` is tick · period, in s from the record's first tick: the board's own time. `host_time` is the host's
     monotonic clock (s) when the sample arrived. `set_point` is what the controller took in this period, not what was
     sent. `status` holds the board's flags (`firmware_protocol.commands.StatusFlag`). `velocity` is empty on a rig that
-    does not measure it, as the MA2000.
+    does not measure it, such as the MA2000.
     """
 
     tick: int

@@ -44,6 +44,6 @@ class StatusReport(Wire):
 
 
 def report_of(status: RobotStatus, server: str) -> StatusReport:
-    """The report of what a service says; what a newer service says more is left out."""
+    """The report of a service's status; fields that only a newer service has are left out."""
     fields = {name: getattr(status, name) for name in StatusReport.model_fields if name != "server"}
     return StatusReport(server=server, **fields)

@@ -25,7 +25,7 @@ class TraceLimits(BaseModel):
     total_bytes: Annotated[int, Field(ge=1)] = 2048 * MIB
     """Size of all chunks of a file once they are uncompressed."""
     records: Annotated[int, Field(ge=1)] = 20_000_000
-    """Records of a file, its messages among them. One sample takes a message a joint and one more."""
+    """Records of a file, its messages among them. One sample takes one message per joint and one more."""
     events: Annotated[int, Field(ge=0)] = 1_000_000
     attachments: Annotated[int, Field(ge=0)] = 100
     attachment_bytes: Annotated[int, Field(ge=0)] = 64 * MIB

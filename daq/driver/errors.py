@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 
 
 class ProtocolVersionError(DaqError):
     """Controller and host do not speak the same protocol."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class ControllerRestartedError(DaqError):
     """The board has been reset: set points and gains are those of power-up. Nothing goes on until `hello`."""
 
-    exit_code = 5
+    exit_code = exit_codes.FAULT
 
 
 class NoSampleError(DaqError):
     """No consistent reading for many periods."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class GainsNotTakenError(DaqError):
     """Gains read back differ from those written."""
 
-    exit_code = 5
+    exit_code = exit_codes.FAULT

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from firmware_protocol.commands import Refusal
 
@@ -9,7 +10,7 @@ from firmware_protocol.commands import Refusal
 class LinkError(DaqError):
     """The controller cannot be spoken to."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
     sent = False
     """Whether the request had been written when it failed, and may have been obeyed."""
 
@@ -25,7 +26,7 @@ class LinkLostError(LinkError):
 class RequestRefusedError(DaqError):
     """The controller answered that it will not. Nothing has changed there."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
     def __init__(self, request: str, reason: int) -> None:
         self.request = request

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.driver import Controller, StopConfirmation
 from daq.safety import Action, Arm, Event, State, advance
@@ -15,9 +16,13 @@ _ORDERLY = (Event.ARM, Event.START, Event.FINISHED, Event.DISARM)
 
 
 class StoppedError(DaqError):
-    """The arm has been stopped; the operation does not continue."""
+    """The arm has been stopped; the operation does not continue. cause: why, without saying that it was stopped"""
 
-    exit_code = 6
+    exit_code = exit_codes.STOPPED
+
+    def __init__(self, cause: str, line: str | None = None) -> None:
+        super().__init__(line or f"the arm has been stopped: {cause}")
+        self.cause = cause
 
 
 class ArmControl:
@@ -88,7 +93,7 @@ class ArmControl:
             yield
         except BaseException as error:
             if not self._frozen:
-                self.stop(f"{type(error).__name__}: {error}")
+                self.stop(error.cause if isinstance(error, StoppedError) else f"{type(error).__name__}: {error}")
             raise
 
     def _freeze(self) -> StopConfirmation:
@@ -106,7 +111,7 @@ class ArmControl:
     def require_not_halted(self) -> None:
         """Raises StoppedError when the arm has been halted."""
         if self._halted is not None:
-            raise StoppedError(f"the arm has been stopped: {self._halted}")
+            raise StoppedError(self._halted)
 
 
 def stop_line(confirmation: StopConfirmation) -> str:

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
@@ -40,7 +41,7 @@ PATIENCE_IN_LOCK_STEP = 5.0
 class RunFaultError(DaqError):
     """The run ended in a fault before there was anything to record, or its record was lost. The arm is frozen."""
 
-    exit_code = 5
+    exit_code = exit_codes.FAULT
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
         ending = approach.arrive(prepared.move.moving, ARRIVED_WITHIN, round(ARRIVAL_TIME / run.controller.period_s))
     if ending.kind != "finished":
         line = f"the move to the start ended before it was there: {ending.cause}; nothing was recorded"
-        raise StoppedError(line) if ending.kind == "stopped" else RunFaultError(line)
+        raise StoppedError(ending.cause, line) if ending.kind == "stopped" else RunFaultError(line)
 
 
 def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
@@ -168,8 +169,8 @@ def _finish(run: RunSetup, changes: tuple[GainChange, ...]) -> Ending:
         run.control.handle(Event.FINISHED)
         run.control.handle(Event.DISARM)
     except StoppedError as error:
-        run.control.stop(str(error))
-        return Ending("stopped", str(error))
+        run.control.stop(error.cause)
+        return Ending("stopped", error.cause)
     except (LinkError, GainsNotTakenError) as error:
         run.control.handle(Event.TRIP, str(error))
         return Ending("fault", f"the plan was carried out, but its gains could not be put back: {error}")

@@ -51,4 +51,4 @@ class RestGuards:
 
 
 def _frozen(row: SampleRow) -> Verdict:
-    return Verdict(stop=f"stopped on the board at tick {row.tick}") if row.status & StatusFlag.FROZEN.value else NOTHING
+    return Verdict(stop=f"on the board, at tick {row.tick}") if row.status & StatusFlag.FROZEN.value else NOTHING

@@ -93,7 +93,7 @@ def advance(arm: Arm, event: Event, cause: str | None = None) -> Outcome:
     """
     match event:
         case Event.STOP:
-            return _stop(arm, cause or "stop requested")
+            return _stop(arm, cause or "on request")
         case Event.TRIP:
             return replace(arm, state=State.FAULT, cause=_first(arm, cause or "guard tripped")), _HALT
         case Event.LINK_LOST:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.sample import SampleRow
@@ -15,7 +16,7 @@ from daq.runner import StoppedError
 class TeachingError(DaqError):
     """Teaching ended early, or its result cannot be used."""
 
-    exit_code = 5
+    exit_code = exit_codes.FAULT
 
 
 class TeachableArm(Protocol):
@@ -33,8 +34,8 @@ class TeachableArm(Protocol):
         ...
 
     def driven(self) -> AbstractContextManager[None]:
-        """Only within it are set points taken. Leaving it is the end of the work, unless it has been stopped; whatever
-        else ends it freezes the arm before anything else is done."""
+        """Set points are taken only within this context. Leaving it ends the work, unless the arm has been stopped; an
+        exception freezes the arm before anything else is done."""
         ...
 
     def next_sample(self) -> SampleRow:

@@ -118,4 +118,4 @@ class ControllerArm:
         try:
             self._control.handle(event)
         except StoppedError as error:  # stopped meanwhile: the error still states the result of the stop
-            raise self.freeze_for_stop(self._ended() or self._control.halted or str(error)) from error
+            raise self.freeze_for_stop(self._ended() or self._control.halted or error.cause) from error

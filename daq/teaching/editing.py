@@ -12,6 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.teaching.program import Instruction, Program
 from daq.teaching.program_plan import check_program, plan_program
+from firmware_protocol.invalid import first_invalid
 
 
 def delete(program: Program, number: int) -> Program:
@@ -47,7 +48,7 @@ def move(program: Program, number: int, to: int) -> Program:
 def change(program: Program, number: int, fields: Mapping[str, Any]) -> Program:
     """The program with other values in instruction `number`; angles of joints that are not named stay.
 
-    Raises SpecError for a field that such an instruction has not, and for a value that is not allowed.
+    Raises SpecError for a field that such an instruction does not have, and for a value that is not allowed.
     """
     _require(program, number)
     old = program.instructions[number - 1]
@@ -72,7 +73,7 @@ def new_violations(before: Program, after: Program, machine: Machine) -> list[st
     """Violations of the edited program that the program before did not have, planned from the machine's rest posture.
 
     A program that could not be planned before either (of another machine, or outside the sensors' ranges) is let
-    through: it may take several edits to mend. Raises SpecError where it cannot be planned any more, and for a machine
+    through: repairing it may take several edits. Raises SpecError where it can no longer be planned, and for a machine
     that has no rest posture.
     """
     if machine.rest_posture is None:
@@ -99,7 +100,6 @@ def _changed(program: Program, **fields: object) -> Program:
     try:
         return Program.model_validate(program.model_dump() | fields)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        raise SpecError(f"program {program.name}: {where} = {shown(first['input'])}: {message}") from error
+        first = first_invalid(error)
+        where = f"{first.where(first=1)} = {shown(first.value)}"
+        raise SpecError(f"program {program.name}: {where}: {first.message}") from error

@@ -10,7 +10,7 @@ from daq.teaching.arm import TeachingError
 
 def freeze_for_stop(control: ArmControl, cause: str) -> StoppedError:
     """Freezes the arm on request. A second request does no harm: the board confirms its state."""
-    return StoppedError(f"the arm has been stopped: {cause}{_frozen(control, Event.STOP, cause)}")
+    return StoppedError(cause, f"the arm has been stopped: {cause}{_frozen(control, Event.STOP, cause)}")
 
 
 def freeze_for_fault(control: ArmControl, cause: str, event: Event = Event.TRIP) -> TeachingError:

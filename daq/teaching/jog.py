@@ -25,7 +25,7 @@ DEAD_MAN = 0.3
 
 @dataclass(frozen=True)
 class JogCommand:
-    """Joints to be driven, with their velocities (rad/s), and when that was said (s, the clock of the samples)."""
+    """Joints to be driven, with their velocities (rad/s), and when they were given (s, on the samples' clock)."""
 
     velocities: Mapping[int, float]
     time: float
@@ -48,7 +48,7 @@ def top_speed(limits: Limits, joint: int) -> float:
 
 
 class Jogger:
-    """Works out one set point a period. Pure but for the angles it has accepted.
+    """Computes one set point per period. Pure except for the angles it has accepted.
 
     Needs all joints of the machine in every sample, since floor and reach depend on all. Raises SpecError without
     them, and for commands that are faster than allowed.
@@ -83,7 +83,7 @@ class Jogger:
         )
 
     def accept(self, step: JogStep) -> None:
-        """The step has been sent: the next one goes on from there."""
+        """Notes that the step has been sent: the next one continues from it."""
         self._driven.update(step.angles)
 
     def _check(self, command: JogCommand) -> None:

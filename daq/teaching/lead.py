@@ -1,4 +1,4 @@
-"""Lead by the nose: the led joints go limp, a hand moves the arm, what the sensors say is the path (section 6.4)."""
+"""Lead by the nose: the led joints go limp, a hand moves the arm, and the measured positions form the path."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from daq.trajectories import control_period
 from firmware_protocol.units import counts_to_posture
 
 STILL_WITHIN = 8
-"""ADC counts of error up to which the gains of a led joint come back: an assumption, a pull of half a degree. No led
-joint may have moved by more in that time either: set points that follow it leave no error to be seen."""
+"""Largest error (ADC counts) at which the gains of a led joint are restored: an assumption; the joint is then pulled by
+half a degree. No led joint may have moved further in that time either: set points that follow it leave no error."""
 STILL_FOR = 0.2
 """Time (s) for which the error must stay that small: an assumption. A hand that reverses is still for a moment."""
 SHORTEST = 2
@@ -40,10 +40,10 @@ def lead_by_nose(
 
     The gains of the led joints are 0 meanwhile: **the arm must be held, it may sink under its weight.** Their set
     points follow the hand, so that nothing pulls when the gains come back; they come back when the arm is at rest.
-    Joints not led hold their place and are watched. `keep` is given what was recorded, however it ended.
+    Joints not led hold their place and are watched. `keep` receives what was recorded, however it ended.
 
-    Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped: the led joints are limp then,
-    and the line says so: nothing is ever made stiff that may be moving or frozen elsewhere.
+    Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped. The led joints then stay
+    limp, and the error says so: a joint that may be moving, or frozen elsewhere, is never made stiff.
     """
     missing = [joint for joint in joints if joint not in arm.joints]
     if missing or not joints:
@@ -58,7 +58,7 @@ def lead_by_nose(
             if len(rows) >= SHORTEST:
                 keep(_path(rows, arm.joints, joints, control_period(machine)))
     except StoppedError as error:
-        raise StoppedError(f"lead: {error}{_limp_line(limp)}") from error
+        raise StoppedError(error.cause, f"lead: {error}{_limp_line(limp)}") from error
     except DaqError as error:
         raise TeachingError(f"lead: {error}{_limp_line(limp)}") from error
     if len(rows) < SHORTEST:

@@ -1,4 +1,4 @@
-"""Carries a taught program out on the real driver: its motions followed and guarded like any experiment's."""
+"""Carries a taught program out on the real driver; its motions are followed and guarded like those of an experiment."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class FollowingPerformer:
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
         self._guarded = partial(RunningGuards, machine, limits, self._arm.joints)
         self._guards = self._guarded(moving=self._arm.joints)
-        """Guards while nothing is sent. Joints that were moved last may still be on the way to their set points."""
+        """Guards for periods in which nothing is sent. Joints that moved last may still approach their set points."""
         self._step(Event.ARM)
 
     def follow(self, plan: Plan) -> None:
-        """Plays a plan to its end. Raises StoppedError or TeachingError when it does not get there; the arm is frozen
-        then. A board that has restarted since is noticed before anything is sent: its set points are others."""
+        """Plays a plan to its end. Raises StoppedError or TeachingError when it does not get there; the arm is then
+        frozen. A restart of the board is noticed before anything is sent, because it has changed the set points."""
         self.observe(1)
         self._step(Event.START)
         ending = self._follower.follow(plan, lambda _index: None)
@@ -72,8 +72,8 @@ class FollowingPerformer:
         self._step(Event.FINISHED)
 
     def observe(self, periods: int) -> None:
-        """Lets so many control periods pass, watched. Raises StoppedError on a request to end, also in between,
-        and TeachingError for a fault, a restart or a lost link; the arm is frozen then."""
+        """Waits this many control periods under the guards. Raises StoppedError on a request to end, also in between,
+        and TeachingError for a fault, a restart or a lost link; the arm is then frozen."""
         for _ in range(periods):
             verdict = self._guards.check(self._arm.next_sample(), {})
             if verdict.stop is not None:
@@ -110,4 +110,4 @@ class FollowingPerformer:
         try:
             self._control.handle(event)
         except StoppedError as error:
-            raise halting.freeze_for_stop(self._control, self._control.halted or str(error)) from error
+            raise halting.freeze_for_stop(self._control, self._control.halted or error.cause) from error

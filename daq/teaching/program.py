@@ -14,6 +14,7 @@ from daq.contracts.experiment import Angle, Duration, JointNumber
 from daq.teaching.files import write_whole
 from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
 from daq.trajectories import MOVE_SPEED
+from firmware_protocol.invalid import first_invalid
 
 NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
 """Permitted names of programs, as a regular expression."""
@@ -104,9 +105,8 @@ def parse_program(text: str, origin: str = "program") -> Program:
             return Program.model_validate(parse_toml(text, origin))
         return Program.model_validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"]) or "program"
-        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+        first = first_invalid(error)
+        raise SpecError(f"{origin}: {first.where('program', first=1)}: {first.message}") from error
 
 
 def program_text(program: Program) -> str:

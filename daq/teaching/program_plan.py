@@ -43,7 +43,7 @@ class Performer(Protocol):
         ...
 
     def observe(self, periods: int) -> None:
-        """Lets so many control periods pass."""
+        """Waits for this many control periods."""
         ...
 
     def input_is_on(self, line: int) -> bool:
@@ -80,8 +80,8 @@ def plan_program(program: Program, machine: Machine, start: Sequence[float]) -> 
 
 
 def check_program(planned: Sequence[PlannedInstruction], machine: Machine, limits: Limits) -> list[str]:
-    """All violations of the program, one line each. The first motion may come back from
-    outside the limits, where the arm may have been led."""
+    """All violations of the program, one line each. The first motion may come back from outside the limits, where the
+    arm may have been led."""
     lines = []
     first = True
     for item in planned:

@@ -19,7 +19,7 @@ FASTEST_RATE = 10.0
 
 
 class RecordedPath(BaseModel):
-    """Measured angles (rad), one row a control period, one column a joint; times (s) from the first row."""
+    """Measured angles (rad), one row per control period, one column per joint; times (s) from the first row."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -46,7 +46,7 @@ class RecordedPath(BaseModel):
 
     def thinned(self, within: float) -> RecordedPath:
         """The same path with as few points as keep it within `within` rad of every recorded one (Douglas–Peucker in
-        time): what is left out are rests and straight lines."""
+        time): points at rest and on straight lines are left out."""
         positions = np.array(self.positions)
         times = np.array(self.times)
         kept = {0, len(times) - 1}

@@ -1,1 +1,1 @@
-"""Trace files: MCAP written so that a crash loses a second at most, read into numpy, listed, checked, drawn, as CSV."""
+"""Trace files: MCAP, written so that a crash loses at most a second; reading, listing, checking, plotting, and CSV."""

@@ -2,9 +2,9 @@
 
 The cache holds the limits that the trace was read within, and the size and the CRC-32 over every byte of the trace file
 it was made from, and is used only when the file still has both and the limits are the same. So a changed file is
-noticed whatever its times say: damage of up to 32 bits in a row always, anything else but for one case in 2³². A
-cryptographic hash would take four times as long, most of the 0.2 s that opening again may take, and protect from
-nobody: who can forge the trace can write the cache as well.
+noticed whatever its times say: damage of up to 32 bits in a row always, any other change except in
+one case of 2³². A cryptographic hash would take four times as long, most of the 0.2 s that opening again may take, and
+would protect against nobody: anyone who can forge the trace can also write the cache.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def cache_path(path: Path) -> Path:
 
 
 def key_of(path: Path, limits: TraceLimits) -> str:
-    """What a cache must have been made from, and within which limits, to be used for this file. Raises OSError."""
+    """Identifies a trace file and the limits for reading it; only a cache of this key is used. Raises OSError."""
     size = crc = 0
     with path.open("rb", buffering=0) as stream:
         while piece := stream.read(_PIECE):
@@ -64,7 +64,7 @@ def load(path: Path, key: str) -> Trace | None:
 
 
 def store(path: Path, key: str, trace: Trace) -> bool:
-    """Keep a trace for the next time; False where the folder cannot be written to, which is no error."""
+    """Writes the cache of a trace; False where the folder cannot be written to, which is no error."""
     head = {
         "record": trace.record.model_dump(mode="json"),
         "joints": trace.joints,

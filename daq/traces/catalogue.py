@@ -175,7 +175,7 @@ def _metadata(path: Path, limits: TraceLimits) -> tuple[Texts, Texts | None]:
 
 
 def _scanned_metadata(path: Path, data: bytes, limits: TraceLimits) -> dict[str, Texts]:
-    """The same from the whole file, which also says what is wrong with it. Raises TraceError."""
+    """The same metadata, read from the whole file, which also shows any damage. Raises TraceError."""
     found = scan(data, str(path), limits)
     if found.damage is not None:
         raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")

@@ -25,10 +25,11 @@ from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
 from daq.traces.naming import trace_id_of
 from daq.traces.recording import software
+from firmware_protocol.invalid import first_invalid
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
-"""Columns a joint may have, after which comes `_` and its number. `position` is needed, or `velocity` in its place: a
-position is then the integral of the speed, from 0."""
+"""Signals that a joint may have; a column is named by the signal, `_` and the joint's number. `position` is needed, or
+`velocity` in its place: the position is then the integral of the velocity, from 0."""
 
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 """Note in a trace whose positions were integrated."""
@@ -36,7 +37,7 @@ INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-6])")
 
 
-class Beside(BaseModel):
+class CsvDescription(BaseModel):
     """The TOML beside a CSV file. `machine` is the name of a shipped machine or a path from the TOML's folder."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -62,7 +63,7 @@ def toml_path(path: Path) -> Path:
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
-    """Write `time` and the signals that the trace has, and the TOML beside it. Numbers read back exactly.
+    """Writes `time` and the signals that the trace has, and the TOML beside it. Numbers read back exactly.
 
     The same trace gives the same bytes. Raises TraceError when a file cannot be written.
     """
@@ -81,7 +82,7 @@ def export_csv(trace: Trace, path: Path) -> Path:
             stream.writelines(
                 ",".join(map(repr, row)) + "\n" for row in zip(*(c.tolist() for c in columns), strict=True)
             )
-        toml_path(path).write_text(_beside_text(trace), encoding="utf-8")
+        toml_path(path).write_text(_description_text(trace), encoding="utf-8")
     except OSError as error:
         raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
     return path
@@ -96,10 +97,10 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     path = Path(path)
     data = _read(path, limits.file_bytes, "file_bytes")
     toml = toml_path(path)
-    beside_data = _read(toml, limits.metadata_bytes, "metadata_bytes") if os.path.exists(toml) else None
-    beside = _beside(toml, beside_data)
+    description_data = _read(toml, limits.metadata_bytes, "metadata_bytes") if os.path.exists(toml) else None
+    description = _description(toml, description_data)
     header, table, rows = _read_table(path, data, limits)
-    joints = _joints(path, header, beside)
+    joints = _joints(path, header, description)
     _check_bounds(path, header, table, rows)
     signals: dict[str, Any] = {}
     for name in SIGNALS:
@@ -109,7 +110,7 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
             raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
-    record = _record(path, beside, trace_id_of(data, *([] if beside_data is None else [beside_data])))
+    record = _record(path, description, trace_id_of(data, *([] if description_data is None else [description_data])))
     if "position" not in signals:
         signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
@@ -124,35 +125,35 @@ def _integrate(time: Floats, velocity: Floats) -> Floats:
     return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _record(path: Path, beside: Beside, identity: str) -> TraceRecord:
+def _record(path: Path, description: CsvDescription, identity: str) -> TraceRecord:
     """`identity` is that of the file and the TOML beside it, so that a model fitted to them goes on naming them."""
     machine = None
-    if beside.machine is not None:
-        named = beside.machine in shipped_machines()
+    if description.machine is not None:
+        named = description.machine in shipped_machines()
         try:
-            machine = load_machine(beside.machine if named else str(path.parent / beside.machine))
+            machine = load_machine(description.machine if named else str(path.parent / description.machine))
         except DaqError as error:
             raise TraceError(f"{toml_path(path)}: machine: {error}") from error
     own_name = machine.name if machine else path.stem
     return TraceRecord(
         trace_id=identity,
-        created=beside.created or datetime.now(UTC),
+        created=description.created or datetime.now(UTC),
         software=software(),
-        source=beside.source,
-        robot=own_name if beside.robot is None else beside.robot,
+        source=description.source,
+        robot=own_name if description.robot is None else description.robot,
         machine=machine,
-        operator=beside.operator,
-        period=beside.period,
-        drive_unit=beside.drive_unit,
-        notes=beside.notes,
-        outcome=beside.outcome,
+        operator=description.operator,
+        period=description.period,
+        drive_unit=description.drive_unit,
+        notes=description.notes,
+        outcome=description.outcome,
     )
 
 
-def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
+def _joints(path: Path, header: list[str], description: CsvDescription) -> tuple[int, ...]:
     measured = "position_" if any(name.startswith("position_") for name in header) else "velocity_"
     found = sorted(int(name.removeprefix(measured)) for name in header if name.startswith(measured))
-    wanted = beside.joints or tuple(found)
+    wanted = description.joints or tuple(found)
     for joint in wanted:
         if joint not in found:
             raise TraceError(f"{path}: row 1: column 'position_{joint}' is missing; it has {', '.join(header)}")
@@ -162,7 +163,7 @@ def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
 
 
 def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int]]:
-    """Header, numbers (rows, columns), all finite, and in which row of the file each stands. Raises TraceError."""
+    """Header, numbers (rows, columns), all finite, and the row of the file that each stands in. Raises TraceError."""
     try:
         rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
         header = [name.strip() for name in next(rows, [])]
@@ -192,7 +193,7 @@ def _check_header(path: Path, header: list[str]) -> None:
 def _numbers(
     path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits
 ) -> tuple[Floats, array[int]]:
-    """The numbers (rows, columns), all finite, and the row of the file of each: blank ones are left out.
+    """The numbers (rows, columns), all finite, and the row of the file of each; blank rows are left out.
 
     Raises TraceError.
     """
@@ -217,7 +218,7 @@ def _numbers(
 
 
 def _records_of_a_row(header: list[str]) -> int:
-    """Messages that a row becomes in a trace: one a joint, and one for all of them."""
+    """Number of messages that a row becomes in a trace: one per joint, and one for all of them."""
     return 1 + len({name.rpartition("_")[2] for name in header[1:]})
 
 
@@ -261,25 +262,26 @@ def _read(path: Path, most: int, limit: str) -> bytes:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
 
 
-def _beside(path: Path, data: bytes | None) -> Beside:
+def _description(path: Path, data: bytes | None) -> CsvDescription:
     if data is None:
-        return Beside()
+        return CsvDescription()
     try:
-        beside = Beside.model_validate(parse_toml(data.decode("utf-8"), str(path)))
+        description = CsvDescription.model_validate(parse_toml(data.decode("utf-8"), str(path)))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise TraceError(f"{path}: {where}: {first['msg']} (got {shown(first['input'])})") from error
+        first = first_invalid(error)
+        raise TraceError(f"{path}: {first.where()}: {first.message} (got {shown(first.value)})") from error
     except UnicodeDecodeError as error:
         raise TraceError(f"{path}: is not text in UTF-8") from error
     except SpecError as error:
         raise TraceError(str(error)) from error
-    if beside.created is not None and beside.created.tzinfo is None:
-        raise TraceError(f"{path}: created: {beside.created.isoformat()} has no time zone; write Z behind it for UTC")
-    return beside
+    if description.created is not None and description.created.tzinfo is None:
+        raise TraceError(
+            f"{path}: created: {description.created.isoformat()} has no time zone; write Z behind it for UTC"
+        )
+    return description
 
 
-def _beside_text(trace: Trace) -> str:
+def _description_text(trace: Trace) -> str:
     record = trace.record
     machine = record.machine.name if record.machine and record.machine.name in shipped_machines() else None
     created = record.created.astimezone(UTC).isoformat().replace("+00:00", "Z")

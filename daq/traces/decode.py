@@ -37,7 +37,7 @@ def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded
 
 
 def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimits, origin: str) -> None:
-    """Shorten a scan to the chunks before the first that does not follow the ones before it.
+    """Shortens a scan to the chunks before the first that does not follow the ones before it.
 
     A recording ends no chunk inside a row, and time increases from row to row.
     Raises TraceError when the channels are not those of a trace.

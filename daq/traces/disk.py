@@ -13,7 +13,7 @@ from daq.contracts.errors import TraceError
 
 
 def open_regular(path: Path) -> IO[bytes]:
-    """A file to read. Raises OSError, also for what is no file: opening a pipe would wait for its writer."""
+    """Opens a regular file to read. Raises OSError, also for a pipe, whose opening would wait for its writer."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
@@ -40,7 +40,7 @@ def read_at_most(stream: IO[bytes], most: int, origin: str, limit: str = "file_b
 def create_locked(path: Path) -> IO[bytes]:
     """A new file, locked for this process until it is closed or the process ends.
 
-    Raises TraceError when the file exists, or another process took it in the moment of its making; OSError otherwise.
+    Raises TraceError when the file exists, or another process took it while it was being created; OSError otherwise.
     """
     try:
         stream = path.open("xb")
@@ -54,7 +54,7 @@ def create_locked(path: Path) -> IO[bytes]:
 
 
 def try_lock(stream: IO[bytes]) -> bool:
-    """Take the lock of an open file; False when a living process has it."""
+    """Takes the lock of an open file; False when a living process has it."""
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -82,13 +82,13 @@ def is_still_at(stream: IO[bytes], path: Path) -> bool:
 
 
 def sync(stream: IO[bytes]) -> None:
-    """Bring everything written so far to the disk."""
+    """Syncs everything written so far to the disk."""
     stream.flush()
     os.fsync(stream.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk."""
+    """Syncs the names in a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
@@ -97,7 +97,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def rename(old: Path, new: Path) -> None:
-    """Give a file its final name, and bring the name to the disk."""
+    """Gives a file its final name, and syncs the name to the disk."""
     old.replace(new)
     sync_folder(new.parent)
 

@@ -40,7 +40,7 @@ def first_metadata(stream: IO[bytes], limits: TraceLimits, origin: str) -> tuple
 
 
 def indexed_metadata(stream: IO[bytes], limits: TraceLimits) -> dict[str, Texts]:
-    """The metadata of a trace that the index of a finished file leads to, by name.
+    """Metadata of a finished file by name, found through its index.
 
     Raises ValueError or another of UNREADABLE when it has no index or a damaged one, OSError.
     """

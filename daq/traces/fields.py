@@ -1,7 +1,7 @@
 """The fields of MCAP records, read so that no length, whatever it claims, reaches beyond its record.
 
-mcap's own parsers take what is left of a record for the whole of a field that is cut, and pass lengths of 2⁶⁴−1 on to
-Python's streams, which raise OverflowError.
+mcap's own parsers take the rest of a record for a whole field where the field is cut off, and pass lengths of 2⁶⁴−1 on
+to Python's streams, which raise OverflowError.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Fields:
 
 
 def chunk_of(body: memoryview) -> CompressedChunk:
-    """Raises ValueError, as all of these do."""
+    """The chunk in a record's body. Raises ValueError, as all functions below do."""
     fields = Fields(body)
     fields.raw(16)  # times of the first and the last message, which the messages state themselves
     size, crc, compression = fields.u64(), fields.u32(), fields.text()

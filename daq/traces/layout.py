@@ -145,7 +145,7 @@ def event_of(message: bytes) -> TraceEvent:
 
 
 def json_object(text: str | bytes) -> dict[str, Any]:
-    """An object of JSON, nested 200 deep at most and without NaN. Raises ValueError."""
+    """A JSON object, nested at most 200 deep and without NaN. Raises ValueError."""
     found = from_json(text, allow_inf_nan=False)
     if not isinstance(found, dict):
         raise ValueError("it is no JSON object")  # noqa: TRY004  # what is wrong is the text, not a type here

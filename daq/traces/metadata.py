@@ -12,6 +12,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import TRACE_FORMAT, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import layout
+from firmware_protocol.invalid import first_invalid
 
 _JOINT = re.compile(r"[1-9][0-9]?")
 _NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
@@ -74,7 +75,10 @@ def signals_of(start: dict[str, str], origin: str) -> frozenset[str]:
 
 
 def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
-    """Number of samples, and s between the first and the last, as its end tells. Raises TraceError."""
+    """Number of samples, and time (s) between the first and the last, as the trace's end states them.
+
+    Raises TraceError.
+    """
     try:
         samples, duration = int(end["samples"][:_SHOWN]), float(end["duration"][:_SHOWN])
     except (KeyError, ValueError) as error:
@@ -87,6 +91,6 @@ def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
 def one_line(error: Exception) -> str:
     """The error in one line, with the field for pydantic's errors."""
     if isinstance(error, ValidationError):
-        first = error.errors()[0]
-        return f"{'.'.join(str(part)[:_SHOWN] for part in first['loc'])}: {first['msg']}"
+        first = first_invalid(error)
+        return f"{'.'.join(str(part)[:_SHOWN] for part in first.place)}: {first.message}"
     return " ".join(str(error).split())

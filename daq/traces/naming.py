@@ -45,5 +45,5 @@ def part_path(path: Path) -> Path:
 
 
 def finished_path(part: Path) -> Path:
-    """The name a part file gets when it is finished."""
+    """The name that a part file gets when it is finished."""
     return part.with_name(part.name.removesuffix(PART_SUFFIX) + SUFFIX)

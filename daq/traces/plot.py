@@ -1,4 +1,4 @@
-"""A trace as a picture one would print: position and set point, error, drive, and as one HTML page.
+"""Draws a trace for print: position and set point, error, drive; also as one HTML page.
 
 matplotlib and Jinja2 are imported when a plot is made, so that nothing else waits for them.
 """
@@ -70,10 +70,10 @@ class _Row:
 
 
 def plot_trace(trace: Trace, path: Path, joints: tuple[int, ...] | None = None) -> Path:
-    """Draw a trace into a PNG, SVG, PDF or self-contained HTML file, by the suffix of `path`. Returns `path`.
+    """Draws a trace into a PNG, SVG, PDF or self-contained HTML file, by the suffix of `path`. Returns `path`.
 
     `joints` are drawn; None draws those that the experiment moves, or all where there is no experiment.
-    Raises TraceError for another suffix, a joint that the trace has not, a trace without samples, or a file that
+    Raises TraceError for another suffix, a joint that the trace does not have, a trace without samples, or a file that
     cannot be written.
     """
     path = Path(path)
@@ -112,7 +112,7 @@ def html_page(trace: Trace, joints: tuple[int, ...] | None = None) -> bytes:
 
 
 def figure_of(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
-    """The figure: a row a signal, a column a joint, marks where something happened."""
+    """The figure: one row per signal, one column per joint, marks at events."""
     from matplotlib.figure import Figure
 
     recorded = trace.joints

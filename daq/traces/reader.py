@@ -80,7 +80,7 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
 
 
 def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, NDArray[Any]]:
-    """The columns of a trace, by their names: time, position, and what else of them it has."""
+    """The columns of a trace by name: time, position, and the others that it has."""
     first = decoded.samples[0]
 
     def columns(name: str) -> NDArray[Any]:

@@ -19,7 +19,7 @@ ONE_CHUNK_A_FLUSH = 1 << 40
 
 
 def open_mcap(stream: IO[bytes]) -> Writer:
-    """An MCAP writer as all traces are written: zstd, one chunk a flush, checksums over chunks and the data section."""
+    """The MCAP writer for all traces: zstd, one chunk per flush, checksums over chunks and the data section."""
     writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(library=software())
     return writer
@@ -85,10 +85,10 @@ class Recording:
         self._log = self._mcap.register_channel(layout.EVENTS_TOPIC, "json", log)
 
     def row(self, row: SampleRow) -> None:
-        """Add one control period.
+        """Adds one control period.
 
         Messages are published at the board's time and logged at the host's monotonic one, both counted from the
-        record's start: a UTC clock that is set back meanwhile moves nothing.
+        record's start: a UTC clock that is set back meanwhile does not shift them.
         """
         first = self._first = self._first or row
         published = self._stamp(row.time)
@@ -101,7 +101,7 @@ class Recording:
         self.last_time = row.time
 
     def event(self, event: TraceEvent) -> None:
-        """Add an event."""
+        """Adds an event."""
         moment = self._stamp(event.time)
         self._mcap.add_message(self._log, moment, layout.event_message(event, moment), moment, self._events)
         self._events += 1
@@ -114,11 +114,11 @@ class Recording:
         return stamp
 
     def flush(self) -> None:
-        """End the chunk: what was added so far can be read back once the stream's bytes are."""
+        """Ends the chunk: what was added so far can be read back once the stream's bytes are."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
 
     def finish(self, outcome: Outcome | None, counters: Mapping[str, float]) -> None:
-        """Write the outcome, the index and the end of the file."""
+        """Writes the outcome, the index and the end of the file."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
         duration = self.last_time - (self._first.time if self._first else 0.0)
         self._mcap.add_metadata(layout.END_METADATA, outcome_metadata(outcome, counters, self.samples, duration))

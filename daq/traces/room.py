@@ -10,13 +10,13 @@ from daq.contracts.errors import TraceError
 from daq.traces import disk
 
 BYTES_A_SAMPLE = 400
-"""Size of one joint's sample, estimated generously (docs/traces.md gives the measured figure)."""
+"""Size (bytes) of one joint's sample, estimated generously (docs/traces.md gives the measured figure)."""
 RESERVE = 20_000_000
 """Space (bytes) that stays free for other programs."""
 
 
 def require_room(folder: Path, samples: int, joints: int) -> None:
-    """Makes the folder, writes and syncs a first file there, and compares what is free with what the trace may need.
+    """Makes the folder, writes and syncs a test file there, and compares the free space with what the trace may need.
 
     Raises TraceError with one line.
     """

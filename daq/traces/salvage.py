@@ -1,4 +1,4 @@
-"""Finishing the traces that a crash or a power cut left without an end. What was synced is kept; none is complete.
+"""Finishes traces that a crash or a power cut left without an end. What was synced is kept; none counts as complete.
 
 No file keeps the next one from being salvaged, whatever is in it, and no byte of what could not be read is deleted.
 """
@@ -71,7 +71,7 @@ class _NoTraceError(TraceError):
 
 
 def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tuple[Salvaged, ...]:
-    """Salvage every part file in a folder that no living process is writing. One that cannot be salvaged says why.
+    """Salvages every part file in a folder that no living process is writing. One that cannot be salvaged says why.
 
     Raises TraceError when the folder cannot be read.
     """
@@ -96,11 +96,11 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
 
 
 def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
-    """Make a finished trace, marked `interrupted`, from a part file, and remove the part file once that is safe.
+    """Makes a finished trace, marked `interrupted`, from a part file, and removes the part file once that is safe.
 
-    Everything up to the first damage is kept. Where something follows that was not read, or another program has put
-    metadata or records of its own in, which are not copied, the part file is renamed and stays. Running it again after
-    it was cut short itself gives the same trace.
+    Everything up to the first damage is kept. The part file is renamed and kept if bytes follow that were not read, or
+    if it holds metadata or records of other programs, which are not copied. A salvage that was interrupted gives the
+    same trace when it is run again.
     Raises PutAsideError when no trace can be made from it: it has been renamed, so that it is not tried again. Raises
     TraceError when a living process is writing the file, when another trace has its name, when a newer version wrote
     it, or when reading or writing fails; the part file is then as it was.
@@ -173,7 +173,7 @@ def _readable(part: Path, data: bytes, limits: TraceLimits) -> _Readable:
 
 
 def _trace_before_damage(found: Scan, origin: str, limits: TraceLimits) -> Trace:
-    """The trace in a scan, which is shortened to it where a chunk does not belong to it. Raises TraceError."""
+    """The trace in a scan, which is cut before the first chunk that does not belong to it. Raises TraceError."""
     if layout.START_METADATA not in found.metadata:
         raise TraceError(f"{origin}: holds no trace")
     try:
@@ -187,7 +187,7 @@ def _trace_before_damage(found: Scan, origin: str, limits: TraceLimits) -> Trace
 
 
 def _put_aside(part: Path, suffix: str) -> Path:
-    """Rename a part file to a name that no file has. Raises OSError."""
+    """Renames a part file to a name that no file has. Raises OSError."""
     aside = part.with_name(part.name + suffix)
     number = 1
     while aside.exists():
@@ -206,7 +206,7 @@ def _counters(start: Texts, end: Texts | None, part: Path) -> dict[str, float]:
 
 
 def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> None:
-    """A file with the final name may only be what an earlier salvage of the same part file made."""
+    """Raises TraceError for a file of the final name, unless an earlier salvage of the same part file made it."""
     if not path.exists():
         return
     there = read_trace(path, limits).record
@@ -240,7 +240,7 @@ def _copy(found: Scan, writer: Writer) -> None:
 
 
 def _check_copy(path: Path, trace: Trace, limits: TraceLimits) -> None:
-    """Read the copy back before the original goes. Raises TraceError when it does not hold the same samples."""
+    """Reads the copy back before the original is removed. Raises TraceError when it does not hold the same samples."""
     found = scan(path.read_bytes(), str(path), limits)
     copy = trace_of(found, str(path), limits)
     same = all(np.array_equal(getattr(copy, name), getattr(trace, name)) for name in layout.ALL_SIGNALS)

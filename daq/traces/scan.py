@@ -1,6 +1,6 @@
-"""Walking through the records of an MCAP file that may end anywhere, be damaged anywhere, or be made to do harm.
+"""Walks through the records of an MCAP file that may end anywhere, be damaged anywhere, or be made to do harm.
 
-mcap's own StreamReader reads the same records, but takes what is left of a cut record for the whole of it, and parses
+mcap's own StreamReader reads the same records, but takes the rest of a cut record for a whole one, and parses
 the index of every message, which costs more than all the rest of opening a trace.
 """
 
@@ -64,7 +64,7 @@ class Scan:
     good_bytes:      length of the readable part
     damage:          what is wrong after it; None when the file is whole
     records:         number of records outside of chunks
-    others:          number of records that say something and are not kept here: metadata and records of other programs
+    others:          number of records with content that is not kept here: metadata and records of other programs
     chunks_indexed:  number of chunks that the index tells of; None without an index
     """
 
@@ -81,13 +81,13 @@ class Scan:
     chunks_indexed: int | None = None
 
     def cut_before_chunk(self, number: int, damage: str) -> None:
-        """Take chunk `number` (from 0) for the first damage."""
+        """Treats chunk `number` (from 0) as the first damage."""
         self.good_bytes, self.damage = self.chunk_starts[number], damage
         del self.chunks[number:], self.chunk_starts[number:]
 
 
 def scan(data: bytes | memoryview, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Scan:
-    """Read everything readable. What exceeds a limit counts as damage from there on.
+    """Reads everything readable. What exceeds a limit counts as damage from there on.
 
     Raises TraceError when `data` is empty or does not begin as an MCAP file.
     """
@@ -131,7 +131,7 @@ def messages(chunk: bytes) -> Iterator[Message]:
 
 
 def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tuple[int, set[int]]:
-    """Append the data of each message to the list of its channel, where it has one: the short way to all samples.
+    """Appends the data of each message to the list of its channel, where there is one: the fast way to all samples.
 
     Returns how many records the chunk has and which channels its messages are of. Raises ValueError or struct.error
     when a record does not end with the chunk, or there are more than `most`.
@@ -151,7 +151,7 @@ def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tup
             raise ValueError(NOT_IN_CHUNKS)
         position = following
         count += 1
-    while position < end and count < most:  # what is too short for a message
+    while position < end and count < most:  # records too short for a message
         opcode, position = _record_at(chunk, position)
         if opcode not in _DEFINITIONS:
             raise ValueError(NOT_IN_CHUNKS)
@@ -184,7 +184,7 @@ class _Walk:
         self._defined_in_chunks = 0
 
     def take(self, opcode: int, body: memoryview) -> None:
-        """Raises one of UNREADABLE."""
+        """Sorts one record into the scan. Raises one of UNREADABLE."""
         found = self._found
         found.records += 1
         require(found.records, self._limits.records, "there are more than {} records", "records")

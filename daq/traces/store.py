@@ -1,4 +1,4 @@
-"""Writing a whole trace at once: what was imported, or made by computation."""
+"""Writes a whole trace at once, imported or computed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from daq.traces.writer import ROWS_A_CHUNK
 
 
 def write_trace(trace: Trace, path: Path) -> Path:
-    """Write `trace` to a new file at `path`, so that it is there whole or not at all. Returns `path`.
+    """Writes `trace` to a new file at `path`, so that it is there whole or not at all. Returns `path`.
 
     Raises TraceError when the file exists or cannot be written, or no reader would take the trace.
     """
@@ -53,7 +53,7 @@ def _signals(trace: Trace) -> tuple[str, ...]:
 
 
 def _rows(trace: Trace) -> Iterator[SampleRow]:
-    """Rows in which a signal that the trace has not is NaN, or 0 where it is an integer."""
+    """Rows in which a signal that the trace does not have is NaN, or 0 where it is an integer."""
     absent = (math.nan,) * len(trace.joints)
     columns = {
         name: None if getattr(trace, name) is None else getattr(trace, name).tolist()

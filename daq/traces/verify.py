@@ -28,7 +28,7 @@ PERIODS_OFF = 0.01
 
 
 class Finding(BaseModel):
-    """One thing that was found, in one line."""
+    """One finding, in one line."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -38,7 +38,7 @@ class Finding(BaseModel):
 
 
 class Verification(BaseModel):
-    """All that was found in one file. `trustworthy` is whether none of it is an error."""
+    """All findings about one file. `trustworthy`: none of them is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -52,9 +52,9 @@ class Verification(BaseModel):
 
 
 def verify(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Verification:
-    """Check everything about a trace file that the file itself allows to check; never uses the cache.
+    """Checks all that can be checked from a trace file alone; never uses the cache.
 
-    Raises TraceError only when the file cannot be read from the disk, or is larger than is read or fits into memory.
+    Raises TraceError only when the file cannot be read from the disk, or exceeds the limits or the memory.
     """
     path = Path(path)
     try:

@@ -1,4 +1,4 @@
-"""Recording a trace off the acquisition loop: a bounded queue to one thread that writes and syncs."""
+"""Records a trace outside the acquisition loop: a bounded queue feeds one thread that writes and syncs."""
 
 from __future__ import annotations
 
@@ -91,19 +91,19 @@ class TraceWriter:
         return self._failure
 
     def sample(self, row: SampleRow) -> None:
-        """Record one control period. Raises TraceError when writing has failed or the row cannot follow the last."""
+        """Records one control period. Raises TraceError when writing has failed or the row cannot follow the last."""
         self._check(row)
         self._last = row
         self._put(row)
 
     def event(self, event: TraceEvent) -> None:
-        """Record an event. Raises TraceError when writing has failed or the event's time is not finite."""
+        """Records an event. Raises TraceError when writing has failed or the event's time is not finite."""
         if not math.isfinite(event.time):
             raise TraceError(f"{self.path}: event {event.kind!r} has time {event.time}, which is not finite")
         self._put(event)
 
     def close(self, outcome: Outcome, counters: Mapping[str, float] | None = None) -> Path:
-        """Write everything that waits, finish the file and give it its name. Returns `path`.
+        """Writes everything that waits, finishes the file and gives it its name. Returns `path`.
 
         Raises TraceError when that failed; the part file then stays for `salvage`.
         """
@@ -156,7 +156,7 @@ class TraceWriter:
             raise self._fail(f"the disk is {self._queue.maxsize} samples and events behind") from None
 
     def _fail(self, what: str) -> TraceError:
-        """Remember the first failure; the calls that come raise it."""
+        """Keeps the first failure; later calls raise it."""
         if self._failure is None:
             self._failure = TraceError(f"{self.path}: cannot be written: {what}; what came before is in {self.part}")
         return self._failure
@@ -173,7 +173,7 @@ class TraceWriter:
             raise
 
     def _refuse_what_waits(self) -> None:
-        """Empty the queue, so that an acquisition that waits for room in it is told at its next call."""
+        """Empties the queue, so that an acquisition that waits for room in it gets the error at its next call."""
         while not self._queue.empty():
             self._queue.get_nowait()
 

@@ -1,9 +1,9 @@
-"""From a specified motion to the set points of every control period. Pure: nothing here moves anything."""
+"""Turns a specified motion into set points for every control period. Pure: nothing here moves an arm."""
 
 from daq.trajectories.move import MOVE_SPEED, plan_move
 from daq.trajectories.planner import plan, start_angles
 from daq.trajectories.presets import PRESETS, Preset, preset
-from daq.trajectories.set_points import Mark, Plan, PlanPreview, control_period, make_plan, snapped
+from daq.trajectories.set_points import Mark, Plan, PlanPreview, control_period, make_plan, representable_angles
 
 __all__ = [
     "MOVE_SPEED",
@@ -17,6 +17,6 @@ __all__ = [
     "plan",
     "plan_move",
     "preset",
-    "snapped",
+    "representable_angles",
     "start_angles",
 ]

@@ -10,7 +10,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
 from daq.trajectories.cubic import PEAK_SPEED, rest_to_rest
 from daq.trajectories.piece import Piece, sample_times, smooth_piece
-from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, snapped
+from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, representable_angles
 
 MOVE_SPEED = 0.25
 """Highest speed of a slow move in rad/s: an assumption, under half that of the source's ramp."""
@@ -25,7 +25,7 @@ def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float],
     The joint with the longest way reaches `speed` (rad/s) half-way. Where both are the same posture the plan is that
     one set point. Raises SpecError for angles outside the sensors' ranges.
     """
-    begin, end = snapped(machine, start), snapped(machine, target)
+    begin, end = representable_angles(machine, start), representable_angles(machine, target)
     way = move_piece(end - begin, control_period(machine), speed)
     moving = [joint + 1 for joint in np.flatnonzero(end != begin).tolist()]
     jumps = np.concatenate([[False], way.jumps])

@@ -1,4 +1,4 @@
-"""Multisine: many frequencies at once, with phases that a seed decides."""
+"""Multisine: many frequencies at once, with phases drawn from a seed."""
 
 from __future__ import annotations
 

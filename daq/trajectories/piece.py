@@ -19,7 +19,7 @@ LONGEST = 4 * 3600.0
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Motion of k joints from where they stand, without the point where they stand.
+    """Motion of k joints relative to its start, without the start itself.
 
     offsets: (m, k) rad from the start of the piece, at 1, 2, … m control periods after it
     jumps:   (m,) True where a set point jumps on purpose

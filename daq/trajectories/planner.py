@@ -37,7 +37,7 @@ from daq.trajectories.pick_and_place import pick_and_place
 from daq.trajectories.piece import Piece, smooth_piece
 from daq.trajectories.ramp import ramp
 from daq.trajectories.sequence import join_pieces, spread
-from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, snapped
+from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, representable_angles
 from daq.trajectories.sine import sine
 from daq.trajectories.slow_ramp import slow_ramp
 from daq.trajectories.staircase import staircase
@@ -67,12 +67,12 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     """Set points of the whole experiment from `start` (rad, all joints of the machine): settle, motion, hold, and with
     repeats a slow way back between them.
 
-    Joints that the experiment does not move keep their posture. Nothing is checked here but that it can be written
-    down; `daq.safety.check_plan` says whether it may be carried out. Raises SpecError.
+    Joints that the experiment does not move keep their posture. The only check here is that it can be written
+    down as set points; `daq.safety.check_plan` says whether it may be carried out. Raises SpecError.
     """
     _require_joints(spec, machine)
     period = control_period(machine)
-    begin = snapped(machine, start)
+    begin = representable_angles(machine, start)
     columns = [joint - 1 for joint in spec.joints]
     unit = np.array([abs(machine.calibration(joint).rad_per_posture_unit) for joint in spec.joints])
     if isinstance(spec.trajectory, PickAndPlace):
@@ -161,7 +161,7 @@ def _angles(given: Amplitude, joints: tuple[int, ...]) -> Floats:
 
 
 def _of_one_joint(piece: Piece, joints: tuple[int, ...]) -> Piece:
-    """The marks of one joint alone say so."""
+    """Names the joint in the marks of a piece that moves one joint only."""
     if len(joints) > 1:
         return piece
     return replace(piece, marks=tuple(replace(mark, joint=joints[0]) for mark in piece.marks))

@@ -1,4 +1,4 @@
-"""Experiments that have a name: the source's ramp, the set that tells hidden effects apart, and a trace to hold out.
+"""Named experiments: the source's ramp, the set that tells hidden effects apart, and a trace to hold out.
 
 The diagnostic set has five parts, each for effects that the others confuse: A excites one joint at a time, B reverses
 slowly (friction), C makes small steps (quantiser, dead zone, backlash), D goes fast and saturates every drive (gain
@@ -32,7 +32,7 @@ MAJOR = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Preset:
-    """An experiment by name, with one line that says what it is for."""
+    """A named experiment, with one line that says what it is for."""
 
     description: str
     spec: ExperimentSpec
@@ -54,7 +54,7 @@ def _segment(move: Simple, *joints: int) -> Segment:
 
 
 def _there_and_back(degrees: tuple[float, ...], duration: float, rest: float, *joints: int) -> list[Segment]:
-    """A ramp out, a rest, a ramp back, a rest; one value in `degrees` a joint."""
+    """A ramp out, a rest, a ramp back, a rest; `degrees` has one value per joint."""
     segments = []
     for sign in (1.0, -1.0):
         amplitude = {j: sign * math.radians(a) for j, a in zip(joints or MAJOR, degrees, strict=True)}
@@ -105,8 +105,8 @@ def _second_posture() -> list[Segment]:
     ]
 
 
-def _to_judge_by() -> list[Segment]:
-    """What the diagnostic set does, but with other sizes and speeds and at a third posture."""
+def _held_out() -> list[Segment]:
+    """Like the diagnostic set, but with other sizes and speeds and at a third posture."""
     there = (-25.0, 20.0, 30.0)
     slow = SlowRamp(amplitude=_by_joint(3.0, 4.0, -4.0), speed=math.radians(4.5), reversals=1)
     return [
@@ -146,6 +146,6 @@ PRESETS: dict[str, Preset] = {
     },
     "held-out": Preset(
         "17 s that no fit has seen, to judge a model by: tones, ramps, slow reversals, steps at a third posture",
-        _sequence("held-out", _to_judge_by()),
+        _sequence("held-out", _held_out()),
     ),
 }

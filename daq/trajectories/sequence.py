@@ -30,7 +30,7 @@ def join_pieces(pieces: Iterable[Piece], joints: int, period: float) -> Piece:
 
 
 def spread(piece: Piece, columns: list[int], joints: int) -> Piece:
-    """A piece of some joints as one of `joints` joints: `columns` are theirs, the others stand still."""
+    """Extends a piece to `joints` joints: its own go to `columns`, the others stand still."""
     offsets = np.zeros((len(piece.offsets), joints))
     offsets[:, columns] = piece.offsets
     return replace(piece, offsets=offsets)

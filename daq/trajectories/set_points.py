@@ -45,7 +45,7 @@ class JointPreview:
 
 @dataclass(frozen=True)
 class PlanPreview:
-    """A plan in a few numbers, for a look before anything moves."""
+    """A plan in a few numbers, to look at before anything moves."""
 
     duration: float
     period: float
@@ -61,7 +61,7 @@ class PlanPreview:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Set points of all joints of a machine, one row a control period, the first being where the arm stands.
+    """Set points of all joints of a machine, one row per control period, the first being where the arm stands.
 
     period:   s
     moving:   joints (from 1) that the plan moves; the others keep their posture throughout
@@ -152,8 +152,8 @@ def postures_of(machine: Machine, joint: int, angles: Floats) -> Integers:
     return np.floor(units + 0.5).astype(np.int64)
 
 
-def snapped(machine: Machine, angles: Sequence[float]) -> Floats:
-    """The angles (rad) of the postures nearest to `angles`, one a joint: where a set point can really be.
+def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
+    """The angles (rad) of the postures nearest to `angles`, one per joint: what set points can represent.
 
     A reading in the last fraction of the range counts as posture 999, as on the wire. Raises SpecError for a wrong
     number of joints, an angle that is not finite or one outside the sensor's range.

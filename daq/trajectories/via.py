@@ -18,7 +18,7 @@ def via(move: Via, points: Floats, period: float) -> Piece:
     The source asks each segment for the positions and speeds of (3.46) to (3.51) and leaves the speeds at the via
     points open; here they are those that make the acceleration continuous, too: the clamped cubic spline.
     """
-    from scipy.interpolate import CubicSpline  # loaded only by who needs it
+    from scipy.interpolate import CubicSpline  # imported here, because few motions need it
 
     knots = np.array([0.0, *move.times])
     for number, (before, after) in enumerate(pairwise(knots.tolist()), start=1):

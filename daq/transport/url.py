@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 
 DEFAULT_BAUD = 115200
@@ -21,7 +22,7 @@ BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 46080
 class TransportError(DaqError):
     """A port that cannot be named, found, opened or owned."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class PortBusyError(TransportError):
@@ -31,7 +32,7 @@ class PortBusyError(TransportError):
 class PortUrlError(TransportError):
     """A port URL that cannot be understood."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -79,7 +80,7 @@ def options(
     by_default = getattr(context.get_parameter_source("server"), "name", "") == "ENVIRONMENT"
     if server is not None and port is not None:
         if not by_default:
-            raise SpecError("--port and --server: the server has the robot at its own port; give one of them")
+            raise SpecError("--port and --server: the server uses its own port; give one of them")
         server = None
     if server is not None and context.invoked_subcommand in HERE:
         if not by_default:
@@ -88,11 +89,12 @@ def options(
     context.obj = Invocation(config_file=config_file, port_option=port, server=server, server_by_default=by_default)
 
 
-def main() -> None:
-    """Entry point: a user's error ends in one line on standard error and a documented exit code."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: a user's error ends in one line on standard error and a documented exit code. arguments: as typed
+    behind `daq`; None for those of this process"""
     _print_whatever_files_are_called()
     try:
-        exit_code = app(prog_name="daq", standalone_mode=False)
+        exit_code = app(arguments, prog_name="daq", standalone_mode=False)
         _flush()  # now, while what keeps it from being written is still an error
     except DaqError as error:
         fail(str(error), error.exit_code)
@@ -105,11 +107,11 @@ def main() -> None:
     except MemoryError:
         fail("the computer has not enough memory for this", exit_codes.PROGRAM_FAULT)
     except BrokenPipeError:
-        # `daq traces ls | head`: whoever read has enough. Python would complain at exit.
+        # `daq traces ls | head`: the reader has closed the pipe. Python would complain at exit.
         _drop_output()
         raise SystemExit(exit_codes.PROGRAM_FAULT) from None
     except OSError as error:
-        # Where nobody knew better: a name that is too long, a folder that may not be read, a full disk.
+        # No other code has handled this: a name that is too long, a folder that may not be read, a full disk.
         file = "" if error.filename is None else f"{error.filename}: "
         _drop_output()
         code = exit_codes.WRONG_INPUT if error.errno in WRONG_NAMES else exit_codes.PROGRAM_FAULT

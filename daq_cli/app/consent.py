@@ -1,4 +1,4 @@
-"""The operator's word before a real arm moves: given with --yes, or asked for where a person can be asked."""
+"""The operator's consent before a real arm moves: given with --yes, or asked for if there is a terminal."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ T = TypeVar("T")
 
 
 def can_be_asked() -> bool:
-    """Only a person can consent: what comes through a pipe is nobody's word."""
+    """Whether a person can be asked: only a person can consent, so a pipe is not enough."""
     return console().is_terminal and sys.stdin.isatty()
 
 
 @dataclass(frozen=True)
 class Consent:
-    """What the operator is asked to agree to before a real arm does it.
+    """The operator's consent to something that a real arm will do.
 
-    given: agreed beforehand, with --yes. what: what will happen, as the question says it. refused: the same, as the
-    refusal says it.
+    given:   whether the operator consented beforehand, with --yes
+    what:    what will happen, in the words of the question
+    refused: the same, in the words of the refusal
     """
 
     given: bool
@@ -33,7 +34,7 @@ class Consent:
     refused: str = "it moves"
 
     def agreed(self, url: str) -> bool:
-        """Whether a person at this terminal agrees now; no when nobody can be asked."""
+        """Asks the person at this terminal; returns False if nobody can be asked."""
         return can_be_asked() and typer.confirm(
             f"{url} is a real arm, and {self.what}. Is its workspace clear?", err=True
         )
@@ -44,9 +45,9 @@ class Consent:
             raise SafetyError(f"{url} is a real arm: {self.refused} only with the operator's consent (--yes)")
 
     def attempt(self, url: str, action: Callable[[bool], T], missing: type[SafetyError]) -> T:
-        """`action` with the consent that was given; where it raises `missing`, once more when a person agrees.
+        """Calls `action` with the consent given so far; if it raises `missing` and a person then agrees, once more.
 
-        So nobody holds the port while the question is on the screen, and a stop gets through.
+        So the port is not occupied while the question is on the screen, and a stop gets through.
         """
         try:
             return action(self.given)

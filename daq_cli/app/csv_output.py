@@ -28,7 +28,7 @@ def check_csv(path: Path) -> None:
     """Raises SpecError when the TOML beside the CSV would replace another one, such as a machine or a configuration."""
     from pydantic import ValidationError
 
-    from daq.traces.csv_table import Beside, toml_path
+    from daq.traces.csv_table import CsvDescription, toml_path
 
     toml = toml_path(path)
     if toml == path:
@@ -36,8 +36,10 @@ def check_csv(path: Path) -> None:
     if not toml.exists():
         return
     try:
-        found = Beside.model_validate(parse_toml(read_text(toml, str(toml)), str(toml)))
+        found = CsvDescription.model_validate(parse_toml(read_text(toml, str(toml)), str(toml)))
     except (SpecError, ValidationError):
-        found = Beside()
+        found = CsvDescription()
     if not found.model_fields_set >= WRITTEN:
-        raise SpecError(f"{path}: {toml} would be replaced, which is no trace's; give the CSV another name or folder")
+        raise SpecError(
+            f"{path}: {toml} would be replaced, which does not belong to a trace; give the CSV another name or folder"
+        )

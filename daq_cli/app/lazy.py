@@ -22,7 +22,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "queue": ("daq_cli.commands.queue", "Show, pause and resume the queue of a server's robot."),
     "token": ("daq_cli.commands.token", "Make, list and revoke tokens of the service."),
     "backup": ("daq_cli.commands.backup", "Save everything that a service keeps in one file."),
-    "restore": ("daq_cli.commands.restore", "Bring a backup back."),
+    "restore": ("daq_cli.commands.restore", "Restore a backup."),
     "traces": ("daq_cli.commands.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq_cli.commands.config", "Show and check the configuration."),
     "mock": ("daq_cli.commands.mock", "Start a mock controller that others can connect to."),

@@ -30,7 +30,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     from daq.traces import disk
 
-    final = path.resolve()  # a link stays, and goes on pointing at what is made
+    final = path.resolve()  # a link stays, and points at the new file
     part = final.with_name(f".{final.name}.{os.getpid()}.part")
     try:
         yield part

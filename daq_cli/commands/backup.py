@@ -1,4 +1,4 @@
-"""`daq backup`: everything that a service keeps, in one file."""
+"""`daq backup`: writes everything that a service keeps into one file."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def blind(
     context: typer.Context,
     folder: Annotated[Path, typer.Option(help="Folder that keeps everything; an interrupted trial continues there.")],
     seeds: Annotated[str | None, typer.Option(help="Numbers of the arms: FIRST:LAST, or a list with commas.")] = None,
-    cases: Annotated[int | None, typer.Option(min=1, help="Take at most so many of them, of mixed kinds.")] = None,
+    cases: Annotated[int | None, typer.Option(min=1, help="Take this number of arms at most, of mixed kinds.")] = None,
     kinds: Annotated[
         str, typer.Option(help="Kinds of arms: clean, single, open-set, pair, shared, wrong-priors.")
     ] = "clean,single,open-set",
@@ -66,9 +66,9 @@ def blind(
         if seeds is not None:
             raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")
         if cases is not None:
-            raise SpecError("--cases and --registration: a registered run has the cases that it registers, all of them")
+            raise SpecError("--cases and --registration: a registered run has all cases that it registers")
         if own := [n for n in ("kinds", "loads", "experiment", "acquire") if _asked_for(context, n)]:
-            raise SpecError(f"--{own[0]} and --registration: a registered run has what it registers, and nothing else")
+            raise SpecError(f"--{own[0]} and --registration: a registered run takes this from its registration")
         chosen, experiment, acquire, drawn = _registered(registration, run)
     else:
         if seeds is None:
@@ -81,7 +81,7 @@ def blind(
     left = campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
     _show(campaign, folder, as_json=json)
     if left:
-        console().print(f"{left} cases are not done; the same command goes on with them")
+        console().print(f"{left} cases are not done; the same command continues with them")
         raise typer.Exit(exit_codes.FAULT)
 
 
@@ -91,14 +91,14 @@ def _asked_for(context: typer.Context, option: str) -> bool:
 
 
 def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
-    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers, some_of
+    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers, sample_arms
 
     found = arms(parse_numbers(seeds), parse_choice(kinds, KINDS, "kind"), parse_choice(loads, LOADS, "load"))
-    return found if cases is None else some_of(found, cases)
+    return found if cases is None else sample_arms(found, cases)
 
 
 def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:
-    """Seeds, experiment, whether more experiments may be asked for, and the registration that says so."""
+    """Returns the seeds, the experiment, whether the diagnosis may ask for more experiments, and the registration."""
     from daq_cli.trial.registered import read_registration
 
     registration, commit = read_registration(path, run)

@@ -1,4 +1,4 @@
-"""`daq compare`: several models beside the same traces."""
+"""`daq compare`: compares several models on the same traces."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def compare(
 
 
 def _models_and_traces(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Splits names into models (.json, .toml, and machines that ship) and traces (everything else)."""
+    """Splits names into models (.json, .toml, and machines of the package) and traces (everything else)."""
     models = [n for n in names if n.endswith((".json", ".toml")) or n in shipped_machines()]
     return models, [n for n in names if n not in models]
 

@@ -1,4 +1,4 @@
-"""`daq config`: what is configured, and whether it is right."""
+"""`daq config`: shows and checks the configuration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`daq design`: experiments that determine a model's parameters best, and what a given one would add."""
+"""`daq design`: proposes experiments that determine a model's parameters best, or judges given ones."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def _report(
     how: str,
     nats: Sequence[float] | None = None,
 ) -> None:
-    """Writes the report on these experiments, if one is wanted."""
+    """Writes the report on these experiments, if one was requested."""
     if path is None:
         return
     from daq.safety.planned import planned
@@ -126,7 +126,7 @@ def _report(
 
 
 def _fitted(model: str, parameters: str | None) -> FitResult | None:
-    """The result of the fit that the model comes from, if its parameters are the ones to be known."""
+    """Returns the result of the fit that made the model, if its parameters are those to be determined."""
     from model.fitting.result import is_result, load_result
 
     if not model.endswith(".json") or parameters is not None or not is_result(Path(model)):
@@ -155,4 +155,4 @@ def _print_gain(gain: InformationGain) -> None:
     for p in gain.parameters:
         table.add_row(p.name, f"{p.before:.3g}", f"{p.after:.3g}", p.unit, f"{100 * p.share:.0f} %")
     print_table(table, 120)
-    print(f"together: {gain.nats:.1f} nats of information more")
+    print(f"together: {gain.nats:.1f} more nats of information")

@@ -1,4 +1,4 @@
-"""`daq diagnose`: where traces and a model disagree, what is missing, what adding it does, and what to run next."""
+"""`daq diagnose`: finds where traces and a model disagree, what is missing, and which experiment to run next."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def diagnose(
     context: typer.Context,
     traces: TracesArgument,
     model: Annotated[
-        str | None, typer.Option(help=f"The model to doubt (default: the traces' machine). {MODEL_HELP}")
+        str | None, typer.Option(help=f"The model to examine (default: the traces' machine). {MODEL_HELP}")
     ] = None,
     holdout: HoldoutOption = None,
     effects: Annotated[
@@ -76,7 +76,7 @@ def diagnose(
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
+    """Find where a model and traces disagree, name the missing effect, add it, and show how the gap shrinks."""
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.acquire_loop import diagnose_and_acquire
     from model.discrepancy.carried_load import require_load_held
@@ -119,7 +119,7 @@ def diagnose(
 
 
 def _save(found: Diagnosis, out: Path | None) -> None:
-    """Writes the model, if it is wanted, before the report is made, which may fail."""
+    """Writes the model, if requested, before the report is made, which may fail."""
     from model.machine_model.model_file import save_model
 
     if out is not None:
@@ -128,7 +128,7 @@ def _save(found: Diagnosis, out: Path | None) -> None:
 
 
 def _print_result(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
-    """Prints the answer, and where the model and the report are."""
+    """Prints the answer and the files of the model and the report."""
     from daq_cli.models.diagnosis_text import answer_text
 
     if as_json:
@@ -156,7 +156,7 @@ def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOpt
 def _beginning(
     robot: RobotAccess, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
 ) -> Model:
-    """The model to be examined, with the load that was carried. names: what the command line calls the traces."""
+    """Returns the model to be examined, with the load that the arm carried. `names`: the traces on the command line."""
     from model.discrepancy.carried_load import with_load
     from model.machine_model.model import base_model
 
@@ -165,7 +165,7 @@ def _beginning(
 
 
 def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:
-    """Writes the report; where the traces can be simulated, it compares the models before and after on every trace."""
+    """Writes the report. If the traces can be simulated, it compares the models before and after on every trace."""
     from daq.contracts.machine import NoController
     from model.comparison.compare import compare
     from model.reports.diagnosis_report import LABELS, diagnosis_report

@@ -1,4 +1,4 @@
-"""`daq fit`: a model's parameters from traces, and which of them the traces do not determine."""
+"""`daq fit`: fits a model's parameters to traces, and names those that the traces do not determine."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def fit(
     from model.simulation.prepared import Options
 
     if torques and (method != "least_squares" or starts > 1 or seed or open_loop):
-        raise SpecError("--torques: --method, --starts, --seed and --open-loop are of a fit of motion; leave them out")
+        raise SpecError("--torques: --method, --starts, --seed and --open-loop need a fit of motion; leave them out")
     robot = robot_of(context)
     if torques:
         robot.require_local("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
@@ -151,7 +151,7 @@ def fit(
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
-    """Writes the model and says where, before the comparison is made, which may fail."""
+    """Writes the model and prints its file, before the comparison is made, which may fail."""
     with replacing(out) as part:
         found.save(part)
     if not quiet:
@@ -161,7 +161,7 @@ def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
 def _beginning(
     robot: RobotAccess, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
 ) -> Model:
-    """The model that the fit starts from."""
+    """Returns the model from which the fit starts."""
     from model.machine_model.model import base_model
 
     if model is not None and machine is not None:

@@ -1,4 +1,4 @@
-"""`daq ports`: which serial ports there are."""
+"""`daq ports`: lists serial ports."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ WhileStoppedOption = Annotated[
 
 
 class NotSwitchedError(DaqError):
-    """The controller reads back another value than was written."""
+    """The value that the controller reads back differs from the one that was written."""
 
     exit_code = exit_codes.NOT_REACHED
 
@@ -79,5 +79,5 @@ def _print_switched(what: str, wanted: str, found: str) -> None:
 
 
 def _bits(signals: Sequence[bool]) -> int:
-    """One number, signal 0 its lowest bit."""
+    """Converts signals to a number, in which signal 0 is the lowest bit."""
     return sum(on << bit for bit, on in enumerate(signals))

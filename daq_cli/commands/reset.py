@@ -1,4 +1,4 @@
-"""`daq reset`: the explicit end of a stop."""
+"""`daq reset`: ends a stop explicitly."""
 
 from __future__ import annotations
 

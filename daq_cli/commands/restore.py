@@ -1,4 +1,4 @@
-"""`daq restore`: a backup, brought back to the configured places."""
+"""`daq restore`: writes a backup to the configured places."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def restore(
     ] = False,
     json: JsonOption = False,
 ) -> None:
-    """Bring back the database, traces, models and results of a backup. The service must not run."""
+    """Restore the database, traces, models and results of a backup. The service must not run."""
     from daq_cli.app.progress import shown_progress
     from server.backup.manifest import verify
     from server.backup.places import places_of
@@ -31,7 +31,7 @@ def restore(
     from server.clock import SystemClock
 
     if file.exists() and not file.is_file():
-        raise SpecError(f"{file}: is no file, so no backup")
+        raise SpecError(f"{file}: is not a file, so not a backup")
     put_aside: list[str] = []
     if check:
         with shown_progress("checking") as progress:
@@ -49,6 +49,6 @@ def restore(
         print_json({"file": file, "restored": not check, "put_aside": put_aside, **manifest, **counted})
         return
     for folder in put_aside:
-        console().print(f"put aside what was there: {folder}", markup=False)
+        console().print(f"existing data were moved to {folder}", markup=False)
     counts = f"{found.count('traces')} traces, {found.count('models')} models, {found.size / 1e6:.1f} MB"
     print(f"{file} of {found.created:%Y-%m-%d %H:%M:%S %Z} {what}: {counts}")

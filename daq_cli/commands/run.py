@@ -235,5 +235,5 @@ def diagnostic(
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Run the preset `diagnostic`: about 55 s of motion that tells hidden effects apart."""
+    """Run the preset `diagnostic`: about 55 s of motion that distinguishes hidden effects."""
     by_name(context, "diagnostic", folder, dry_run, yes, json)

@@ -1,4 +1,4 @@
-"""`daq sensitivity`: which parameter moves which joint's response, how much, and when."""
+"""`daq sensitivity`: shows which parameter changes which joint's response, how much, and when."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ def sensitivity(
         Path | None, typer.Option("--output", "-o", callback=_file, help="The curves: .csv, or .png, .svg, .pdf.")
     ] = None,
     open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="Apply the recorded drive, so that no controller makes up for a change.")
+        bool,
+        typer.Option("--open-loop", help="Apply the recorded drive, so that no controller compensates changes."),
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,

@@ -1,4 +1,4 @@
-"""`daq serve`: the service, until a signal ends it."""
+"""`daq serve`: runs the service until a signal ends it."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ app = typer.Typer(add_completion=False)
 def serve(
     context: typer.Context,
     host: Annotated[
-        str | None, typer.Option(help="Address to listen at (default: the configured one, else 127.0.0.1).")
+        str | None, typer.Option(help="Address to listen on (default: the configured one, else 127.0.0.1).")
     ] = None,
-    port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any free one.")] = None,
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any free one.")] = None,
 ) -> None:
     """Serve experiments, traces and the dashboard to people and programs."""
     from daq.transport.url import parse_port_url
     from server import logs
 
-    logs.begin()  # first: what is wrong with the configuration is a line of the log, too
+    logs.begin()  # first, so that errors of the configuration are lines of the log, too
     call = invocation(context)
     settings = call.settings
     section = settings.server.model_copy(
         update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
     )
-    parse_port_url(call.port)  # a port that is none does not become one by trying again
+    parse_port_url(call.port)  # an invalid port is refused now, instead of being retried
     from server.serve import serve as run
 
     robot = settings.robot.model_copy(update={"port": call.port})

@@ -1,4 +1,4 @@
-"""`daq simulate`: what a model does with the set points, or the drive, of recorded traces."""
+"""`daq simulate`: simulates recorded traces with a model, from their set points or their drive."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def simulate(
 
 
 def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
-    """The trace that the model would have recorded."""
+    """Returns the trace that the model would have recorded."""
     from daq.contracts.trace import Trace
     from model.simulation.simulate import simulate
 

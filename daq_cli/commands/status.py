@@ -1,4 +1,4 @@
-"""`daq status`: posture, state and link of the robot."""
+"""`daq status`: shows posture, state and link of the robot."""
 
 from __future__ import annotations
 

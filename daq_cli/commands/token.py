@@ -1,4 +1,4 @@
-"""`daq token`: who may use the service from another computer."""
+"""`daq token`: manages the tokens with which people and programs use the service from other computers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def add(
         typer.Option(help="A viewer may look, and stop the robot; an operator may also move it."),
     ] = "viewer",
 ) -> None:
-    """Make a token. It is shown this once; only its hash is kept."""
+    """Make a token. It is shown only once; its hash is stored."""
     from server.clock import SystemClock
 
     _require_name(name)

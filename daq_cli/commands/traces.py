@@ -1,4 +1,4 @@
-"""`daq traces`: what has been recorded."""
+"""`daq traces`: lists, shows, plots, converts and verifies traces."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
 
 
 def joints_text(joints: tuple[int, ...]) -> str:
-    """`1-3` where joints follow each other, else `1,3`."""
+    """Writes joints as `1-3` if they are consecutive, else as `1,3`."""
     if len(joints) > 1 and joints == tuple(range(joints[0], joints[-1] + 1)):
         return f"{joints[0]}-{joints[-1]}"
     return ",".join(map(str, joints))
@@ -84,7 +84,7 @@ def joints_text(joints: tuple[int, ...]) -> str:
 def show(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
-    """Show what a trace says about itself, and its figures by joint."""
+    """Show a trace's record, and its figures by joint."""
     from daq.traces.summary import joint_figures
 
     path, found = _read(context, trace, folder)
@@ -219,7 +219,7 @@ def check(
     else:
         for finding in found.findings:
             print(printable(f"{finding.level}: {finding.message}"))
-        print("trustworthy" if found.trustworthy else "NOT to be trusted")
+        print("trustworthy" if found.trustworthy else "NOT trustworthy")
     if not found.trustworthy:
         raise typer.Exit(exit_codes.FAULT)
 

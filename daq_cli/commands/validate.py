@@ -1,4 +1,4 @@
-"""`daq validate`: what would have to move, when, and against what, for a model to explain traces."""
+"""`daq validate`: checks whether expected parameter deviations explain a model's errors on traces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One way for every command to reach a robot, whoever has its port."""
+"""One way for every command to reach a robot, whichever process owns its port."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class RobotAccess(Protocol):
         """The machine file of the robot, with the limits that hold for it now."""
 
     def require_reached(self) -> None:
-        """Raises what connecting raises; nothing is sent that could move the arm."""
+        """Connects, without sending anything that could move the arm, and raises the errors of connecting."""
 
     def view(self) -> RobotView:
         """Posture, state and link, as they are now."""
@@ -75,10 +75,10 @@ class RobotAccess(Protocol):
         """
 
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-        """Every trace, the oldest first, and the place where they are."""
+        """Returns all traces, the oldest first, and the name of their place."""
 
     def find_trace(self, folder: Path, wanted: str) -> Path:
-        """The file of a trace: by path, number, name or `last`, in `folder`; one of a service is fetched into it."""
+        """Finds a trace by path, number, name or `last` in `folder`; a service's trace is downloaded into it."""
 
     def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
         """Imports a trace of another rig or tool."""

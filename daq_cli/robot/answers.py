@@ -1,4 +1,4 @@
-"""What a robot answers to a command, whether this computer or a service has its port."""
+"""The answers of a robot to commands, which are the same for a local robot and for one at a service."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotView:
-    """One look at the robot: all that is known of it, and its state in one line."""
+    """The state of the robot, in full and in one line."""
 
     report: StatusReport
     headline: str
@@ -25,7 +25,7 @@ class RobotView:
 
 @dataclass(frozen=True)
 class ResetDone:
-    """What a reset has done, in one line; and, from a board at this computer, which joints nothing holds."""
+    """The result of a reset in one line and, from a local board, the joints that nothing holds."""
 
     text: str
     limp: str = ""

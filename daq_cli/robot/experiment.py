@@ -93,7 +93,7 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
     if violations:
         raise SafetyError(f"refused: {'; '.join(map(str, violations))}")
     if not as_json:
-        print("  nothing speaks against it; nothing was sent")
+        print("  no limit is violated; nothing was sent")
 
 
 def print_result(finished: Finished) -> None:

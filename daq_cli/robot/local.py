@@ -1,4 +1,4 @@
-"""The robot at this computer's port, which is opened for the moment of a question or for the time of a run."""
+"""The robot at this computer's port, which is opened for each question, or for the time of a run."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class LocalRobot:
 
     @contextmanager
     def _connected(self) -> Iterator[Controller]:
-        """The configured controller, greeted; closed afterwards. Nothing is sent that could move it.
+        """Connects to the configured controller, and closes it afterwards. Sends nothing that could move the arm.
 
         Raises ReachError when no robot is configured: a new mock would have no state worth showing.
         """
@@ -68,7 +68,7 @@ class LocalRobot:
         return Controller.connect(self.call.port, load_memory_map(self.call.settings.robot.memory_map))
 
     def require_reached(self) -> None:
-        """Greets the robot and lets it go again; of a mock, this shows that it starts with its options."""
+        """Connects to the robot and disconnects again. A mock thereby shows that it starts with its options."""
         with self._controller():
             pass
 
@@ -122,10 +122,10 @@ class LocalRobot:
 
     @contextmanager
     def _switchable(self, while_stopped: bool, consent: Consent) -> Iterator[Controller]:
-        """The controller of an arm that may be switched now.
+        """The controller of an arm whose outputs may be switched now.
 
-        Raises SafetyError without the operator's word on a real arm, and for one that has been stopped, also while the
-        operator was asked: nobody holds the port meanwhile, so that a stop gets through.
+        Raises SafetyError without the operator's consent on a real arm, and if the arm is stopped, also if this happens
+        while the operator is asked: the port is free meanwhile, so that a stop gets through.
         """
         with self._connected() as controller:
             _require_switchable(controller, while_stopped)
@@ -151,7 +151,7 @@ class LocalRobot:
 
         with self._connected() as controller:
             status = controller.status()
-            frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # ends this stop, and none that comes later
+            frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # this ends no stop that comes later
             if here:
                 # A second stop would change nothing: the board measures the posture when a stop begins.
                 controller.release(stop)

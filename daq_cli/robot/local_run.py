@@ -25,16 +25,16 @@ class _NoConsentError(AcquisitionFailedError):
 def acquire_locally(
     call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent
 ) -> Finished:
-    """Runs `spec`, showing its progress. Where a real arm waits for consent and a person can be asked, asks.
+    """Runs `spec` and shows its progress. If a real arm needs consent and a person can be asked, it asks.
 
-    Raises AcquisitionFailedError when there is no trace; SpecError for a folder or a port that is none.
+    Raises AcquisitionFailedError if there is no trace, SpecError for a folder or a port that is not valid.
     """
     from daq.acquisition.messages import Finished, Job
     from daq.transport import parse_port_url
 
     if not str(folder).isprintable():
         raise SpecError(f"folder {str(folder)!r}: a trace's folder has a name of printable characters")
-    parse_port_url(call.port)  # a port that is none needs no process to say so
+    parse_port_url(call.port)  # an invalid port is refused without starting a process
 
     def attempt(moves_real_arm: bool) -> Finished:
         job = Job(
@@ -57,7 +57,7 @@ def acquire_locally(
 
 
 def _run(job: Job) -> Finished | Failed:
-    """One acquisition process, its progress and events on the terminal; Ctrl-C and its like are passed on as a stop."""
+    """Runs one acquisition process, and shows its progress and events; Ctrl-C, Ctrl-Z and SIGTERM become a stop."""
     from daq.acquisition import messages
     from daq.acquisition.parent import Acquisition
 

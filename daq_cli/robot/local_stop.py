@@ -1,4 +1,4 @@
-"""A stop through the configured port, which nobody needs to hold for it."""
+"""A stop through the configured port, for which no process needs to own the port."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from daq_cli.app.context import Invocation
 
 
 def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
-    """Stops the robot of the command line or the configuration, unless a process that holds its port has been asked.
+    """Stops the robot of the command line or the configuration, unless the process that owns its port has been asked.
 
-    A configuration that cannot be read is no reason not to have stopped the others; the answer says so.
+    If the configuration cannot be read, the answer says so; other robots have been stopped by then.
     """
     try:
         url = call.port_option or call.settings.robot.port
@@ -27,7 +27,7 @@ def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
 
 
 def _device(url: str) -> object:
-    """The device or address that a port's URL names, whatever its spelling; the text itself where it is no URL."""
+    """Returns the device or address in a port's URL, whatever its spelling; the text itself if it is not a URL."""
     from daq.transport.url import SerialPort, TcpPort, TransportError, parse_port_url
 
     try:

@@ -96,9 +96,9 @@ class LocalTeaching:
 
     @contextmanager
     def _owned(self, prepare: Callable[[OwnedRobot], Made]) -> Iterator[tuple[OwnedRobot, Made]]:
-        """The robot, held by this process. Where a real arm waits for consent and a person can be asked, asks.
+        """The robot, whose port this process owns. If a real arm needs consent and a person can be asked, it asks.
 
-        `prepare` looks and checks before anything moves: what it refuses leaves set points and gains as they were.
+        `prepare` makes checks before anything moves; if it refuses, set points and gains stay as they were.
         """
         from daq.acquisition.owned import owned_robot
         from daq.config.robot_files import load_memory_map

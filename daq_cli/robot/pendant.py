@@ -49,8 +49,8 @@ class Pendant:
         return min(self.wish, top_speed(self._machine.limits, self.joint))
 
     def command(self, typed: str, now: float) -> JogCommand | None:
-        """The newest command after the keys `typed` at `now` (s, the samples' clock); the one before when they drive
-        nothing."""
+        """Returns the newest command after the keys `typed` at `now` (s, the samples' clock), or the command before if
+        these keys drive nothing."""
         direction = typed.count(RIGHT) - typed.count(LEFT)
         for key in typed.replace(RIGHT, "").replace(LEFT, ""):
             if key in "123456" and int(key) <= len(self._machine.joints):
@@ -69,7 +69,7 @@ class Pendant:
 
 
 class StatusLine:
-    """One line at the foot of the terminal (standard error), written again only when it changes."""
+    """One line at the bottom of the terminal (standard error), written again only when it changes."""
 
     def __init__(self) -> None:
         self._shown = ""
@@ -103,10 +103,10 @@ class Teaching(Protocol):
     """An arm that a person teaches. Ctrl-C stops it. Angles are in rad."""
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
-        """Drives joints with the keys; `keep` is given the set points of a posture to be kept."""
+        """Drives joints with the keys; `keep` is called with the set points of a posture that the person saves."""
 
     def perform(self, program: Program) -> str:
         """Carries out a taught program, and returns one line on how it ended."""
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Records a path while the arm is led by hand; `keep` is given the path of a stopped lead, too."""
+        """Records a path while the arm is led by hand; `keep` is called with the path, even after a stop."""

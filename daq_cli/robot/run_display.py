@@ -1,4 +1,4 @@
-"""A run on the terminal while it goes on."""
+"""Shows a run in the terminal while it goes on."""
 
 from __future__ import annotations
 

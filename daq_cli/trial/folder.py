@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 
 Stage = Literal["detect", "record", "diagnose", "score"]
 STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score")
@@ -134,4 +135,4 @@ def _read_asked(file: Path) -> Asked:
     try:
         return Asked.model_validate_json(read_text(file, str(file)))
     except ValidationError as error:
-        raise SpecError(f"{file}: not a trial's: {error.errors()[0]['msg']}") from error
+        raise SpecError(f"{file}: not a trial's: {first_invalid(error).message}") from error

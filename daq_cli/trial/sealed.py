@@ -17,6 +17,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from daq_cli.trial.mock_side import TrialStageError
+from firmware_protocol.invalid import first_invalid
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import Model
 from model.machine_model.model_file import save_model
@@ -52,9 +53,9 @@ class SealedAnswer:
         try:
             return Diagnosis.model_validate_json(self.text)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"])
-            raise DiagnosisFailedError(f"what the diagnosis gave is no answer: {where}: {first['msg']}") from error
+            first = first_invalid(error)
+            line = f"what the diagnosis gave is no answer: {first.where()}: {first.message}"
+            raise DiagnosisFailedError(line) from error
 
 
 def diagnose_sealed(

@@ -49,7 +49,7 @@ class BoardCounters:
 class Board:
     """Controller and arm, switched on at time 0 with the arm where `plant` has it.
 
-    `arm_seed` draws what belongs to this very arm, its potentiometers' curves; without it `seed` does.
+    `arm_seed` draws what belongs to this one arm, its potentiometers' curves; without it `seed` draws them.
 
     Raises BoardError when the plant's step does not divide the period and the computing delay.
     """
@@ -144,7 +144,7 @@ class Board:
         self._write_pairs(self.memory.encoded("set_point", by_index))
 
     def hold_memory(self, duration_us: int) -> None:
-        """The host's side keeps the memory busy for `duration_us` from now: every fetch in that time is missed."""
+        """Keeps the memory busy on the host's side for `duration_us` from now: every fetch in that time is missed."""
         self._host_until_us = max(self._host_until_us, self._time_us + duration_us)
 
     # --- stop

@@ -10,14 +10,14 @@ from mock_controller.modification import Modification
 
 @runtime_checkable
 class KnowsBoard(Modification, Protocol):
-    """Is told the board's constants, once, before the first reading."""
+    """Receives the board's constants once, before the first reading."""
 
     def know_board(self, parameters: BoardParameters) -> None: ...
 
 
 @runtime_checkable
 class ChangesSensor(Modification, Protocol):
-    """Angle that one joint's potentiometer shows for the joint's true angle. Asked every control period."""
+    """Changes the angle that one joint's potentiometer shows for the true angle. Called every control period."""
 
     joint: int
 
@@ -26,7 +26,7 @@ class ChangesSensor(Modification, Protocol):
 
 @runtime_checkable
 class ChangesReading(Modification, Protocol):
-    """Reading (ADC counts, not yet rounded) of one joint's converter. Asked every control period."""
+    """Changes the reading (ADC counts, not yet rounded) of one joint's converter. Called every control period."""
 
     joint: int
 
@@ -35,14 +35,14 @@ class ChangesReading(Modification, Protocol):
 
 @runtime_checkable
 class ChangesBoard(Modification, Protocol):
-    """Other constants of the board: timing, gains, scales. Applied once, before the board exists."""
+    """Changes constants of the board: timing, gains, scales. Applied once, before the board exists."""
 
     def change_board(self, parameters: BoardParameters) -> BoardParameters: ...
 
 
 @runtime_checkable
 class ChangesSetPoint(Modification, Protocol):
-    """Set point (ADC counts) that one joint's controller works with. Asked every control period."""
+    """Changes the set point (ADC counts) that one joint's controller works with. Called every control period."""
 
     joint: int
 

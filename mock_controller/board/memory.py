@@ -55,7 +55,7 @@ class SharedMemory:
         self._bytes[:] = bytes(len(self._bytes))
 
     def values(self, name: str) -> list[int]:
-        """Values of a register, one a joint (or a single one)."""
+        """Values of a register, one per joint (or a single one)."""
         column, data, base = self._columns[name], self._bytes, self._base
         mask, sign = column.mask, column.sign
         if column.high is None:

@@ -1,4 +1,4 @@
-"""The board's numbers, read from a data file that gives each one's source."""
+"""The board's constants, read from a data file that gives each one's source."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class BoardTiming:
 
 @dataclass(frozen=True)
 class BoardParameters:
-    """Everything the board is made of. Element i of the tuples is joint i+1.
+    """All constants of the board. Element i of the tuples is joint i+1.
 
     `linearity` is the potentiometers' largest error as a fraction of the range, `noise` the converter's rms in
     counts before rounding, `dac_full_scale` the volts of 127 DAC counts, `default_gains` (P, I, D) those in EPROM.
-    `controller_scales` multiply the controllers' outputs before their limit; 1 is what a gain stands for.
+    `controller_scales` multiply the controllers' outputs before their limit; at 1 a gain has its stated meaning.
     """
 
     timing: BoardTiming

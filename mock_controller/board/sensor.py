@@ -46,7 +46,7 @@ class LinearityCurve:
 class PositionSensors:
     """The six potentiometers and their converter; noise is drawn from `seed`, joint by joint.
 
-    The curves are drawn from `arm_seed`, by default the same: another day's noise on the same potentiometers.
+    The curves are drawn from `arm_seed`, by default `seed`: the same arm on another day has other noise only.
     """
 
     def __init__(
@@ -95,14 +95,14 @@ class PositionSensors:
         return counts
 
     def stick(self, joint: int) -> None:
-        """The wiper of `joint` (from 1) stays where it is: the reading no longer follows the arm."""
+        """Holds the wiper of `joint` (from 1) where it is: the reading no longer follows the arm."""
         self._stuck[joint - 1] = self._last[joint - 1]
 
     def crackle(self, joint: int, noise: float) -> None:
-        """The reading of `joint` (from 1) gets noise of `noise` counts rms."""
+        """Adds noise of `noise` counts rms to the reading of `joint` (from 1)."""
         self._noise[joint - 1] = noise
 
     def repair(self, joint: int) -> None:
-        """`joint` (from 1) neither sticks nor crackles any more."""
+        """Ends sticking and noise of `joint` (from 1)."""
         self._stuck.pop(joint - 1, None)
         self._noise[joint - 1] = self._usual_noise

@@ -1,4 +1,4 @@
-"""The conversation: which request is carried out, refused, or has to wait.
+"""Decides which request is carried out, refused, or has to wait.
 
 At most one `Sample` waits at a time (a later one takes its place), and in lock-step one `Advance`; all other requests
 are answered meanwhile, `Stop` at once. Time is the board's: carrying out a request lets it pass.
@@ -155,7 +155,7 @@ class Bridge:
         return wake if advance is None else min(wake, max(advance.until_us, now))
 
     def hang_up(self) -> None:
-        """The connection has ended, and with it the session. What the host has said before still counts."""
+        """Ends the session with its connection. Commands that were received before keep their effect."""
         self._session.end()
         self._sample = None
         self._advance = None
@@ -163,7 +163,7 @@ class Bridge:
     # --- requests
 
     def receive(self, frame: Frame) -> list[Frame]:
-        """Carries out one request, or lets it wait; the replies there are now."""
+        """Carries out one request, or lets it wait; returns the replies that are ready now."""
         request = self._understood(frame)
         if isinstance(request, Refusal):
             return [self._refuse(frame.sequence, frame.opcode, request)]
@@ -181,7 +181,7 @@ class Bridge:
         return [to_frame(frame.sequence, reply)]
 
     def overdue(self) -> list[Frame]:
-        """Replies to what waited, as far as their moment has come."""
+        """Replies to waiting requests whose moment has come."""
         replies = []
         if self._sample is not None:
             replies += self._try_sample(self._sample)
@@ -191,7 +191,7 @@ class Bridge:
         return replies
 
     def _understood(self, frame: Frame) -> Request | Refusal:
-        """The request in a frame, or what is wrong with the frame itself, whatever the session."""
+        """The request in a frame, or the refusal for a fault of the frame itself, whatever the session."""
         if frame.opcode in self._incapable:
             return Refusal.NOT_CAPABLE
         try:
@@ -285,7 +285,7 @@ class Bridge:
     def _begin_sample(self, sequence: int, request: Sample) -> list[Frame]:
         after = request.after
         if after > self._board.tick:
-            # AFTER_NEWEST, or a host that remembers the ticks of an earlier life of the board.
+            # AFTER_NEWEST, or a host that remembers ticks from before a restart of the board.
             newest = self._board.snapshots.newest()
             after = newest.tick if newest else 0
         patience_us = WAIT_LIMIT_PERIODS * self._board.parameters.timing.period

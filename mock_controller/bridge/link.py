@@ -1,4 +1,4 @@
-"""One connection as seen from the bridge: bytes in, bytes out, each at its moment of board time.
+"""One connection as the bridge sees it: bytes in, bytes out, each at its moment of board time.
 
 Bytes travel on a line (which may take time), through the faults of the line, to the bridge; replies go the same way
 back. Everything under way has a time; `run_until` lets it happen in order.
@@ -30,7 +30,7 @@ class Responder(Protocol):
         ...
 
     def receive(self, frame: Frame) -> list[Frame]:
-        """Carries out a request now; the replies that it has at once."""
+        """Carries out a request now; returns the replies that are ready at once."""
         ...
 
     def overdue(self) -> list[Frame]:
@@ -159,7 +159,7 @@ class Link:
         return output
 
     def run_until(self, time_us: int) -> None:
-        """Lets everything happen that happens up to a time (µs); the bridge's own work may end a little later."""
+        """Carries out everything that is due up to a time (µs); the bridge's own work may end a little later."""
         later = time_us + 1
         while True:
             arriving = self._arriving[0][0] if self._arriving else later

@@ -1,4 +1,4 @@
-"""Cuts the host's bytes into pieces: what lies between two delimiters, a frame when nothing has damaged it."""
+"""Cuts the host's bytes into pieces: the bytes between two delimiters, which are a frame unless they are damaged."""
 
 from __future__ import annotations
 

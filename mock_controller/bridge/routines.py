@@ -1,8 +1,8 @@
 """What the bridge does with the shared memory for each request: the host routines of the source (section 6.4).
 
 Every access takes board time. A bridge that sees the controller's period keeps its accesses clear of the moment when
-the controller fetches its set points, so that none is missed for its sake; one that does not, collides with it now
-and then, as a host does that knows nothing of the period (section 6.3).
+the controller fetches its set points, so that it never causes a missed one. A bridge that does not see the period
+collides with a fetch now and then, as does a host that knows nothing of the period (section 6.3).
 """
 
 from __future__ import annotations
@@ -175,6 +175,6 @@ class MemoryRoutines:
         return OutputsWritten()
 
     def set_gripper(self, request: SetGripper) -> Reply:
-        """Opens or closes."""
+        """Opens or closes the gripper."""
         self._write(self._map["gripper"].low[0], bytes((request.closed,)))
         return GripperSet()

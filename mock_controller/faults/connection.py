@@ -11,7 +11,7 @@ from mock_controller.faults.fault import Count, Fault, FaultyParts, PartFault, p
 
 @dataclass(frozen=True, kw_only=True)
 class Stall(Fault):
-    """The bridge is silent: input and output wait until the stall ends."""
+    """Silences the bridge: input and output wait until the stall ends."""
 
     name: ClassVar[str] = "stall"
     duration: float = parameter("s of board time that it lasts", 0.2, 0.0, 1e6)
@@ -19,7 +19,7 @@ class Stall(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class Disconnect(PartFault):
-    """The line is cut, and comes back."""
+    """Cuts the line; it comes back."""
 
     name: ClassVar[str] = "disconnect"
     seconds: float = parameter("s of the host's clock until it is back", 0.5, 0.0, 1e6)

@@ -1,4 +1,4 @@
-"""What a fault is: a name, checked parameters, a span of board time, and where it acts."""
+"""The base of all faults: a name, checked parameters, a span of board time, and the place where it acts."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Fault:
 class WireFault(Fault):
     """A fault of the line: strikes a frame with probability `rate`, in one direction or both."""
 
-    rate: float = parameter("probability a frame", 1.0, 0.0, 1.0)
+    rate: float = parameter("probability per frame", 1.0, 0.0, 1.0)
     direction: str = choice("which frames", "both", ("both", "to_controller", "to_host"))
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
@@ -73,35 +73,35 @@ class FaultyParts(Protocol):
         ...
 
     def hold_memory_at_fetch(self) -> None:
-        """The host's side keeps the shared memory busy while the controller wants it next."""
+        """Keeps the shared memory busy, on the host's side, at the controller's next fetch."""
         ...
 
     def brown_out(self) -> None:
-        """The board's supply fails for a moment and it starts again; the arm stays where it is."""
+        """Interrupts the board's supply for a moment; the board restarts, the arm stays where it is."""
         ...
 
     def stall_joint(self, joint: int) -> None:
-        """A joint jams where it is."""
+        """Jams a joint where it is."""
         ...
 
     def free_joint(self, joint: int) -> None:
-        """A jammed joint moves again."""
+        """Frees a jammed joint."""
         ...
 
     def stick_potentiometer(self, joint: int) -> None:
-        """A joint's reading stays what it is."""
+        """Holds a joint's reading at its present value."""
         ...
 
     def crackle_potentiometer(self, joint: int, counts: float) -> None:
-        """A joint's reading gets noise of so many ADC counts rms."""
+        """Adds noise of `counts` ADC counts rms to a joint's reading."""
         ...
 
     def repair_potentiometer(self, joint: int) -> None:
-        """A joint's reading is right again."""
+        """Restores a joint's reading."""
         ...
 
     def disconnect(self, seconds: float) -> None:
-        """The line is cut, and back after `seconds` of the host's clock."""
+        """Cuts the line for `seconds` of the host's clock."""
         ...
 
 

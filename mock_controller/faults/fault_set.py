@@ -33,7 +33,7 @@ class ActiveFault:
 
 @dataclass
 class FaultSet:
-    """All faults of one mock. Repeatable: each draws from its own seeded numbers, once a frame or a period."""
+    """All faults of one mock. Repeatable: each draws from its own seeded numbers, once per frame or period."""
 
     parts: FaultyParts
     seed: int = 0
@@ -65,7 +65,7 @@ class FaultSet:
         return [entry.label for entry in ended]
 
     def listing(self) -> list[dict[str, Any]]:
-        """What is switched on, as JSON takes it."""
+        """The faults that are switched on, as JSON data."""
         now = self.parts.time_us
         return [{"label": entry.label, "acting": entry.covers(now), **describe(entry.fault)} for entry in self.active]
 
@@ -85,7 +85,7 @@ class FaultSet:
         return None if due == math.inf else int(due)
 
     def make_changes(self, now: int) -> None:
-        """Lets faults set in, and end, that are due at a time (µs)."""
+        """Starts and ends the faults that are due at a time (µs)."""
         for entry in list(self.active):
             if not entry.begun and entry.begin_us <= now:
                 entry.begun = True

@@ -14,7 +14,7 @@ class BusyMemory(PartFault):
     """The shared memory is busy when the controller wants it: set points are missed in that period."""
 
     name: ClassVar[str] = "busy_memory"
-    rate: float = parameter("probability a control period", 1.0, 0.0, 1.0)
+    rate: float = parameter("probability per control period", 1.0, 0.0, 1.0)
 
     def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
         if dice.random() < self.rate:

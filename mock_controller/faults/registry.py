@@ -1,4 +1,4 @@
-"""Faults by name, and as they are asked for: `flip:rate=0.01,seed=3`."""
+"""Finds faults by name and parses requests for them, such as `flip:rate=0.01,seed=3`."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _value(name: str, field: dataclasses.Field[Any], text: str) -> Any:
 
 
 def describe(fault: Fault) -> dict[str, Any]:
-    """Name and parameters of a fault, as JSON takes them (an endless duration is null)."""
+    """Name and parameters of a fault, as JSON data (an endless duration is null)."""
     values = dataclasses.asdict(fault)
     if values["duration"] == float("inf"):
         values["duration"] = None

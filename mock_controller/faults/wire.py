@@ -11,7 +11,7 @@ from mock_controller.faults.fault import Chunk, WireFault, parameter
 
 @dataclass(frozen=True, kw_only=True)
 class Flip(WireFault):
-    """Turns bits over; the receiver finds the frame damaged."""
+    """Inverts bits; the receiver finds the frame damaged."""
 
     name: ClassVar[str] = "flip"
     bits: int = parameter("bits turned over in a frame that is struck", 1, 1, 64)

@@ -35,7 +35,7 @@ class SecretError(ValueError):
 
 
 class Kind(IntEnum):
-    """From which arms a seed draws; `ANY` leaves that to the rest of the seed."""
+    """Kinds of arms that seeds draw; under `ANY` the rest of the seed decides the kind."""
 
     ANY = 0
     CLEAN = 1
@@ -47,7 +47,7 @@ class Kind(IntEnum):
 
 
 class Load(IntEnum):
-    """What the arm carries, told to everybody."""
+    """Loads that the arm may carry; which one is announced to everybody."""
 
     NOMINAL = 0
     LIGHT = 1
@@ -55,7 +55,7 @@ class Load(IntEnum):
 
 
 LOAD_KG: dict[Load, float | None] = {Load.NOMINAL: None, Load.LIGHT: 0.4, Load.HEAVY: 2.0}
-"""MLOAD (kg), wrist and hand included; None is that of the data file."""
+"""Mass MLOAD (kg), wrist and hand included; None keeps that of the data file."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class HiddenEffect:
         return self.name if known_modifications()[self.name].shared else UNKNOWN
 
     def modifications(self) -> tuple[Modification, ...]:
-        """The effect, ready to act."""
+        """The effect as modifications of the mock."""
         return build_modifications((self.name, values) for values in self.parameters)
 
 
@@ -88,7 +88,7 @@ class HiddenArm:
     effects: tuple[HiddenEffect, ...]
 
     def plant_parameters(self, parameters: PlantParameters) -> PlantParameters:
-        """The arm with its load and deviations, its effects not yet acting."""
+        """The arm with its load and deviations, without its effects."""
         return deviating_plant(loaded(parameters, self.load), self.deviations)
 
     def board_parameters(self, parameters: BoardParameters) -> BoardParameters:
@@ -96,18 +96,18 @@ class HiddenArm:
         return deviating_board(parameters, self.deviations)
 
     def modifications(self, leave_out: int | None = None) -> tuple[Modification, ...]:
-        """The effects, ready to act; without the one of index `leave_out`."""
+        """The effects as modifications of the mock; without the one of index `leave_out`."""
         kept = (effect for index, effect in enumerate(self.effects) if index != leave_out)
         return tuple(modification for effect in kept for modification in effect.modifications())
 
     def parts(self, plant: PlantParameters, board: BoardParameters, leave_out: int | None = None) -> LoopParts:
-        """The whole for a loop without rounding."""
+        """The complete arm, for a loop without rounding."""
         return LoopParts(
             self.plant_parameters(plant), self.board_parameters(board), self.modifications(leave_out), self.seed
         )
 
     def truth(self) -> dict[str, Any]:
-        """All of it, as JSON takes it."""
+        """Everything that is hidden, as JSON data."""
         return {
             "seed": self.seed,
             "kind": self.kind.name.lower(),
@@ -128,7 +128,7 @@ class HiddenArm:
 
 
 def loaded(parameters: PlantParameters, load: Load) -> PlantParameters:
-    """The arm with one of the loads that everybody knows of."""
+    """The arm with one of the announced loads."""
     mass = LOAD_KG[load]
     return parameters if mass is None else change_body(parameters, m_load=mass)
 
@@ -179,7 +179,7 @@ def _effects(random: Random, kind: Kind) -> tuple[HiddenEffect, ...]:
 
 
 def _pair(random: Random) -> tuple[HiddenEffect, ...]:
-    """Two different effects; a gear that gives can do so in one way only."""
+    """Two different effects. Backlash and compliance are never drawn on the same joint: its gear can have only one."""
     first, second = (_one(random, size) for size in random.sample(SHARED_SIZES, 2))
     gives = ("backlash", "joint_compliance")
     while first.name in gives and second.name in gives and first.joints == second.joints:
@@ -192,7 +192,7 @@ def _one(random: Random, size: SizeRange) -> HiddenEffect:
 
 
 def _at(random: Random, size: SizeRange, joints: tuple[int, ...]) -> HiddenEffect:
-    """An effect of one strength and sign at all its joints; what else there is to it is drawn once."""
+    """An effect of one strength and sign at all its joints; its other parameters are drawn once."""
     strength = random.random()
     sign = random.choice((-1, 1)) if size.signed else 1
     drawn_once = random.getrandbits(64)

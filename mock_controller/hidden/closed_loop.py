@@ -1,8 +1,9 @@
 """The control loop without rounding: an arm's readings as real numbers.
 
 Positions, errors and drive are real numbers here; in place of rounding, each reading carries noise of the same size
-(the converter's own and that of a rounding error, a quantity uniform over one count), drawn from a seed. Two arms run
-with the same noise differ by what differs between them, and neither rests where rounding would have kept it moving.
+(the converter's own and that of a rounding error, a quantity uniform over one count), drawn from a seed. With the
+same noise, the readings of two arms differ only by what differs between the arms, and neither arm comes to rest where
+rounding would have kept it moving.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ ROUNDING_VARIANCE = 1.0 / 12.0
 
 @dataclass(frozen=True)
 class LoopParts:
-    """What a loop is made of; `arm_seed` draws the potentiometers' curves."""
+    """The parts of a control loop; `arm_seed` draws the potentiometers' curves."""
 
     plant: PlantParameters
     board: BoardParameters
@@ -68,7 +69,7 @@ class _SmoothPid:
 def readings(
     parts: LoopParts, experiment: Experiment, noise_seed: int = 0, step_us: int = STEP_US
 ) -> NDArray[np.float64]:
-    """Readings (counts, one row a period, joints 1 to 6) of the experiment, the settling before it left out."""
+    """Readings (counts, one row per period, joints 1 to 6) of the experiment, the settling before it left out."""
     board = parts.board
     for change in of_kind(parts.modifications, ChangesBoard):
         board = change.change_board(board)

@@ -21,7 +21,7 @@ class ExperimentError(ValueError):
 
 @dataclass(frozen=True)
 class Experiment:
-    """Set points (posture units, six a period) from the first period after `settle` periods at the first of them."""
+    """Set points (posture units, six per period) from the first period after `settle` periods at the first of them."""
 
     set_points: tuple[tuple[int, ...], ...]
     gains: tuple[int, int, int] = (2, 0, 0)
@@ -45,7 +45,7 @@ class Experiment:
 
 
 def read_experiment(path: Path, gains: tuple[int, int, int] = (2, 0, 0)) -> Experiment:
-    """An experiment from CSV with a line a period and columns set_point_1 … set_point_6 (posture units).
+    """An experiment from CSV with one line per period and columns set_point_1 … set_point_6 (posture units).
 
     Raises ExperimentError with one clear line.
     """
@@ -76,7 +76,7 @@ class _Path:
         self.rows += [list(self._now)] * round(seconds * 50)
 
     def move(self, by: tuple[float, float, float], seconds: float) -> None:
-        """A straight ramp by so many posture units."""
+        """Adds a straight ramp by so many posture units."""
         periods = max(round(seconds * 50), 1)
         start = list(self._now)
         for k in range(1, periods + 1):

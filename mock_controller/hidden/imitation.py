@@ -14,7 +14,7 @@ from mock_controller.plant import PlantParameters
 
 
 def imitation(parameters: PlantParameters, modifications: Iterable[Modification]) -> dict[str, float]:
-    """Deviations (fractions) of the arm `parameters` that do what the modifications do, or nearly, where some can."""
+    """Deviations (fractions) of the arm `parameters` that act as the modifications do, or nearly, if any can."""
     found: dict[str, float] = {}
     for effect in modifications:
         for name, fraction in _of_one(parameters, effect).items():
@@ -22,7 +22,7 @@ def imitation(parameters: PlantParameters, modifications: Iterable[Modification]
     return found
 
 
-def _of_one(  # noqa: PLR0911  (a table: a line an effect)
+def _of_one(  # noqa: PLR0911  (a table with one line per effect)
     parameters: PlantParameters, effect: Modification
 ) -> dict[str, float]:
     body = parameters.rigid_body
@@ -53,13 +53,13 @@ def _dampings(parameters: PlantParameters, number: int) -> tuple[float, float]:
 
 
 def _faster(parameters: PlantParameters, number: int, share: float) -> dict[str, float]:
-    """A joint that moves by a share more than is read: as if all that grows with its speed were that much more."""
+    """A joint that moves more than it reads, by a share: every term that grows with its speed seems larger by it."""
     damped = _damping(parameters, number, share * sum(_dampings(parameters, number)))
     return {**damped, f"rotor_inertia_{number}": share}
 
 
 def _damping(parameters: PlantParameters, number: int, more: float) -> dict[str, float]:
-    """`more` damping, shared by the two that can give it so that their priors ask the least."""
+    """`more` damping, divided between its two possible sources so that their priors are strained least."""
     stated = {tolerance.name: tolerance.stated for tolerance in tolerances()}
     names = (f"back_emf_constant_{number}", f"viscous_friction_{number}")
     present = _dampings(parameters, number)

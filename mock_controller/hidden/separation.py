@@ -1,8 +1,8 @@
 """d′: how far the readings of an arm with a hidden effect are from those that a sound arm could give.
 
 Run the arm with and without its effects, with the same noise. Their difference y, in standard deviations of a reading,
-is what an observer sees who knows the arm without them. One who does not may move the tolerance parameters z, each in
-its own standard deviation, at the price of its prior. With J = ∂y/∂z what is left is
+is what an observer sees who knows the arm without them. An observer who does not may adjust the tolerance parameters z
+(in their standard deviations) at the cost of their prior. With J = ∂y/∂z there remains
 
     d′² = min_z |y − J z|² + |z|²  =  yᵀ (I + J Jᵀ)⁻¹ y.
 
@@ -68,7 +68,7 @@ _SMALL_MOVE = 0.5
 """Largest move (standard deviations) for which the tangents are trusted without a simulation."""
 _SETTLED = 0.95
 """The refit stops after a step that leaves more than this share of the cost."""
-_AS_FORETOLD = 0.03
+_AS_PREDICTED = 0.03
 """Relative deviation of d′ from the tangents' prediction below which they are confirmed and the refit stops."""
 _LEAST_FRACTION, _MOST_FRACTION = -0.9, 5.0
 """Bounds of a constant's change, as fractions of its value."""
@@ -90,7 +90,7 @@ class Tangents:
     deviations: NDArray[np.float64]
 
     def within_reach(self, moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`moved` (standard deviations), each brought to where its constant can be."""
+        """`moved` (standard deviations), clipped to the bounds of each constant."""
         low, high = zip(*(_reach(name) for name in self.names), strict=True)
         return np.minimum(np.maximum(moved, np.array(low) / self.deviations), np.array(high) / self.deviations)
 
@@ -104,7 +104,7 @@ def _reach(name: str) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Separation:
-    """How well an effect can be seen: d′, the same before any refit, and how far the refit moves what (in σ)."""
+    """Detectability of an effect: d′, its value before any refit, and the refit's move of each parameter (in σ)."""
 
     d_prime: float
     before_refit: float
@@ -113,7 +113,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class _Direction:
-    """One tolerance parameter: its name and standard deviation, how many steps that is, and the arm a step on."""
+    """One tolerance parameter: its name and standard deviation, the same in steps, and the arm one step away."""
 
     name: str
     deviation: float
@@ -152,7 +152,7 @@ def tangents(
     )
     if kept is not None:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        # Written aside and renamed: others may look for the file at this moment.
+        # Written under another name and renamed: another process may look for the file now.
         aside = kept.with_suffix(f".{os.getpid()}.npz")
         np.savez(aside, names=np.array(found.names), matrix=found.matrix, deviations=found.deviations)
         aside.replace(kept)
@@ -169,11 +169,12 @@ def separation(
 ) -> Separation:
     """d′ between `parts` and the same arm with the modifications `without` only (by default none).
 
-    `present`: what `modelled_readings` has given for these parts, where that is known.
+    `present`: the result of `modelled_readings` for these parts, if it is known.
 
-    The refit goes along the tangents, then looks where that has led. Unless what is left is what the tangents have
-    foretold, or d′ is clearly large, it goes on, up to `refits` times: a strong effect that tolerances can imitate is
-    far from where the tangents were taken. Where some can imitate it, exactly or nearly, the refit starts from those.
+    The refit takes a step along the tangents and simulates the result. It ends there if the remainder is as they
+    predicted, or if d′ is clearly large. Otherwise it continues, up to `refits` times, because a strong effect that
+    tolerances can imitate has its optimum far from where the tangents were taken. Where deviations are known that
+    imitate the effect, exactly or nearly, the refit starts from those.
     """
     one = reading_deviation(parts.board)
     step_us = _step_length(parts)
@@ -196,9 +197,9 @@ def separation(
     looked = _separation_of(found.before_refit, left_there, there, known)
     hidden = [effect for effect in parts.modifications if effect not in without]
     imitating = imitation(parts.plant, hidden)
-    as_foretold = abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime
+    as_predicted = abs(looked.d_prime - found.d_prime) <= _AS_PREDICTED * found.d_prime
     clear = min(looked.d_prime, found.d_prime) > max(_CLEAR, _MOSTLY_EXPLAINED * found.before_refit)
-    if not imitating and (as_foretold or clear):
+    if not imitating and (as_predicted or clear):
         return min(looked, found, key=lambda each: each.d_prime)
     if imitating:
         start = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
@@ -217,12 +218,12 @@ def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
 
 
 def modelled_readings(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
-    """Readings (counts, (periods, MODELLED)) of the arm with all that it has."""
+    """Readings (counts, (periods, MODELLED)) of the complete arm."""
     return readings(parts, experiment, step_us=_step_length(parts))[:, :MODELLED]
 
 
 def _step_length(parts: LoopParts) -> int:
-    """Steps of the plant (µs): coarse ones where the drive changes between them and no gear gives."""
+    """Step of the plant (µs): coarse if the drive changes only at coarse steps and every gear is rigid."""
     fine = parts.board.timing.computing_delay % _COARSE_STEP_US or of_kind(parts.modifications, ChangesTransmission)
     return STEP_US if fine else _COARSE_STEP_US
 
@@ -237,8 +238,8 @@ def _refit(
 ) -> Separation:
     """Levenberg–Marquardt from `moved`, where `left` is the residual.
 
-    The tangents are corrected by what each step has shown (Broyden's update).
-    Heavily damped at first: it begins with the directions that explain most, and the others follow where those led.
+    Each step corrects the tangents (Broyden's update). Heavy damping at first makes it begin with the directions that
+    explain most; the others follow.
     """
     matrix = known.matrix
     cost = float(left @ left + moved @ moved)
@@ -275,9 +276,8 @@ def _separation_of(before: float, left: NDArray[np.float64], moved: NDArray[np.f
 def _move_parameters(
     parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
 ) -> tuple[LoopParts, NDArray[np.float64]]:
-    """The arm with its tolerance parameters moved by so many of their standard deviations.
-
-    Also what is left of the moves, to go along the tangents.
+    """The arm with its tolerance parameters moved by a number of their standard deviations, and the remainder of the
+    moves, which is to go along the tangents.
     """
     rest = np.zeros(len(known.names))
     deviations = dict(zip(known.names, (moved * known.deviations).tolist(), strict=True))

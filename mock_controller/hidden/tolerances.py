@@ -1,7 +1,7 @@
 """What may differ between two sound arms, and by how much.
 
-A deviation is a fraction of the data file's value, of the computing delay seconds. Potentiometers deviate by a smooth
-curve each; for a refit it is represented by three harmonics (`LinearityHarmonic`).
+A deviation is a fraction of the data file's value; that of the computing delay is in seconds. Each potentiometer
+deviates by a smooth curve; for a refit it is represented by three harmonics (`LinearityHarmonic`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Gears that give, waste torque, or turn unevenly."""
+"""Gears with play, elasticity, losses or uneven torque."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class JointCompliance:
 
 @dataclass
 class TorqueRipple:
-    """At `joint` a torque of `amplitude`, `periods` times a joint turn."""
+    """At `joint` a torque of `amplitude`, `periods` times per joint turn."""
 
     name: ClassVar[str] = "torque_ripple"
     shared: ClassVar[bool] = True
@@ -62,7 +62,7 @@ class TorqueRipple:
 
 @dataclass
 class DetentCogging:
-    """At `joint` a torque locked to the pinion, sharp like a detent: four harmonics of `periods` a joint turn."""
+    """At `joint` a torque locked to the pinion, sharp like a detent: four harmonics of `periods` per joint turn."""
 
     name: ClassVar[str] = "detent_cogging"
     shared: ClassVar[bool] = False

@@ -12,28 +12,28 @@ from mock_controller.plant.transmission import Transmission
 
 @runtime_checkable
 class ChangesPlant(Modification, Protocol):
-    """Other constants: masses, load, direction of gravity, motor, friction. Applied once, before the plant exists."""
+    """Changes constants: masses, load, direction of gravity, motor, friction. Applied once, before the plant exists."""
 
     def change_plant(self, parameters: PlantParameters) -> PlantParameters: ...
 
 
 @runtime_checkable
 class KnowsPlant(Modification, Protocol):
-    """Is told the arm's constants and the length of a step (s), once, before anything moves."""
+    """Receives the arm's constants and the step length (s) once, before anything moves."""
 
     def know_plant(self, parameters: PlantParameters, step_s: float) -> None: ...
 
 
 @runtime_checkable
 class CouplesDrives(Modification, Protocol):
-    """Volts at all six amplifiers' outputs, before anything else acts on them. Asked once per new voltages."""
+    """Changes the volts at all six amplifiers' outputs, before anything else acts on them. Called for new voltages."""
 
     def coupled_volts(self, volts: Sequence[float]) -> list[float]: ...
 
 
 @runtime_checkable
 class ChangesDriveVoltage(Modification, Protocol):
-    """Volts at one joint's motor, between the amplifier's gain and its supply limit. Asked once per new voltage."""
+    """Changes the volts at one joint's motor before the supply limit. Called for each new voltage."""
 
     joint: int
 
@@ -42,7 +42,7 @@ class ChangesDriveVoltage(Modification, Protocol):
 
 @runtime_checkable
 class ChangesMotorVolts(Modification, Protocol):
-    """Volts at one joint's motor, after the supply limit. Asked every step, with what the amplifier means to give."""
+    """Changes the volts at one joint's motor after the supply limit. Called every step with the amplifier's volts."""
 
     joint: int
 
@@ -51,7 +51,7 @@ class ChangesMotorVolts(Modification, Protocol):
 
 @runtime_checkable
 class ChangesMotorTorque(Modification, Protocol):
-    """What is added to one joint's motor torque (`torque`: after gear and viscous friction). Asked every step."""
+    """Adds to one joint's motor torque (`torque`: after gear and viscous friction). Called every step."""
 
     joint: int
 
@@ -60,7 +60,7 @@ class ChangesMotorTorque(Modification, Protocol):
 
 @runtime_checkable
 class ChangesFriction(Modification, Protocol):
-    """Level (≥ 0) that one joint's Coulomb friction may reach. Asked every step, after `torque_change`."""
+    """Changes the level (≥ 0) that one joint's Coulomb friction may reach. Called every step, after `torque_change`."""
 
     joint: int
 
@@ -69,7 +69,7 @@ class ChangesFriction(Modification, Protocol):
 
 @runtime_checkable
 class ChangesTransmission(Modification, Protocol):
-    """A gear that gives: rotor and link of one joint move apart."""
+    """Replaces one joint's rigid gear by one that yields: rotor and link move apart."""
 
     joint: int
 
@@ -78,7 +78,7 @@ class ChangesTransmission(Modification, Protocol):
 
 @runtime_checkable
 class AddsJointTorque(Modification, Protocol):
-    """Torque on one joint's link, a function of time and the joint's own motion. Asked every step."""
+    """Adds a torque on one joint's link, a function of time and the joint's own motion. Called every step."""
 
     joint: int
 
@@ -87,6 +87,6 @@ class AddsJointTorque(Modification, Protocol):
 
 @runtime_checkable
 class AddsTorque(Modification, Protocol):
-    """Torque from outside on all joints, a function of time and state (six values). Asked every step."""
+    """Adds torques from outside on all joints, functions of time and state (six values). Called every step."""
 
     def external_torque(self, time_s: float, angles: Sequence[float], rates: Sequence[float]) -> Sequence[float]: ...

@@ -1,4 +1,4 @@
-"""The plant's numbers, in SI units, read from a data file that gives each one's source."""
+"""The plant's constants, in SI units, read from a data file that gives each one's source."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class AmplifierParameters:
 
 @dataclass(frozen=True)
 class PlantParameters:
-    """Everything the plant is made of. Element i of `joints` is joint i+1."""
+    """All constants of the plant. Element i of `joints` is joint i+1."""
 
     rigid_body: RigidBodyParameters
     amplifier: AmplifierParameters

@@ -77,7 +77,7 @@ class Plant:
         self._applied = self._data.qfrc_applied
         self._coulomb = CoulombLevel(parameters)
         self._presliding_rate = parameters.friction.presliding / self._step_s
-        """Joint rate (rad/s) that is the presliding displacement a step."""
+        """Joint rate (rad/s) at which one step covers the presliding displacement."""
         self._with_current = [i for i, joint in enumerate(parameters.joints) if joint.inductance > 0.0]
         self._half_damping = [0.0 if i in self._rotors else 0.5 * drive.damping for i, drive in enumerate(self._drives)]
         for curious in of_kind(self._modifications, KnowsPlant):
@@ -174,7 +174,7 @@ class Plant:
         self._stalled.discard(joint)
 
     def advance(self, volts_in: Sequence[float], duration_us: int) -> None:
-        """Moves the arm on for `duration_us` with six constant voltages (V) at the amplifiers' inputs.
+        """Moves the arm for `duration_us` under six constant voltages (V) at the amplifiers' inputs.
 
         Raises PlantError for a duration that is no whole number of steps, or volts that are not six finite numbers.
         """
@@ -220,7 +220,7 @@ class Plant:
         self._steps += 1
 
     def _step_modified(self, asked: list[float]) -> None:
-        """One step with everything that a modification or an inductance may add, the amplifiers asked for volts."""
+        """One step with everything that a modification or an inductance may add; `asked` are the amplifiers' volts."""
         v: list[float] = self._v.tolist()
         q: list[float] = self._q.tolist()
         time_s = self.time_us * 1e-6
@@ -286,7 +286,7 @@ class Plant:
         inertias = np.zeros((JOINTS, JOINTS))
         mujoco.mj_fullM(self._model, self._data, inertias)
         for index, rotor in self._rotors.items():
-            # Seen with every other joint free, which is the lightest that the link can be.
+            # Computed with every other joint free, where the link's inertia is smallest.
             link = 1.0 / float(np.linalg.inv(inertias)[index, index])
             own = self.parameters.joints[index].reflected_inertia
             effective = link * own / (link + own) if own > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""The gear between rotor and link where it gives; a rigid gear needs no state and none of this."""
+"""A gear that yields, between rotor and link; a rigid gear needs no state and none of this."""
 
 from __future__ import annotations
 

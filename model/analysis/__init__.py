@@ -1,1 +1,1 @@
-"""What a model says about its machine: torques along a motion, elements of D, sensitivities, which parameters act."""
+"""Analysis of a model: torques along a motion, elements of D, sensitivities, and the joints that parameters act on."""

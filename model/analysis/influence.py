@@ -1,4 +1,4 @@
-"""Which inertial parameters act on which joint: the source's tables 5.1 to 5.3 beside what the dynamics do."""
+"""Which inertial parameters act on which joint: the source's tables 5.1 to 5.3 beside those that the dynamics give."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Influence(BaseModel):
 def influences(
     chain: Chain, table: str, published: tuple[frozenset[str], ...], *, waist_still: bool = False, states: int = 10
 ) -> tuple[Influence, ...]:
-    """Acting parameters of a chain of revolute joints at random states, beside published ones, one entry a joint.
+    """Acting parameters of a chain of revolute joints at random states, beside published ones, one entry per joint.
 
     Raises ChainError for a prismatic joint.
     """

@@ -24,7 +24,7 @@ class _Part(BaseModel):
 class SensitivityCurve(_Part):
     """Change of each joint's reading (rad, m) along a run when one parameter changes by its expected deviation.
 
-    `by_joint` has one series a modelled joint; `rms` is over all of them.
+    `by_joint` has one series per modelled joint; `rms` is over all of them.
     """
 
     name: str

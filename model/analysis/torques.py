@@ -5,11 +5,11 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
@@ -18,7 +18,6 @@ from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from model.validation import differentiation
 
-Floats = NDArray[np.float64]
 Series = tuple[float, ...]
 
 
@@ -112,7 +111,7 @@ def torques_of_trace(model: Model, trace: Trace, width: float = 2.0) -> TorqueAn
 def torques_along(
     model: Model, time: Floats, position: Floats, speed: Floats, acceleration: Floats, source: str
 ) -> TorqueAnalysis:
-    """Torques along a motion (k, n) in rad, rad/s and rad/s²; link 3 by (7.28) if the model has it so."""
+    """Torques along a motion (k, n) in rad, rad/s and rad/s²; link 3 by (7.28) if the model uses it."""
     joints = range(model.joint_count)
     chain = _as_published(chain_of(model)) if model.published_inertia else chain_of(model)
     whole = np.array([recursive.mass_matrix(chain, q) for q in position])
@@ -175,7 +174,7 @@ def _without_moments(chain: ChainArrays) -> ChainArrays:
 
 
 def _as_published(chain: ChainArrays) -> ChainArrays:
-    """The arm with link 3 and its load as one rod that is shifted along itself, (7.20) to (7.28): 13 to 22 % more."""
+    """The arm with link 3 and its load as one shifted rod, (7.20) to (7.28), whose inertia is 13 to 22 % too high."""
     inertial = chain.inertial.copy()
     mass, length = inertial[2, 0], chain.geometry[2, 2]
     beyond = -inertial[2, 1] / mass  # s_3x: from the common centre of mass to the end of the link

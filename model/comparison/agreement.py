@@ -17,8 +17,8 @@ class JointAgreement(_Part):
     """One joint over one or more traces.
 
     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-    count of the sensor (None where it has none), all in `unit`. `share` is the mean square of what is left over that of
-    the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+    count of the sensor (None where it has none), all in `unit`. `share` is the mean square of the residual divided by
+    that of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
     """
 
     joint: int
@@ -41,7 +41,7 @@ class JointAgreement(_Part):
 
 
 class TraceAgreement(_Part):
-    """One trace; `held_out` tells whether the model was fitted to it, None where that is not the question."""
+    """One trace; `held_out` tells whether the model was fitted to it, None where nothing was fitted."""
 
     trace: str
     held_out: bool | None

@@ -6,25 +6,23 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class TraceSignals:
     """One trace beside its simulations.
 
-    time (m,) s; measured, set_point (or None) and each of `simulated` (m, n) in `units`, one column a joint.
+    time (m,) s; measured, set_point (or None) and each of `simulated` (m, n) in `units`, one column per joint.
     """
 
     trace: str
@@ -55,7 +53,7 @@ def compare(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Comparison:
-    """Simulate every trace with every model, driven by the controller or by the recorded drive.
+    """Simulates every trace with every model, driven by the controller or by the recorded drive.
 
     Args:
         models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to;

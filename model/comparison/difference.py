@@ -15,7 +15,8 @@ SAME = 1e-12
 class ParameterDifference(BaseModel):
     """One parameter with its value in each model, None where a model does not have it.
 
-    `deviations` is the spread of the values in expected deviations; None where one lacks it or none is expected.
+    `deviations` is the spread of the values in expected deviations; None where a model lacks the
+    parameter or no deviation is expected.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)

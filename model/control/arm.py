@@ -22,7 +22,7 @@ WEIGHT_2 = lumped.SIZE
 WEIGHT_3 = lumped.SIZE + 1
 """(m3 + MLOAD) g, N."""
 VOLTS_TO_TORQUE = lumped.SIZE + 2
-"""Three entries: n K_T / R, N·m at the joint a volt at the motor."""
+"""Three entries: n K_T / R, N·m at the joint per volt at the motor."""
 BACK_EMF = lumped.SIZE + 5
 """Three entries: n² K_T K_b / R, N·m·s/rad at the joint."""
 VISCOUS = lumped.SIZE + 8
@@ -39,7 +39,7 @@ class DrivenArm:
 
     Args:
         body: cylinder, rods, load and reflected rotor inertias.
-        resistance: Ω. torque_constant: N·m/A. back_emf: V·s/rad. gear: motor turns a joint turn.
+        resistance: Ω. torque_constant: N·m/A. back_emf: V·s/rad. gear: motor turns per joint turn.
         viscous: v_eff on the motor's side, N·m·s/rad. friction_arm: μ̃, m.
     """
 

@@ -21,7 +21,7 @@ PARTITIONED_GAINS = (11.0, 5.0, 7.0)
 """K_P, K_I, K_D of every joint, (8.17) to (8.19): poles at −1, −1 and −5 on a unit inertia."""
 
 PID_GAINS = ((25.4, 5.2, 21.9), (29.2, 3.8, 23.6), (22.8, 4.8, 21.7))
-"""K_P, K_I, K_D of joints 1 to 3 of the classical PID (section 8.3), volts at the amplifier's input a rad."""
+"""K_P, K_I, K_D of joints 1 to 3 of the classical PID (section 8.3), volts at the amplifier's input per rad."""
 
 AMPLIFIER_GAIN = 28.0
 """Gain between the controller's output and the motor (section 6.2); by (8.5) and (8.7) it is part of the PID's loop."""
@@ -41,7 +41,7 @@ class Sinusoid:
         return np.array([self.centre, self.amplitude, [2 * np.pi / self.period] * 3, self.phase])
 
     def at(self, time: Floats) -> Floats:
-        """Positions (k, 3) wanted at times (k,)."""
+        """Desired positions (k, 3) at times (k,)."""
         centre, amplitude, rate, phase = self.table()
         return np.asarray(centre + amplitude * np.sin(np.outer(time, rate) + phase))
 
@@ -56,7 +56,7 @@ class Partitioned:
 
 @dataclass(frozen=True)
 class ClassicalPid:
-    """PID with fixed gains a joint; `amplifier` multiplies its output before the motor."""
+    """PID with fixed gains for each joint; `amplifier` multiplies its output before the motor."""
 
     gains: tuple[tuple[float, float, float], ...] = PID_GAINS
     amplifier: float = AMPLIFIER_GAIN

@@ -11,13 +11,13 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace, TraceRecord
+from model.arrays import Floats
 from model.fitting.covariance import inverse
 from model.fitting.fit import INTERVAL, fit_problem
 from model.fitting.options import FitOptions
@@ -31,15 +31,14 @@ from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 
-Floats = NDArray[np.float64]
-
 Planner = Callable[[ExperimentSpec], Floats]
-"""A function that gives the set points (k, joints of the machine) of an experiment in rad, one row a control period. It
-raises a DaqError of one line for an experiment that the limits of the machine do not allow. The caller supplies it,
+"""A function that gives the set points (k, joints of the machine) of an experiment in rad, one row per control period.
+It raises a DaqError of one line for an experiment that the limits of the machine do not allow. The caller supplies it,
 since planning belongs to `daq`."""
 
 FOLLOWING_SHARE = 0.6
-"""Largest following error of a design, as a share of that at which set points pause: a real arm may be slower."""
+"""Largest following error of a design, as a share of the error at which set points pause. It leaves a margin for a real
+arm that is slower than the model."""
 
 
 class _Part(BaseModel):
@@ -101,7 +100,7 @@ def information_gain(
 
 
 def prior_information(unknowns: Sequence[Unknown]) -> Floats:
-    """(p, p) information of the priors in natural sizes; where nothing is claimed, that of a hundred natural sizes."""
+    """(p, p) information of the priors in natural sizes; without a stated deviation, that of 100 natural sizes."""
     precision = prior_precision(tuple(unknowns)) * scales(tuple(unknowns)) ** 2
     return np.diag(np.maximum(precision, 1e-4))
 
@@ -196,7 +195,7 @@ def _falls_behind(error: Floats, change: Floats, smooth: float, most: float) -> 
 
 
 def _marginal(problem: SimulatedProblem, information: Floats) -> tuple[tuple[Unknown, ...], Floats]:
-    """Information about the unknowns that are no nuisances, which are known as far as their priors say."""
+    """Information about the unknowns of interest; nuisances are marginalised, known as far as their priors say."""
     nuisance = np.array([u.nuisance for u in problem.unknowns])
     own = tuple(u for u in problem.unknowns if not u.nuisance)
     if not nuisance.any():

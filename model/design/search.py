@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
+from model.arrays import Floats
 from model.design.candidates import drawn_experiment
 from model.design.information import (
     InformationGain,
@@ -24,8 +24,6 @@ from model.fitting.fit import INTERVAL
 from model.fitting.options import FitOptions
 from model.fitting.unknowns import Unknown, scales
 from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 
 class DesignOptions(BaseModel):

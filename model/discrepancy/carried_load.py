@@ -1,4 +1,4 @@
-"""A load that somebody states for the arm: the model with it, and whether its motors could hold it."""
+"""A load that a user states for the arm: the model with this load, and whether the motors could hold it."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from daq.contracts.experiment import ExperimentSpec
 from model.discrepancy.grounds import ControllerProof, Method, Note, Reason, Refusal
 from model.machine_model.model import Model
+from model.machine_model.parameter import Parameter
 
 ANSWER_FORMAT = 1
 """Version of the answer; a reader refuses newer ones."""
@@ -33,12 +34,23 @@ class _Part(BaseModel):
 
 
 class FoundValue(_Part):
-    """One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it."""
+    """One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it.
+
+    `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine). Both
+    are empty in older answers.
+    """
 
     value: float
     low: float | None
     high: float | None
     unit: str
+    part: str = ""
+    joints: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, p: Parameter, value: float, low: float | None = None, high: float | None = None) -> FoundValue:
+        """An estimate of a parameter."""
+        return cls(value=value, low=low, high=high, unit=p.unit, part=p.part, joints=p.joints)
 
 
 class Candidate(_Part):

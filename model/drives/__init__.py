@@ -1,1 +1,1 @@
-"""From a set point to motor volts, a period at a time: sensor, controller, amplifier; compiled, one joint a call."""
+"""From a set point to motor volts, for one joint and one period: sensor, controller, amplifier; compiled."""

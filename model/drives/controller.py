@@ -1,4 +1,4 @@
-"""Sampled controllers of one joint, one period a call."""
+"""Sampled controllers of one joint, one call per period."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def clamped(x: Any, limit: Any) -> Any:
 
 @inlined
 def outside(x: Any, half_width: Any) -> Any:
-    """What of x lies outside ±half_width: zero inside."""
+    """The part of x beyond ±half_width; zero inside."""
     if x.real > half_width.real:
         return x - half_width
     if x.real < -half_width.real:

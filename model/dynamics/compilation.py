@@ -1,6 +1,6 @@
-"""How every compiled function of the model is compiled, and where its machine code is kept.
+"""Compiles the functions of the model, and decides where their machine code is kept.
 
-numba decides whether cached code is still good by the source file of the function alone, not by the files of
+numba decides whether cached code is still valid by the source file of the function alone, not by the files of
 the functions it calls: after an edit of the dynamics it would go on running the old dynamics inside an
 unchanged simulation kernel. The machine code of a function is therefore kept in a folder named by a hash of its
 module and of every module of ours that this one reaches by imports: an edit of any of them gives a fresh folder, an
@@ -30,7 +30,7 @@ CACHE_DAYS = 30
 """Caches of older sources that have not been written for this long are removed."""
 
 PACKAGES = ("model", "daq", "firmware_protocol")
-"""Where compiled code may reach of ours. numba itself watches its own version and the processor."""
+"""Our packages that compiled code may import from. numba itself watches its own version and the processor."""
 
 _ROOT = Path(__file__).resolve().parents[2]
 _numba_settings: Any = numba.config
@@ -56,7 +56,7 @@ def dependencies(module: str, root: Path = _ROOT) -> dict[str, Path]:
 def source_hash(module: str, root: Path = _ROOT) -> str:
     """Hash of the sources that a module reaches, names included, as 16 hexadecimal digits.
 
-    For a module from elsewhere, a user's own: of its file, where it has been imported, and of all of `model`.
+    For a module outside the project, such as a user's own: hash of its file, if it is imported, and of all of `model`.
     """
     sources = dependencies(module, root)
     if not sources:
@@ -129,35 +129,35 @@ def _remove_old(parent: Path, before: float) -> None:
 
 
 def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> Any:
-    """Division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as a C compiler
-    does with -march=native: results repeat to the bit on one machine, not across machines."""
+    """Compiles so that division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as
+    a C compiler does with -march=native. So results repeat to the bit on one machine, not across machines."""
     if cached:
         _numba_settings.CACHE_DIR = str(cache_folder(function.__module__))  # read when the function is decorated
     return numba.njit(cache=cached, error_model="numpy", fastmath={"contract"}, **options)(function)
 
 
 def compiled(function: Callable[..., Any], *, nogil: bool = False) -> Any:
-    """Compile a module-level function that Python calls to machine code, cached on disk.
+    """Compiles a module-level function that Python calls to machine code, cached on disk.
 
-    Other threads run beside it with `nogil`.
+    With `nogil` other threads run beside it.
     """
     return _compile(function, cached=True, nogil=nogil)
 
 
 def internal(function: Callable[..., Any]) -> Any:
-    """Compile a function that only compiled code calls: no entry from Python, and kept only within its callers."""
+    """Compiles a function that only compiled code calls: no entry from Python, and kept only within its callers."""
     return _compile(function, cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a small scalar function that must disappear into its caller."""
+    """Compiles a small scalar function that must disappear into its caller."""
     return _compile(function, cached=False, forceinline=True)
 
 
 def _import_without_looking_for_blas() -> None:
-    """numba imports scipy.linalg at its first compilation, to learn whether there is a BLAS: a fifth of a first use.
+    """Keeps numba from importing scipy.linalg in search of a BLAS, which takes a fifth of the time of a first use.
 
-    Nothing here uses one, and what multiplies matrices in a user's own effect asks for it again by itself.
+    Nothing here uses one; a user's own effect that multiplies matrices imports it again by itself.
     """
     name = "scipy.linalg.cython_blas"
     if name in sys.modules:

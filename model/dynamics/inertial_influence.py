@@ -2,7 +2,7 @@
 
 The parameters are those of (5.3): mass, centre of mass c̄ and inertia I* of a link about the joint that carries it, in
 link axes. Their effect on the joint torques is differentiated exactly, state by state, so that the tables of the
-source can be set beside what its own model does.
+source can be compared with its own model.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PARAMETERS = ("m", "cx", "cy", "cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 """Names of the ten inertial parameters of a link, about the joint that carries it."""
 
 NEGLIGIBLE = 1e-12
-"""Share of the largest sensitivity below which one is rounding."""
+"""Share of the largest sensitivity below which a sensitivity counts as rounding."""
 
 State = tuple[FloatArray, FloatArray, FloatArray]
 """Joint angles, rates and accelerations, each (n,)."""
@@ -49,7 +49,7 @@ def torque_sensitivities(chain: Chain, state: State) -> FloatArray:
 def acting_parameters(chain: Chain, states: Iterable[State]) -> list[list[str]]:
     """Names of the parameters that act on each joint's torque in any of the states, such as "m3" or "I2zz".
 
-    One list a joint, in the order of the links. Raises as `torque_sensitivities`.
+    One list per joint, in the order of the links. Raises as `torque_sensitivities`.
     """
     largest = np.max([np.abs(torque_sensitivities(chain, state)) for state in states], axis=0)
     acts = largest > NEGLIGIBLE * largest.max()

@@ -28,7 +28,7 @@ def solve_3(
 ) -> Any:
     """Solution (x1, x2, x3) of a symmetric 3 × 3 system; one pivot, then a 2 × 2 system by its determinant.
 
-    Two divisions instead of three: they are the longest instructions in it.
+    It has two divisions instead of three: they are its slowest instructions.
     """
     pivot = reciprocal(d11)
     l2 = d12 * pivot

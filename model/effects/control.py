@@ -1,4 +1,4 @@
-"""The controller and its timing."""
+"""Effects of the controller and its timing."""
 
 from __future__ import annotations
 

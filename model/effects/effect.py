@@ -1,4 +1,4 @@
-"""What an effect is, and the sizes of a joint from which it takes its bounds and expected deviations."""
+"""The types of an effect and its parameters, and the sizes of a joint that give bounds and expected deviations."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class JointScale:
 Size = float | Callable[[JointScale], float]
 
 
-def sized(size: Size, scale: JointScale) -> float:
-    """A size that is a number, or follows from the joint."""
+def evaluate_size(size: Size, scale: JointScale) -> float:
+    """The value of a size: a number, or a function of the joint."""
     return size(scale) if callable(size) else size
 
 
@@ -61,7 +61,7 @@ class EffectParameter:
         name: last part of the parameter's full name.
         column: where it lies (`model.layout`), a joint's column or, for the whole machine, a shared slot.
         unit: in SI.
-        null: value at which the effect is not there; None for a parameter that only shapes it.
+        null: value at which the effect is absent; None for a parameter that only shapes it.
         start: value when the effect is added without one: the null value, or a typical shape.
         low, high: bounds. deviation: expected size on a machine that has the effect.
         source: where its numbers come from; the effect's own source where it is empty.
@@ -82,7 +82,7 @@ class EffectParameter:
         chosen = self.null if self.start is None else self.start
         if chosen is None:
             raise ValueError(f"effect parameter {self.name} has neither a null nor a starting value")
-        return sized(chosen, scale)
+        return evaluate_size(chosen, scale)
 
 
 class EffectFile(BaseModel):
@@ -124,7 +124,7 @@ class Effect:
 
     @property
     def shared_name(self) -> EffectName:
-        """Its entry in the shared list, or one like it: what it acts on, its family, one line for people."""
+        """Its entry in the shared list; for a user's own effect, an entry of the same form."""
         if self.file is not None:
             return EffectName(self.name, "joint torque", self.family, self.physics)
         return effect_names()[self.name]

@@ -40,7 +40,7 @@ def load_effect_file(path: Path) -> Effect:
 
 
 def _stated(path: Path, file: EffectFile) -> OwnEffect:
-    """What the file states, run under a module name of its own."""
+    """Runs the file under a module name of its own; returns the effect that it states."""
     name = f"own_effect_{file.sha256}"
     spec = spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:

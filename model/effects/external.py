@@ -1,4 +1,4 @@
-"""Torques from outside."""
+"""Effects of external torques."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ EXTERNAL = (
             EffectParameter("rest", at.SPRING_REST, "rad", null=None, start=0.0, low=-10.0, high=10.0, deviation=1.0),
         ),
     ),
-    # A record that begins at another moment meets it at another phase. Held-out records get a phase of their own
-    # (`model.discrepancy.output_error.holdout`); those that are fitted together share one, which is right for one
-    # record alone.
+    # Its phase counts from the start of a record, so each record has another one. Held-out records get a phase of their
+    # own (`model.discrepancy.output_error.holdout`); records that are fitted together share one, which is right for a
+    # single record only.
     Effect(
         "periodic_disturbance",
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",

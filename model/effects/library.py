@@ -35,7 +35,7 @@ def own_effects() -> dict[str, Effect]:
 
 
 def add_own(found: Effect) -> None:
-    """Add an effect of the user's own. Raises SpecError when another file's effect has its name."""
+    """Adds an effect of the user's own. Raises SpecError when another file's effect has its name."""
     other = _own.get(found.name)
     if other is not None and other != found:
         assert other.file is not None
@@ -44,7 +44,7 @@ def add_own(found: Effect) -> None:
 
 
 def remove_own(name: str) -> None:
-    """Take an effect of the user's own out of the library again; models that have it can no longer be used."""
+    """Removes an effect of the user's own from the library; models that have it can no longer be used."""
     _own.pop(name, None)
 
 

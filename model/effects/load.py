@@ -1,4 +1,4 @@
-"""Mass, its place, and gravity."""
+"""Effects of masses, their location, and gravity."""
 
 from __future__ import annotations
 

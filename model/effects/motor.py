@@ -1,4 +1,4 @@
-"""Motor and amplifier."""
+"""Effects of motor and amplifier."""
 
 from __future__ import annotations
 

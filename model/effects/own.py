@@ -27,7 +27,7 @@ class OwnParameter:
     Args:
         name: an argument of the torque, and the last part of the parameter's name.
         unit: in SI, for a revolute joint (N·m and rad; on a prismatic one N and m).
-        null: value at which the effect is not there; None for a parameter that only shapes it, which needs a `start`.
+        null: value at which the effect is absent; None for a parameter that only shapes it, which needs a `start`.
         deviation: expected size on a machine that has the effect. low, high: what is physically possible.
         start: value when the effect is added; the null value where nothing is said.
         source: where these numbers come from; the effect's source where nothing is said.

@@ -1,7 +1,7 @@
 """For the torque of an effect of the user's own: functions with corners, which also carry exact derivatives.
 
-Python's abs, min, max and comparisons do not: a derivative travels in the imaginary part of a complex number. Smooth
-functions are numpy's: np.exp, np.sin, np.cos, np.tanh, np.sqrt, np.log. Comparisons look at `.real`.
+Python's abs, min, max and comparisons carry none: a derivative travels in the imaginary part of a complex number.
+Smooth functions are numpy's: np.exp, np.sin, np.cos, np.tanh, np.sqrt, np.log. Comparisons look at `.real`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The potentiometer: its reading against the angle."""
+"""Effects of the potentiometer: its reading against the angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between motor and joint."""
+"""Effects between motor and joint."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale
 
 CONTACT_RATE = 1500.0
-"""rad/s at which parts in contact swing against each other at most: what steps of 1 ms carry (RK4 to 2785)."""
+"""Highest natural frequency (rad/s) of parts in contact, which steps of 1 ms can follow (RK4 is stable up to 2785)."""
 CONTACT_DAMPING = 0.1
-"""Share of critical damping of that swing: an assumption."""
+"""Damping ratio of that oscillation: an assumption."""
 
 
 def _damping(scale: JointScale) -> float:
@@ -18,12 +18,12 @@ def _damping(scale: JointScale) -> float:
 
 
 def contact_compliance(scale: JointScale) -> float:
-    """Compliance of a contact that swings at `CONTACT_RATE`, rad/(N·m)."""
+    """Compliance of a contact that oscillates at `CONTACT_RATE`, rad/(N·m)."""
     return 1.0 / (CONTACT_RATE**2 * scale.inertia)
 
 
-def _give(scale: JointScale) -> float:
-    """A contact that is this much softer lets a joint give by two counts under a twentieth of its rated torque."""
+def _noticeable_compliance(scale: JointScale) -> float:
+    """Compliance at which a joint yields by two counts under a twentieth of its rated torque."""
     return 2 * scale.resolution / (0.05 * scale.torque)
 
 
@@ -85,8 +85,8 @@ TRANSMISSION = (
                 null=None,
                 start=contact_compliance,
                 low=contact_compliance,
-                high=lambda s: contact_compliance(s) + 10 * _give(s),
-                deviation=_give,
+                high=lambda s: contact_compliance(s) + 10 * _noticeable_compliance(s),
+                deviation=_noticeable_compliance,
             ),
         ),
         flag=at.HAS_FLEXIBILITY,

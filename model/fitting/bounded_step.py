@@ -1,4 +1,4 @@
-"""The step of a Gauss-Newton or Levenberg-Marquardt search within bounds."""
+"""The step of a Gauss–Newton or Levenberg–Marquardt search within bounds."""
 
 from __future__ import annotations
 

@@ -54,7 +54,8 @@ def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
 
 
 def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model, tuple[Unknown, ...]]:
-    """The model with bent potentiometers, and the bends as nuisance parameters; the model alone where not wanted."""
+    """The model with bent potentiometers, and the bends as nuisance parameters; the model alone if bends are not asked
+    for."""
     if options.sensor_bend is False or signal != "position":
         return model, ()
     taken = {j for use in model.effects if use.name == BEND for j in use.joints}
@@ -97,11 +98,11 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
 
 
 def friction_forms(model: Model) -> tuple[Unknown, ...]:
-    """Room for a law of friction other than the model's own near zero speed, as nuisances.
+    """Nuisance parameters that allow for another law of friction near zero speed than the model's.
 
     Two unknowns a joint with sliding friction: the distance over which friction builds up when motion starts or turns,
     and the shape of that rise, between Prandtl's corner and Dahl's exponential. Neither is in any machine file, the
-    sensor hardly shows them, and laws of friction differ in them; both decide a little of every reversal.
+    sensor hardly shows them, and laws of friction differ in them; both affect every reversal a little.
     """
     joints = tuple(
         j

@@ -1,10 +1,9 @@
-"""Covariance of fitted parameters when residuals are correlated or larger than the model of the noise says.
+"""Covariance of fitted parameters whose residuals are correlated, or larger than the noise model says.
 
 Whitening takes out the correlation that is the same everywhere. What is left is of another kind: an arm that comes to
-rest a little off stays off for the whole hold, and the noise differs between motion and rest. The sandwich
-A⁻¹ B A⁻¹ with A = JᵀJ + prior, and B from the sums of neighbouring scores (Newey and West 1987), answers for that.
-Since B is itself estimated from few independent stretches, no parameter gets a smaller deviation from it than from A
-alone.
+rest a little off stays off for the whole hold, and the noise differs between motion and rest. The sandwich A⁻¹ B A⁻¹
+with A = JᵀJ + prior, and B from the sums of neighbouring scores (Newey and West 1987), accounts for that. Since B is
+itself estimated from few independent stretches, no parameter gets a smaller deviation from it than from A alone.
 """
 
 from __future__ import annotations
@@ -57,8 +56,8 @@ def sandwich(information: Floats, scores: Sequence[Floats], prior: Floats, bandw
 def inverse(information: Floats) -> Floats:
     """Inverse (p, p) of a symmetric matrix that is positive but for rounding, positive whatever rounding did.
 
-    Where the data say nothing of a direction, rounding may leave a little less than nothing; then the smallest amount
-    that rounding cannot hide stands for it. Rows and columns are brought to one size first.
+    In a direction without information, rounding may leave a slightly negative value; it is replaced by the smallest
+    value that exceeds rounding. Rows and columns are brought to one size first.
     """
     sizes = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     eigenvalues, vectors = np.linalg.eigh(information / np.outer(sizes, sizes))

@@ -1,10 +1,10 @@
-"""Directions in the space of parameters that the data cannot tell from standing still, named as combinations.
+"""Directions in parameter space along which the data do not change, named as combinations.
 
 In scaled coordinates (a unit is the expected deviation, else the value) the whitened Jacobian has a singular value for
-every direction; its inverse is the deviation with which the data alone know that direction. Where it is above one, they
-know less than was expected before. These directions span a space; a basis of it with few members each is what can be
-put into words. One of them has a name of its own: scaling all masses, torque constants, friction and rotor inertias
-together leaves the motion as it is (positions and voltages do not fix the scale of torque).
+every direction; its inverse is the deviation with which the data alone know that direction. Where that is above one,
+the data tell less than was expected beforehand. These directions span a space; a basis of it with few members each is
+what can be put into words. One of them has a name of its own: scaling all masses, torque constants, friction and rotor
+inertias together leaves the motion as it is (positions and voltages do not fix the scale of torque).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A model's parameters from traces."""
+"""Estimates a model's parameters from traces."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from model.machine_model.model import Lineage, Model
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
 SETTLED = 0.33
-"""Largest move of the values in a round, in their deviations, with which the rounds end."""
+"""Largest change of the values in a round, in their deviations, at which the rounds end."""
 LEAST_SQUARES_EVALUATIONS = 60
 ROUND_EVALUATIONS = 2
 """Most evaluations in a round that is not the last: the next round changes the weights anyway."""
 FIRST_TOLERANCE = 100.0
-"""Tolerance of the first search, as a multiple of that of the rounds: it only has to come near."""
+"""Tolerance of the first search, as a multiple of that of the rounds: it only has to come close."""
 SIMPLEX_EVALUATIONS = 400
 """Most evaluations of Nelder and Mead's search for each parameter."""
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.service.jobs import ParameterWords
 from model.arrays import Floats
 from model.fitting.covariance import inverse
 from model.fitting.directions import NEGLIGIBLE, Direction, undetermined
@@ -19,11 +20,11 @@ Verdict = Literal["known", "combination", "unknown"]
 KNOWN_SHARE = 0.5
 """Largest deviation, as a share of the natural size, that the data alone may leave of a parameter that is known."""
 LARGEST_DEVIATION = 30.0
-"""Largest deviation, in natural sizes, that is reported: over a larger distance the model is not linear."""
+"""Largest deviation that is reported, in natural sizes: over a larger distance the model is not linear."""
 STRONG_CORRELATION = 0.95
 """Correlation of estimates beyond which parameters belong to one group."""
 WEAKEST_PRIOR = 1e3
-"""Deviation, in natural sizes, of a prior so wide that it only keeps the arithmetic finite where data say nothing."""
+"""Deviation of a very wide prior, in natural sizes: it only keeps the arithmetic finite where the data say nothing."""
 
 
 class _Part(BaseModel):
@@ -165,7 +166,7 @@ def _combination(direction: Direction, unknowns: Sequence[Unknown], values: Floa
             members.append(Member(name=unknown.name, change=change / value if relative else change, relative=relative))
     members = _smallest_readable(members)
     return Combination(
-        text=_text(members, direction.torque_scale, unknowns),
+        text=_text(members, direction.torque_scale, {u.name: u.unit for u in unknowns}),
         members=tuple(members),
         torque_scale=direction.torque_scale,
         deviation=direction.deviation if np.isfinite(direction.deviation) else None,
@@ -180,18 +181,27 @@ def _smallest_readable(members: list[Member]) -> list[Member]:
     return [m.model_copy(update={"change": m.change / largest}) for m in members]
 
 
-def _text(members: Sequence[Member], torque_scale: bool, unknowns: Sequence[Unknown]) -> str:
+def undetermined_in_words(report: IdentifiabilityReport, words: Mapping[str, ParameterWords]) -> tuple[str, ...]:
+    """The text of each undetermined combination, with the parameters as people write them."""
+    units = {p.name: p.unit for p in report.parameters}
+    labels = {name: own.label for name, own in words.items()}
+    return tuple(_text(one.members, one.torque_scale, units, labels) for one in report.undetermined)
+
+
+def _text(
+    members: Sequence[Member], torque_scale: bool, units: Mapping[str, str], labels: Mapping[str, str] | None = None
+) -> str:
+    called = [(labels or {}).get(m.name, m.name) for m in members]
     if torque_scale:
-        names = ", ".join(m.name for m in members)
-        return f"the scale of torque: {names} may all be larger or smaller by the same factor"
-    units = {u.name: u.unit for u in unknowns}
+        return f"the scale of torque: {', '.join(called)} may all be larger or smaller by the same factor"
     if len(members) == 1:
-        return f"{members[0].name} alone"
-    parts = [
-        f"{m.name} {m.change:+.2g} %" if m.relative else f"{m.name} {0.01 * m.change:+.2g} {units[m.name]}"
-        for m in members
-    ]
-    return "together " + ", ".join(parts)
+        return f"{called[0]} alone"
+    return "together " + ", ".join(f"{name} {_change(m, units)}" for name, m in zip(called, members, strict=True))
+
+
+def _change(member: Member, units: Mapping[str, str]) -> str:
+    size, unit = (member.change, "%") if member.relative else (0.01 * member.change, units[member.name])
+    return f"{size:+.2g} {unit}".replace("-", "−")
 
 
 def _groups(covariance: Floats, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

@@ -21,7 +21,7 @@ DIVERGED = 1e3
 FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-9
 """Damping of the first step and the least damping, as shares of the information's diagonal (Marquardt 1963)."""
 TINY = 1e-12
-"""Added to the diagonal of the damped information, which keeps it positive where nothing is known at all."""
+"""Amount added to the diagonal of the damped information, which keeps it positive definite where nothing is known."""
 LEAST_GAIN, FAIR_GAIN, GOOD_GAIN = 1e-3, 0.25, 0.6
 """Shares of the promised fall in cost: below the first a step is not taken, below the second the next step is damped
 more, above the third the Jacobian serves for another step."""

@@ -1,4 +1,4 @@
-"""A fit seen from the numerics: residuals and their derivatives for values of the unknowns."""
+"""What the numerics of a fit need: residuals and their derivatives for values of the unknowns."""
 
 from __future__ import annotations
 

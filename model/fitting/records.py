@@ -118,7 +118,7 @@ def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
 
 
 def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInputs:
-    """Takes the mean drive over the rest at the start as the drive before the record: one sample is mostly noise."""
+    """Takes the mean drive over the initial rest as the drive before the record, because one sample is mostly noise."""
     if trace.set_point is None or trace.drive is None:
         return inputs
     changed = np.abs(trace.set_point[:, columns] - trace.set_point[0, columns]).max(axis=1) > 1e-9

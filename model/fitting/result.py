@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
 from model.machine_model.model import Model
@@ -116,6 +117,5 @@ def load_result(path: Path) -> FitResult:
     try:
         return FitResult.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "file"
-        raise SpecError(f"{path}: {where}: {first['msg']}; not the result of a fit") from error
+        first = first_invalid(error)
+        raise SpecError(f"{path}: {first.where('file')}: {first.message}; not the result of a fit") from error

@@ -1,4 +1,4 @@
-"""What a fit may change: parameters, where their search begins, bounds, and how far off each is likely to be."""
+"""What a fit may change: parameters with the start of their search, their bounds and their priors."""
 
 from __future__ import annotations
 

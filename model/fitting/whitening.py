@@ -30,7 +30,7 @@ class Whitener:
 
     @property
     def order(self) -> int:
-        """Samples that the full predictor looks back."""
+        """Samples on which the full predictor is based."""
         return len(self.predictors) - 1
 
     def whitened(self, signal: Floats) -> Floats:

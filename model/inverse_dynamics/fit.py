@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.fitting.choice import chosen_unknowns
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fitted_parameter
@@ -28,8 +28,6 @@ from model.inverse_dynamics.problem import TorqueProblem
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
-
-Floats = NDArray[np.float64]
 
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.fitting.problem import Evaluation
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""What a trace measures, how noisy it is, up to which frequency its accelerations can be trusted, and what its noise
-alone makes of a residual torque."""
+"""What a trace measures, how noisy it is, up to which frequency its accelerations can be trusted, and how much residual
+torque its noise alone causes."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import welch
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.dynamics.recursive import mass_matrix
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
-
-Floats = NDArray[np.float64]
 
 CUTOFFS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
 """Cutoffs that `choose_cutoff` tries, Hz."""

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
+from model.arrays import Floats, Mask
 from model.inverse_dynamics.readings import Readings, readings_of
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ORDER = 4
 """Order of the Butterworth low-pass, which runs forwards and backwards."""
@@ -33,7 +30,7 @@ SHORTEST = 1.0
 TURNING_NOISE = 2.0
 """Speed within which friction changes direction, in standard deviations of the speed's noise."""
 RESOLVED = 5.0
-"""Speed from which a joint is known to move, in speeds within which friction changes direction."""
+"""Speed from which a joint is known to move, as a multiple of the speed within which friction changes direction."""
 REST_NOISE = 4.0
 """Speed below which a joint may be at rest, in standard deviations of the speed's noise."""
 REST_SHARE = 0.02

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
+from model.arrays import Floats, Mask
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
@@ -20,15 +21,12 @@ from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
 from model.simulation.own_table import own_table
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 NOT_IN_TORQUES = {
     "wrong_gain": "acts before the drive that is recorded",
     "lost_set_points": "acts before the drive that is recorded",
     "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
 }
-"""Effects that leave no mark in low-passed torques of the recorded drive, and why. All others take part."""
+"""Effects that low-passed torques of the recorded drive do not show, and why. All others take part."""
 DIFFERENCE = 1e-3
 """Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear."""
 CONTACT_SHARE = 0.02

@@ -1,7 +1,7 @@
 """A serial chain of 1 to 6 revolute or prismatic joints, as data.
 
-The chain is what every dynamics routine starts from. It is immutable and holds no behaviour beyond checking
-itself and packing its numbers into the arrays that compiled code reads.
+The chain is what every dynamics routine starts from. It is immutable and does no more than check
+itself and pack its numbers into the arrays that compiled code reads.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Chain:
         load_position: (3,) of the load in the last frame, m; its origin is the end of the last link.
 
     Raises:
-        ChainError: on anything that has no motion or is not physical, in one line.
+        ChainError: for a chain that cannot move or is not physical, in one line.
     """
 
     joints: tuple[Joint, ...]

@@ -1,4 +1,4 @@
-"""Where the links are: frames, link ends, centres of mass, and the Jacobian of a point.
+"""Positions of the links: frames, link ends, centres of mass, and the Jacobian of a point.
 
 All functions take joint variables of shape (..., n) and work on whole traces at once.
 """

@@ -7,7 +7,7 @@ from dataclasses import replace
 from daq.contracts.machine import Friction, Machine
 from daq.contracts.quantity import Quantity
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter, JointScale, sized
+from model.effects.effect import Effect, EffectParameter, JointScale, evaluate_size
 from model.effects.library import effect
 from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Kind, Parameter
@@ -16,14 +16,17 @@ from model.machine_model.parameter import Kind, Parameter
 def effect_parameters(
     machine: Machine, name: str, joints: tuple[int, ...], shared: bool, beyond: int = 0
 ) -> tuple[Parameter, ...]:
-    """Parameters of effect `name` on `joints`: one set a joint, or one set for all when `shared`.
+    """Parameters of effect `name` on `joints`: one set per joint, or one set for all when `shared`.
 
     `beyond` columns of a joint are taken by effects of the user's own that come before this one.
     """
     kind = effect(name)
     if kind.whole_machine:
         scale = joint_scale(machine, machine.modelled_joints[-1])
-        return tuple(replace(_parameter(kind, p, scale, kind.group), slots=(p.column,)) for p in kind.parameters)
+        return tuple(
+            replace(_parameter(kind, p, scale, kind.group), component=kind.group, slots=(p.column,))
+            for p in kind.parameters
+        )
     found = []
     for group in [joints] if shared else [(j,) for j in joints]:
         place = f"joint{group[0]}" if len(group) == 1 else "joints" + "+".join(str(j) for j in group)
@@ -49,16 +52,16 @@ def _parameter(kind: Effect, p: EffectParameter, scale: JointScale, place: str) 
         unit=p.unit,
         value=p.starting_value(scale),
         source=p.source or kind.source,
-        low=sized(p.low, scale),
-        high=sized(p.high, scale),
-        null=None if p.null is None else sized(p.null, scale),
-        deviation=sized(p.deviation, scale),
+        low=evaluate_size(p.low, scale),
+        high=evaluate_size(p.high, scale),
+        null=None if p.null is None else evaluate_size(p.null, scale),
+        deviation=evaluate_size(p.deviation, scale),
         effect=kind.name,
     )
 
 
 def _with_known(p: Parameter, known: Quantity) -> Parameter:
-    """The parameter with the number that the machine file states, and what the file says of bounds and deviation."""
+    """The parameter with the number that the machine file states, and with the file's bounds and deviation."""
     return replace(
         p,
         value=known.value,
@@ -70,7 +73,7 @@ def _with_known(p: Parameter, known: Quantity) -> Parameter:
 
 
 def _known(friction: Friction, name: str, scale: JointScale) -> Quantity | None:
-    """The machine file's own number for a friction effect, on the side and in the unit of the effect."""
+    """The machine file's own number for a friction effect, in the effect's unit and on its side of the gear."""
     if name == "viscous_friction" and friction.viscous_motor_side is None and friction.viscous is not None:
         return _divided(friction.viscous, scale.gear**2)
     return {
@@ -81,6 +84,6 @@ def _known(friction: Friction, name: str, scale: JointScale) -> Quantity | None:
 
 
 def _divided(quantity: Quantity, by: float) -> Quantity:
-    """A number of the joint's side seen from the motor's."""
+    """A quantity at the joint, converted to the motor's side."""
     scaled = {n: getattr(quantity, n) for n in ("value", "low", "high", "deviation")}
     return quantity.model_copy(update={n: None if v is None else v / by for n, v in scaled.items()})

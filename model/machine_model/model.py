@@ -58,7 +58,7 @@ class EffectUse(_Part):
 
     @model_serializer(mode="wrap")
     def _without_no_file(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Files are written where there are any; so the identity of other models does not speak of them."""
+        """Files are written only if there are any, so that models without files keep their identity."""
         data: dict[str, Any] = handler(self)
         if self.file is None:
             del data["file"]
@@ -116,7 +116,7 @@ class Model(_Part):
 
     @cached_property
     def own_columns(self) -> dict[str, int]:
-        """Effects of the user's own in the model, by name, and how many of a joint's columns for them lie before."""
+        """For each effect of the user's own: how many of a joint's columns for such effects lie before its own."""
         columns, taken = {}, 0
         for use in self.effects:
             if use.file is not None and use.name not in columns:
@@ -138,7 +138,7 @@ class Model(_Part):
         return self.by_name[name]
 
     def of_effect(self, effect: str, joint: int | None = None) -> dict[str, Parameter]:
-        """Parameters of an effect on one joint, or (None) of the whole machine, by their part of it."""
+        """Parameters of an effect on one joint, or (None) of the whole machine, by the last part of their names."""
         return {p.part: p for p in self.parameters if p.effect == effect and (joint is None or joint in p.joints)}
 
     @cached_property
@@ -173,7 +173,7 @@ class Model(_Part):
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def with_values(self, values: Mapping[str, float]) -> Model:
-        """The same model with other values. Raises SpecError for a name it has not, or a value outside its bounds."""
+        """The same model with other values. Raises SpecError for an unknown name, or a value outside its bounds."""
         for name, value in values.items():
             p = self.parameter(name)
             if not p.low <= value <= p.high or not math.isfinite(value):
@@ -183,7 +183,7 @@ class Model(_Part):
     def with_effect(
         self, name: str, joints: tuple[int, ...] = (), values: Mapping[str, float] | None = None, shared: bool = False
     ) -> Model:
-        """The model with an effect more. It starts where it does nothing, shapes at typical values.
+        """The model with one more effect. It starts at its null values, where it does nothing; shapes are typical.
 
         `values` are by full name, or by the parameter's last part, then for every joint of the effect.
         """
@@ -281,7 +281,7 @@ def _overlap(one: EffectUse, other: EffectUse) -> bool:
 
 
 def _not_taken(own: tuple[Parameter, ...], before: list[Parameter]) -> list[Parameter]:
-    """Without places that a parameter of an effect before it fills: play and give of one joint have one damping."""
+    """Leaves out parameters whose place an earlier effect fills: backlash and compliance of a joint share a damping."""
     taken = {slot for p in before if p.effect is not None for slot in p.slots}
     left = [replace(p, slots=tuple(s for s in p.slots if s not in taken)) for p in own]
     return [p for p in left if p.slots]

@@ -9,11 +9,12 @@ from pydantic import ValidationError
 
 from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 from model.machine_model.model import MODEL_FORMAT, Model
 
 
 def save_model(model: Model, path: Path) -> Path:
-    """Write a model. Returns `path`. Raises SpecError when the file cannot be written."""
+    """Writes a model. Returns `path`. Raises SpecError when the file cannot be written."""
     try:
         path.write_text(model.model_dump_json(indent=1) + "\n", "utf-8")
     except OSError as error:
@@ -35,9 +36,8 @@ def load_model(path: Path) -> Model:
     try:
         return Model.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "model"
-        raise SpecError(f"model {path}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+        first = first_invalid(error)
+        raise SpecError(f"model {path}: {first.where('model')}: {first.message}") from error
 
 
 def _check_version(path: Path, version: Any) -> None:

@@ -34,14 +34,17 @@ NO_LIMIT = 1e9
 SENSOR_COUNTS = 4096
 DAC_COUNTS = 127
 PRESLIDING_COUNTS = 0.5
-"""Distance, in counts of the sensor, over which friction builds up: an assumption, below what the sensor resolves."""
+"""Distance, in counts of the sensor, over which friction builds up: an assumption, below the sensor's resolution."""
 
 
-def parameter(place: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf) -> Parameter:
+def parameter(
+    component: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf
+) -> Parameter:
     """A parameter of the whole machine from a number of its file; `low` bounds it where the file does not."""
     return Parameter(
-        name=f"{place}.{part}",
+        name=f"{component}.{part}",
         kind=kind,
+        component=component,
         part=part,
         unit=quantity.unit,
         value=quantity.value,
@@ -64,19 +67,16 @@ def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
 
 
 def _of_controller(machine: Machine) -> Iterator[Parameter]:
-    """Gains and limit of the controller, where the file says how far off they may be."""
-    controller = machine.controller
+    """Gains and limits of the controller, where the file says how far off they may be."""
     for number in machine.modelled_joints:
-        place, joints = f"joint{number}.controller", (number,)
-        error = gain_error(machine, number)
-        if error is not None and error.deviation is not None:
-            slot = at.slot(number, at.GAIN_ERROR)
-            low = -0.95 if error.low is None else error.low
-            yield replace(parameter(place, Kind.CONTROLLER, "gain_error", error, slot, low), joints=joints)
-        limit = of_joint(controller.output_limit, number) if isinstance(controller, SampledPid) else None
-        if limit is not None and limit.deviation is not None:
-            slot = at.slot(number, at.OUTPUT_LIMIT)
-            yield replace(parameter(place, Kind.CONTROLLER, "output_limit", limit, slot, 0.0), joints=joints)
+        numbers = (
+            ("gain_error", gain_error(machine, number), at.GAIN_ERROR, -0.95),
+            ("output_limit", output_limit(machine, number), at.OUTPUT_LIMIT, 0.0),
+        )
+        for part, stated, column, low in numbers:
+            if stated is not None and stated.deviation is not None:
+                own = parameter("controller", Kind.CONTROLLER, part, stated, at.slot(number, column), low)
+                yield replace(own, name=f"joint{number}.controller.{part}", joints=(number,))
 
 
 def gain_error(machine: Machine, number: int) -> Quantity | None:
@@ -93,33 +93,43 @@ def gain_error(machine: Machine, number: int) -> Quantity | None:
     return stated.model_copy(update={"value": 0.0, "unit": "1", "deviation": deviation, **relative})
 
 
+def output_limit(machine: Machine, number: int) -> Quantity | None:
+    """Limit of the controller's output on a joint (from 1), as far as the file states one."""
+    controller = machine.controller
+    return of_joint(controller.output_limit, number) if isinstance(controller, SampledPid) else None
+
+
 def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
-    place = f"joint{number}"
-    found = (*_of_link(f"link{number}", joint), *_of_drive(place, joint.drive), *_of_sensor(place, joint))
-    for place, kind, part, quantity, column, low in found:
-        yield replace(parameter(place, kind, part, quantity, at.slot(number, column), low), joints=(number,))
+    for component, kind, part, quantity, column, low in (
+        *_of_link(joint),
+        *_of_drive(joint.drive),
+        *_of_sensor(joint),
+    ):
+        own = parameter(component, kind, part, quantity, at.slot(number, column), low)
+        place = f"link{number}" if component == "link" else f"joint{number}.{component}"
+        yield replace(own, name=f"{place}.{part}", joints=(number,))
 
 
-def _of_link(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+def _of_link(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     geometry, link = joint.geometry, joint.link
     if geometry.a.value != 0.0:
-        yield place, Kind.GEOMETRY, "length", geometry.a, at.A, 0.0
+        yield "link", Kind.GEOMETRY, "length", geometry.a, at.A, 0.0
     if geometry.d.value != 0.0:
-        yield place, Kind.GEOMETRY, "offset", geometry.d, at.D, -math.inf
-    yield place, Kind.INERTIA, "mass", link.mass, at.MASS, 0.0
+        yield "link", Kind.GEOMETRY, "offset", geometry.d, at.D, -math.inf
+    yield "link", Kind.INERTIA, "mass", link.mass, at.MASS, 0.0
     if isinstance(link, Cylinder):
-        yield place, Kind.GEOMETRY, "radius", link.radius, at.RADIUS, 0.0
+        yield "link", Kind.GEOMETRY, "radius", link.radius, at.RADIUS, 0.0
     elif isinstance(link, Body):
         for axis, quantity in enumerate(link.centre):
-            yield place, Kind.INERTIA, f"centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis, -math.inf
+            yield "link", Kind.INERTIA, f"centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis, -math.inf
         for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
             low = 0.0 if k < 3 else -math.inf
-            yield place, Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
+            yield "link", Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
 
 
-def _of_sensor(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
-    """Arguments of `parameter`. A zero that is off turns (or shifts) the link against what its sensor shows."""
+def _of_sensor(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+    """The same. A zero that is off turns (or shifts) the link against what its sensor shows."""
     stated = None if joint.sensor is None else joint.sensor.at_zero
     if stated is None or stated.deviation is None:
         return
@@ -127,25 +137,24 @@ def _of_sensor(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quant
     shift = own.value - stated.value
     moved = {s: None if (v := getattr(stated, s)) is None else v + shift for s in ("low", "high")}
     zero = stated.model_copy(update={"value": own.value, **moved})
-    yield f"{place}.sensor", Kind.GEOMETRY, "zero", zero, column, -math.inf
+    yield "sensor", Kind.GEOMETRY, "zero", zero, column, -math.inf
 
 
-def _of_drive(place: str, drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+def _of_drive(drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
-        motor = f"{place}.motor"
-        yield motor, Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
-        yield motor, Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
-        yield motor, Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
-        yield motor, Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
+        yield "motor", Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
+        yield "motor", Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
+        yield "motor", Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
+        yield "motor", Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
         if drive.gear_ratio.deviation is not None:
-            yield motor, Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
+            yield "motor", Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
         if drive.supply_limit is not None and drive.supply_limit.deviation is not None:
-            yield motor, Kind.DRIVE, "supply_limit", drive.supply_limit, at.SUPPLY, 0.0
+            yield "motor", Kind.DRIVE, "supply_limit", drive.supply_limit, at.SUPPLY, 0.0
     else:
-        yield f"{place}.drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
+        yield "drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
         if drive.inertia is not None:
-            yield f"{place}.drive", Kind.INERTIA, "inertia", drive.inertia, at.ROTOR_INERTIA, 0.0
+            yield "drive", Kind.INERTIA, "inertia", drive.inertia, at.ROTOR_INERTIA, 0.0
 
 
 def nominal_vector(machine: Machine) -> NDArray[np.float64]:
@@ -179,9 +188,8 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
     row[at.STRIBECK_SPEED], row[at.COOLING_TIME], row[at.RIPPLE_CYCLES] = 1.0, 1.0, 1.0
     row[at.CONTACT_COMPLIANCE] = contact_compliance(scale)
     row[at.RANGE], row[at.RAD_PER_COUNT] = scale.range, 0.0
-    limit = of_joint(machine.controller.output_limit, number) if isinstance(machine.controller, SampledPid) else None
+    limit, error = output_limit(machine, number), gain_error(machine, number)
     row[at.OUTPUT_LIMIT] = NO_LIMIT if limit is None else limit.value
-    error = gain_error(machine, number)
     row[at.GAIN_ERROR] = 0.0 if error is None else error.value
     sensor = joint.sensor
     if sensor is not None:
@@ -258,7 +266,7 @@ def _radius(joint: Joint) -> float:
 
 
 def _transmission_inertia(machine: Machine, number: int) -> float:
-    """Rotor and link in series (kg·m²), the link at the least that it shows: its own bodies, folded."""
+    """Inertia of rotor and link in series (kg·m²), with the link's least inertia: its own bodies, the arm folded."""
     joint = machine.joint(number)
     link = joint.link
     own = link.mass.value

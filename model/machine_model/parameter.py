@@ -1,4 +1,4 @@
-"""A number of a model and what it is: kind, joints, effect and part, unit, bounds, and where it lies."""
+"""A parameter of a model: its kind, joints, effect and part, unit and bounds, and its place in the vector."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Kind(StrEnum):
     PRESLIDING_SHAPE = "presliding shape"
     """Shape of that rise, from 0 (Prandtl) to 1 (Dahl)."""
     INITIAL_POSITION = "initial position"
-    """Where a joint starts: how far off the posture that was read."""
+    """Where a joint starts, relative to the posture that was read."""
     INITIAL_VELOCITY = "initial velocity"
-    """How fast a joint starts: beyond the speed that was read."""
+    """How fast a joint starts, relative to the speed that was read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +42,8 @@ class Parameter:
         name: such as `joint2.viscous_friction.coefficient`, `link3.mass`, `controller.delay`; joints that share it are
             joined by a plus: `joints1+2.coulomb_friction.torque`.
         kind: what sort of number it is.
+        component: what carries it: link, motor, drive, load, controller, or what an effect of the whole machine acts
+            on; empty for an effect on joints, and for an initial state.
         part: which number of its link, motor, controller or effect it is: `mass`, `resistance`, `coefficient`; of
             parameters that share one value, the part of the first.
         unit: as written in reports.
@@ -58,6 +60,7 @@ class Parameter:
 
     name: str
     kind: Kind
+    component: str = ""
     part: str
     unit: str
     value: float

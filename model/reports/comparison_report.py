@@ -8,12 +8,12 @@ from model.comparison.agreement import ModelAgreement
 from model.comparison.compare import Comparison
 from model.comparison.difference import ParameterDifference
 from model.reports.motion import ROLES, agreement_table, motion_section
-from model.reports.page import Cell, Report, Section, Table, cells, listed, numbers, spoken
+from model.reports.page import Cell, Report, Section, Table, cells, effect_list, listed, numbers
 from model.reports.units import squared
 
 
 def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:
-    """Models beside what was measured; `differences` between the parameters of two models."""
+    """The page of models beside the measurement; `differences` are between the parameters of two models."""
     labels = [m.label for m in found.models]
     sections = [
         Section("How large the error is", (agreement_table(found.models), _squared_errors(found.models))),
@@ -21,7 +21,7 @@ def comparison_report(found: Comparison, differences: Sequence[ParameterDifferen
     ]
     if differences:
         sections.append(Section("Where the models differ", (_differences(differences, labels),)))
-    facts = [(m.label, f"{m.model}, {spoken(m.effects)}") for m in found.models]
+    facts = [(m.label, f"{m.model}, {effect_list(m.effects)}") for m in found.models]
     facts.append(("traces", listed([s.trace for s in found.signals])))
     return Report(_title(labels), _answer(found.models), tuple(facts), tuple(sections))
 

@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
+from model.arrays import Floats
 from model.design.information import InformationGain, ParameterGain
 from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, listed, spoken
+from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, effect_list, listed
 from model.reports.units import joint_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 LITTLE = 0.9
 """Share of a width from which an interval counts as not having become narrower."""
@@ -28,7 +27,7 @@ LITTLE = 0.9
 
 @dataclass(frozen=True)
 class PlannedExperiment:
-    """An experiment with its set points (k, joints of the machine), rad or m, one row a control period.
+    """An experiment with its set points (k, joints of the machine), rad or m, one row per control period.
 
     nats: information of this experiment and those before it; None where they have no order.
     """
@@ -49,7 +48,7 @@ def design_report(model: Model, planned: Sequence[PlannedExperiment], gain: Info
     facts = (
         ("machine", machine.title),
         ("model", model.identity),
-        ("effects", spoken([use.name for use in model.effects])),
+        ("effects", effect_list([use.name for use in model.effects])),
         ("experiments", listed([p.spec.name or p.spec.trajectory.kind for p in planned])),
     )
     return Report(f"Experiments for {machine.title}", _answer(planned, gain), facts, sections)

@@ -1,4 +1,4 @@
-"""Figures of where a model disagrees: the map in time, and what the residual goes with."""
+"""Figures of where a model disagrees: the map in time, and the quantities that the residual depends on."""
 
 from __future__ import annotations
 

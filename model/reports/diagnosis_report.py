@@ -19,7 +19,7 @@ from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks
 from model.reports.diagnosis_words import Compared, compared, headline
 from model.reports.motion import motion_section
-from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, html, listed, spoken
+from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed
 
 VERDICTS = {
     "nothing-significant": "nothing significant: the model explains these traces within their noise",
@@ -62,8 +62,14 @@ def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
     return (
         ("diagnosis of", machine.title),
         ("verdict", VERDICTS[found.verdict]),
-        ("model before", f"{found.model_before.identity}, {spoken([u.name for u in found.model_before.effects])}"),
-        ("model after", f"{found.model_after.identity}, {spoken([u.name for u in found.model_after.effects])}"),
+        (
+            "model before",
+            f"{found.model_before.identity}, {effect_list([u.name for u in found.model_before.effects])}",
+        ),
+        (
+            "model after",
+            f"{found.model_after.identity}, {effect_list([u.name for u in found.model_after.effects])}",
+        ),
         ("fitted to", listed(found.traces)),
         ("held out", listed(found.holdout) if found.holdout else "none: nothing below was judged on other data"),
         ("time", f"took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"),
@@ -76,7 +82,7 @@ def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> st
 
 
 def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
-    """The ground of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
+    """The basis of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
     sections = []
     if not found.steps:
         if found.where is not None:

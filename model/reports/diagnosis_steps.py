@@ -35,7 +35,7 @@ def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Sect
 
 
 def where_blocks(where: Where, errors: Sequence[SignalError], of: Compared) -> tuple[Block, ...]:
-    """The place in words, the map of every trace, what the residual goes with, and what would have to move."""
+    """The location in words, the map of every trace, what the residual depends on, and what would have to vary."""
     blocks: list[Block] = [Text(where.summary, "plain" if where.joint is None else "warning")]
     if where.cells:
         blocks.append(Text(of.errors, "quiet"))

@@ -69,7 +69,7 @@ def _finding(step: Step) -> str:
     if step.effect is None:
         return "an effect without a name"
     size = words_of(step.effect).size
-    values = [v for name, v in step.parameters.items() if size is not None and name.rsplit(".", 1)[-1] == size]
+    values = [v for v in step.parameters.values() if v.part == size]
     return ", ".join([placed(step.effect, step.joints), *(_size(v) for v in values)])
 
 

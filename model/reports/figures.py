@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from model.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 INK = "#222222"
 QUIET = "#8a8a8a"
@@ -73,13 +73,13 @@ def _style() -> AbstractContextManager[None]:
 
 
 def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, ...]:
-    """About `most` samples of each at most, evenly picked: a printed page resolves no more."""
+    """About `most` samples of each signal, evenly picked: a printed page resolves no more."""
     stride = max(1, -(-len(time) // most))
     return (time[::stride], *(s[::stride] for s in signals))
 
 
 def band(axes: Axes, time: Floats, signal: Floats, colour: str, most: int = 300) -> None:
-    """Draw a signal as a line; if it is long, as the mean of `most` stretches with a band from least to largest."""
+    """Draws a signal as a line; a long one as the mean of `most` intervals, with a band from least to largest."""
     if len(time) <= 2 * most or not np.isfinite(signal).all():
         axes.plot(time, signal, color=colour, lw=0.8)
         return
@@ -97,5 +97,5 @@ def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Any:
 
 
 def baseline(axes: Axes) -> None:
-    """Draw the line of zero."""
+    """Draws the zero line."""
     axes.axhline(0.0, color=QUIET, lw=0.7, zorder=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
 from model.reports.motion import agreement_table, in_sample, motion_section
-from model.reports.page import Cell, Report, Section, Table, Text, listed, spoken
+from model.reports.page import Cell, Report, Section, Table, Text, effect_list, listed
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 
@@ -22,7 +22,7 @@ def fit_report(found: FitResult, comparison: Comparison) -> Report:
     facts = (
         ("machine", found.model.machine.title),
         ("model", f"{found.model.identity}, from {found.model.lineage.parent or 'none'}"),
-        ("effects", spoken([use.name for use in found.model.effects])),
+        ("effects", effect_list([use.name for use in found.model.effects])),
         ("fitted to", f"{listed(found.traces)}: {found.samples} samples"),
         ("held out", listed(held) if held else "none"),
         ("search", f"{found.evaluations} evaluations in {found.seconds:.1f} s; {_ended(found)}"),

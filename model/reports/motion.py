@@ -38,7 +38,7 @@ ROLES = {True: "held out", False: "fitted to", None: "all"}
 def motion_section(
     signals: Sequence[TraceSignals], labels: Sequence[str], most: int = 8, *, closer: bool = False
 ) -> Section:
-    """A section with one figure for each of the first traces: position above, residual below, a column a joint.
+    """A section with one figure for each of the first traces: position above, residual below, one column per joint.
 
     Args:
         closer: also the stretch in which the first model is furthest off.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.comparison.compare import TraceSignals
 from model.reports.figures import INK, MODEL_COLOURS, QUIET, baseline, drawn, panels
 from model.reports.page import Picture
@@ -16,7 +16,6 @@ from model.reports.units import shown_unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 STRETCH = 4.0
 """Length of the stretch that is shown, s."""

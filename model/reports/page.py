@@ -70,7 +70,7 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """Its name in links."""
+        """Its name in links within the page."""
         return "".join(c if c.isalnum() else "-" for c in self.title.lower())
 
 
@@ -113,7 +113,7 @@ def html(report: Report) -> str:
 
 
 def write_report(report: Report, path: Path) -> Path:
-    """Write the page. Returns `path`. Raises SpecError when it is not an .html file or cannot be written."""
+    """Writes the page. Returns `path`. Raises SpecError when it is not an .html file or cannot be written."""
     if path.suffix != ".html":
         raise SpecError(f"report {path}: is written as .html")
     try:
@@ -129,6 +129,6 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
-def spoken(effects: Sequence[str]) -> str:
-    """Effects in words."""
+def effect_list(effects: Sequence[str]) -> str:
+    """Names of effects, as a sentence lists them."""
     return ", ".join(effect_name(e) for e in effects) or "no effects"

@@ -50,7 +50,7 @@ def largest_change(found: SensitivityCurves, curve: SensitivityCurve, k: int, ma
 
 
 def save_curves(found: SensitivityCurves, machine: Machine, path: Path, kind: str) -> None:
-    """The curves as a picture of that kind (png, svg, pdf), one panel a joint. Raises OSError."""
+    """The curves as a picture of that kind (png, svg, pdf), one panel per joint. Raises OSError."""
     saved(lambda figure: _draw(figure, found, machine), PANEL_HEIGHT * len(found.joints), path, kind)
 
 

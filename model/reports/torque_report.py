@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Report, Section, Table, cells, listed, spoken
+from model.reports.page import Cell, Picture, Report, Section, Table, cells, effect_list, listed
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves]) -> Report:
     facts = (
         ("machine", machine.title),
         ("model", f"{found.model.identity}, from {found.model.lineage.parent or 'none'}"),
-        ("effects", spoken([use.name for use in found.model.effects])),
+        ("effects", effect_list([use.name for use in found.model.effects])),
         ("fitted to", listed(fitted)),
         ("held out", listed(held) if held else "none"),
         ("search", f"{found.evaluations} evaluations; {'converged' if found.converged else 'did not converge'}"),

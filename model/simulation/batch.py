@@ -1,4 +1,4 @@
-"""A batch of runs of one model: which compiled run it needs, and running it on all cores."""
+"""A batch of runs of one model: chooses the compiled run that it needs, and runs it on all cores."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from model.simulation.prepared import Prepared
 from model.simulation.run_arrays import RecordArrays, RunArrays
 
 CHUNKS_A_CORE = 4
-"""Pieces into which a batch is cut for each core, so that all are busy to the end where runs differ in length."""
+"""Pieces per core into which a batch is cut, so that all cores are busy to the end although runs differ in length."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class BatchRun:
         """Outputs (r, OUTPUTS, k, n) of all runs, in the order of `model.simulation.period`; k is that of the longest
         record, and rows beyond the end of a shorter one are zero. Not finite where a run diverged.
 
-        Threads share the work; the compiled code holds no lock of Python's. Results do not depend on their number.
+        Threads share the work, because compiled code releases Python's lock. Results do not depend on their number.
         """
         compiled = _compiled_run(self.model, self.general)
         records, runs = self._records(), self._runs()

@@ -21,9 +21,9 @@ NEIGHBOURS = 1.5
 MOST_SAMPLES = 0.8
 """Least share of periods with a sample at which a record counts as made period by period."""
 NEARLY = 1e-6
-"""Distance, in periods, that is only rounding."""
+"""Distance, in periods, that counts as rounding."""
 LARGEST_ANGLE = 20.0
-"""Largest angle, rad, that is taken as such; more than three turns of a joint are taken for degrees."""
+"""Largest plausible angle, rad; more than three turns of a joint are taken for degrees."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class RunInputs:
         initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
         readings: (k, n) rad, NaN where the record has a gap.
         rows: (m,) position of each sample on the grid. gains: (n, GAINS).
-        has_set_points, has_drive: whether the record has them; what it has not is held at the reading, or at zero.
+        has_set_points, has_drive: whether the record has them; what it lacks is held at the reading, or at zero.
     """
 
     joints: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""Effects of the user's own: compiled once a process, checked, and given to the run as a table of addresses."""
+"""The user's own effects: compiled once per process, checked, and passed to the run as a table of addresses."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Simulation:
 
 
 def at_rows(signal: Floats, rows: Floats) -> Floats:
-    """Rows of a signal at fractional positions, linearly interpolated."""
+    """A signal at fractional rows, linearly interpolated."""
     low = np.floor(rows).astype(np.int64)
     share = rows - low
     if not share.any():

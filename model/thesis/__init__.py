@@ -1,1 +1,1 @@
-"""The source's published tables as data, and what this model makes of them: ours beside the published."""
+"""Reproduction of the source: its published tables as data, and this model's results beside them."""

@@ -10,7 +10,7 @@ class _Part(BaseModel):
 
 
 class Check(_Part):
-    """`holds`: whether ours shows what the source says. `ours` and `published` are one line each."""
+    """`holds`: whether our result agrees with the source's statement. `ours` and `published` are one line each."""
 
     name: str
     holds: bool

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
+from model.arrays import Floats
 from model.control.arm import DrivenArm
 from model.control.closed_loop import ClassicalPid, ControlledMotion, Partitioned, Sinusoid, control
 from model.thesis.check import Check, Choice
 from model.thesis.tables import BASIC_WITH_BACK_EMF, VISCOUS, VISCOUS_AND_COULOMB, PublishedModel
-
-Floats = NDArray[np.float64]
 
 START = (math.pi, math.pi / 4, 0.0)
 """Start posture, rad: 180°, 45°, 0° (section 8.2.1)."""
@@ -38,7 +36,7 @@ class _Part(BaseModel):
 
 
 class ControlCase(_Part):
-    """One run. Angles in rad, one series a joint.
+    """One run. Angles in rad, one series per joint.
 
     `back_emf`: whether the law compensates the back-EMF with its own table's constants or with the plant's.
     `amplitude_ratio` is the swing of the position over that of the wanted motion in the first period and in the last;
@@ -84,7 +82,7 @@ class _Run:
 
 
 def control_chapter(progress: Progress = silent, cancel: Cancel | None = None) -> ControlChapter:
-    """Run all of chapter 8. Raises CancelledError when cancelled."""
+    """Runs all of chapter 8. Raises CancelledError when cancelled."""
     cancel = cancel or Never()
     plant = VISCOUS_AND_COULOMB.arm()
     wanted = wanted_motion()

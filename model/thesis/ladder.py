@@ -101,7 +101,7 @@ def climb_ladder(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Ladder:
-    """Fit the four models to the traces and validate each by distortion.
+    """Fits the four models to the traces and validates each by distortion.
 
     Args:
         method: `nelder_mead` is the source's hill climbing; `least_squares` finds the same minimum by derivatives.

@@ -1,4 +1,4 @@
-"""Everything that `daq thesis` reproduces, as one function and one typed result: ours beside the published."""
+"""Everything that `daq thesis` reproduces, as one function and one typed result: ours beside the published one."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def reproduce_thesis(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Reproduction:
-    """Reproduce chapters 5, 7 and 8.
+    """Reproduces chapters 5, 7 and 8.
 
     Args:
         traces: of a plant with complete friction, with the experiment's ramp (section 6.5); the first gives the motion

@@ -46,7 +46,7 @@ RESISTANCE = (5.49, 4.5, 5.49)
 TORQUE_CONSTANT = (0.0208, 0.033, 0.0208)
 ROTOR_INERTIA = (18.3e-7, 32e-7, 18.3e-7)
 GEAR = (600.0, 635.5, 1000.0 / 3.0)
-"""Table 7.1 and appendix C: Ω, N·m/A, kg·m², motor turns a joint turn, joints 1 to 3."""
+"""Table 7.1 and appendix C: Ω, N·m/A, kg·m², motor turns per joint turn, joints 1 to 3."""
 
 
 @dataclass(frozen=True)

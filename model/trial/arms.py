@@ -60,8 +60,11 @@ def arms(numbers: Sequence[int], kinds: Sequence[str], loads: Sequence[str] = LO
     return [compose(number, kind, loads[number % len(loads)]) for number in numbers for kind in kinds]
 
 
-def some_of(seeds: Sequence[int], count: int) -> list[int]:
-    """`count` of the seeds at most, kinds and loads mixed: those whose SHA-256 comes first. More of them keep these."""
+def sample_arms(seeds: Sequence[int], count: int) -> list[int]:
+    """At most `count` of the seeds, kinds and loads mixed: those whose SHA-256 comes first.
+
+    A larger sample contains the smaller ones.
+    """
     return sorted(dict.fromkeys(seeds), key=lambda seed: sha256(str(seed).encode()).digest())[:count]
 
 

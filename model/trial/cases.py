@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterable
 
 from model.trial.score import Score
 
-_AS_IT_STANDS = (
+_FIELDS = (
     *("seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first"),
     *("joint_right", "at_least_one", "alarm", "honest", "excess_removed", "excess_removed_whole"),
     *("seconds", "robot_seconds"),
 )
-_MADE: dict[str, Callable[[Score], str]] = {
+"""Columns that are fields of a score."""
+_DERIVED: dict[str, Callable[[Score], str]] = {
     "hidden": lambda score: " + ".join(score.effects),
     "joints": lambda score: " + ".join("".join(map(str, joints)) or "-" for joints in score.joints),
     "strength": lambda score: " + ".join(f"{strength:.2f}" for strength in score.strengths),
@@ -22,17 +23,19 @@ _MADE: dict[str, Callable[[Score], str]] = {
     "intervals": lambda score: str(len(score.covered)),
     "intervals_right": lambda score: str(sum(covered.inside for covered in score.covered)),
 }
-COLUMNS = (*_AS_IT_STANDS[:3], *list(_MADE)[:4], *_AS_IT_STANDS[3:5], *list(_MADE)[4:], *_AS_IT_STANDS[5:])
+"""Columns that are computed from a score, with their functions."""
+COLUMNS = (*_FIELDS[:3], *list(_DERIVED)[:4], *_FIELDS[3:5], *list(_DERIVED)[4:], *_FIELDS[5:])
+"""Columns of the table, in order."""
 
 
 def as_csv(scores: Iterable[Score]) -> str:
-    """CSV with a line a case, in the order of their seeds; empty where a question does not arise."""
+    """CSV with one line per case, in the order of their seeds; empty where a question does not arise."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
     for score in sorted(scores, key=lambda each: each.seed):
         table.writerow(
-            [_MADE[column](score) if column in _MADE else _plain(getattr(score, column)) for column in COLUMNS]
+            [_DERIVED[column](score) if column in _DERIVED else _plain(getattr(score, column)) for column in COLUMNS]
         )
     return text.getvalue()
 

@@ -1,4 +1,4 @@
-"""The mock's parameters in the conventions of the model, so that stated intervals can be held against the truth.
+"""Converts the mock's parameters to the model's conventions, so that stated intervals can be compared with the truth.
 
 The two were written independently: they measure the same quantity from different zeros, with other signs or on the
 other side of a gear. `TRANSLATIONS` says how, effect by effect; `LEFT_OUT` lists what has no counterpart, and why.
@@ -76,7 +76,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "wrong_gain": _factor,
     "lost_set_points": _same(share="share"),
 }
-"""Translations by effect, from the mock's parameters to the model's (the last part of their names)."""
+"""Translations by effect, from the mock's parameters to the parts of the model's effect."""
 
 LEFT_OUT: dict[str, str] = {
     "stiction": "the mock's bond fades with speed, the model's breaks: their breakaway torques are not one quantity",
@@ -92,7 +92,7 @@ LEFT_OUT: dict[str, str] = {
 
 
 def true_parameters(effect: HiddenEffect, joint: int | None, truth: Truth, machine: Machine) -> dict[str, float]:
-    """The truth at a joint in the model's parameters (last part of the name); empty for effects in `LEFT_OUT`."""
+    """The truth at a joint by part of the model's effect; empty for effects in `LEFT_OUT`."""
     translation = TRANSLATIONS.get(effect.known_as)
     if translation is None:
         return {}

@@ -8,7 +8,7 @@ from model.trial.table import EffectLine, Quantiles, TrialTable
 
 
 def as_markdown(table: TrialTable) -> str:
-    """Everything that a page about the trial shows: rates, quantiles, effects, what was taken for what."""
+    """The whole content of a page about the trial: rates, quantiles, effects, and which were taken for which."""
     if not table.cases:
         return "No case has been scored yet.\n"
     kinds = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in table.kinds.items())

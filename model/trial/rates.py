@@ -26,7 +26,7 @@ class Rate(BaseModel):
 
 def rate(outcomes: Iterable[bool | None]) -> Rate:
     """The share of True; None is not counted."""
-    from scipy.stats import binomtest  # late: the command line starts without it
+    from scipy.stats import binomtest  # imported late, so that the command line starts without it
 
     counted = [outcome for outcome in outcomes if outcome is not None]
     hits = sum(counted)

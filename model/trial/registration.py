@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from daq.contracts.documents import parse_toml
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 from model.trial.arms import KINDS, LOAD_CYCLE, LOADS, drawn_arms
 from model.trial.truth import DETECTABLE
 
@@ -75,7 +76,7 @@ class Registration(_Part):
         return drawn_arms(commit, self.run(name).cases, self.loads)
 
     def check_code(self, hashes: dict[str, str], versions: dict[str, str], origin: str) -> None:
-        """Raises SpecError when something of the code at hand is not registered, or not as it was registered.
+        """Raises SpecError when part of the present code is not registered, or differs from what was registered.
 
         Args:
             hashes, versions: of all that decides the outcome, as they are found. origin: the file, for the message.
@@ -100,6 +101,5 @@ def parse_registration(text: str, origin: str) -> Registration:
     try:
         return Registration.model_validate(parse_toml(text, origin))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+        first = first_invalid(error)
+        raise SpecError(f"{origin}: {first.where()}: {first.message}") from error

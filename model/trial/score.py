@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Diagnosis, Step, Verdict
 from model.discrepancy.verdict import excess_removed as share_removed
+from model.machine_model.effect_parameters import effect_parameters
 from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 
@@ -38,7 +39,7 @@ class Covered(_Scored):
 
 
 class Score(_Scored):
-    """What an answer is worth. None means that the question does not arise for this case.
+    """The score of one answer. None means that the question does not arise for this case.
 
     `named_right`: every effect that was there was named, and no other. `merged_right`: the same with all friction kinds
     as one, for which a group of friction kinds alone is that one name. `in_first`: the effect is among the
@@ -59,7 +60,7 @@ class Score(_Scored):
     """None where the diagnosis failed."""
     place: Place
     answered: tuple[str, ...]
-    """Names that were given; of a group, all in it."""
+    """Names in the answer; of a group, all of them."""
     named_right: bool | None = None
     merged_right: bool | None = None
     in_answer: bool | None = None
@@ -70,16 +71,16 @@ class Score(_Scored):
     alarm: bool | None = None
     honest: bool | None = None
     excess_removed: float | None = None
-    """Of the held-out excess that was there once the tolerance parameters were fitted: what the effects brought."""
+    """Share of the held-out excess after tolerance fits that was removed: the contribution of the effects."""
     excess_removed_whole: float | None = None
-    """Of that of the model as it was given: what the whole diagnosis brought."""
+    """Share of the held-out excess of the given model that was removed: the contribution of the whole diagnosis."""
     covered: tuple[Covered, ...] = ()
     seconds: float
     robot_seconds: float
 
 
 def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine) -> Score:
-    """Score an answer. `machine`: with the load that was announced."""
+    """Scores an answer. `machine`: with the load that was announced."""
     names = tuple(effect.known_as for effect in truth.effects)
     named, group = named_effects(answer), group_of(answer)
     common = {
@@ -249,13 +250,12 @@ def _covered(truth: Truth, answer: Diagnosis, machine: Machine) -> tuple[Covered
         if effect is None or not step.adopted:
             continue
         for joint in effect.joints or (None,):
-            label = None if joint is None else f"joint{joint}"
-            for name, value in true_parameters(effect, joint, truth, machine).items():
-                for key, stated in step.parameters.items():
-                    place, own, last = key.split(".")[0], key.split(".")[-2], key.split(".")[-1]
-                    fits = own == effect.known_as and last == name and label in (None, place)
-                    if fits and stated.low is not None and stated.high is not None:
-                        found[key] = Covered(
-                            parameter=key, value=stated.value, low=stated.low, high=stated.high, truth=value
-                        )
+            on = () if joint is None else (joint,)
+            names = {p.part: p.name for p in effect_parameters(machine, effect.known_as, on, shared=False)}
+            for part, value in true_parameters(effect, joint, truth, machine).items():
+                stated = step.parameters.get(names[part])
+                if stated is not None and stated.low is not None and stated.high is not None:
+                    found[names[part]] = Covered(
+                        parameter=names[part], value=stated.value, low=stated.low, high=stated.high, truth=value
+                    )
     return tuple(found.values())

@@ -13,19 +13,19 @@ from model.trial.score import Score
 from model.trial.truth import is_mock_friction
 
 
-class _Told(BaseModel):
+class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Line(_Told):
-    """One line of the table: what, its rate, and what was to be reached (None: reported only)."""
+class Line(_Part):
+    """One line of the table: what it counts, the rate, and the rate to be reached (None: only reported)."""
 
     what: str
     rate: Rate
     reach: str | None = None
 
 
-class Quantiles(_Told):
+class Quantiles(_Part):
     """Quantiles of a quantity over cases."""
 
     cases: int
@@ -35,7 +35,7 @@ class Quantiles(_Told):
     largest: float | None
 
 
-class EffectLine(_Told):
+class EffectLine(_Part):
     """One effect: cases, how many are detectable, and of those how many were named, placed, and found at the joint."""
 
     effect: str
@@ -48,7 +48,7 @@ class EffectLine(_Told):
     """What was answered instead of the right name, and how often."""
 
 
-class TrialTable(_Told):
+class TrialTable(_Part):
     """The whole table."""
 
     cases: int

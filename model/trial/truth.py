@@ -18,13 +18,13 @@ FRICTION_OF_MOCK = ("tight_spot", "quadratic_drag", "cable_hysteresis", "ageing_
 """Effects that only the mock knows and that are friction too."""
 
 
-class _Told(BaseModel):
+class _Part(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
-class HiddenEffect(_Told):
-    """One hidden effect: the mock's name, the shared name (or `unknown_effect`), joints, parameters one set a joint
-    (one set without joints for an effect on the whole arm), strength 0 to 1 within its range of sizes."""
+class HiddenEffect(_Part):
+    """One hidden effect: the mock's name, the shared name (or `unknown_effect`), joints, one set of parameters per
+    joint (one set without joints for an effect on the whole arm), strength 0 to 1 within its range of sizes."""
 
     effect: str
     known_as: str
@@ -37,8 +37,8 @@ class HiddenEffect(_Told):
         return self.parameters[0 if joint is None else self.joints.index(joint)]
 
 
-class Truth(_Told):
-    """An arm revealed. `deviations`: fractions of the data file's values, of the computing delay s."""
+class Truth(_Part):
+    """An arm revealed. `deviations`: fractions of the data file's values; that of the computing delay in s."""
 
     seed: int
     kind: Kind
@@ -48,14 +48,14 @@ class Truth(_Told):
     deviations: dict[str, float]
 
 
-class SeenEffect(_Told):
+class SeenEffect(_Part):
     """d′ of one effect with the arm's others acting."""
 
     effect: str
     d_prime: float
 
 
-class Detectability(_Told):
+class Detectability(_Part):
     """d′ of an arm's effects together and one by one, computed on the mock's side before any diagnosis."""
 
     seed: int

@@ -1,4 +1,4 @@
-"""Accelerations that a model expects along a measured motion, and their exact derivatives by its parameters.
+"""Accelerations that a model expects along a measured motion, and their exact parameter derivatives.
 
 The right-hand side of the equations of motion, f of (4.1), evaluated at the measured state and the recorded drive. With
 positions as outputs C·J_a of (4.19) is zero, since rates of position contain no parameters; accelerations contain them.
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from model import layout as at
+from model.arrays import Floats
 from model.drives.amplifier import motor_volts
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
@@ -27,8 +28,6 @@ from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
 from model.simulation.specialised import AnyChain, ClosedForm, entry
 from model.validation.differentiation import smoothed
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class _Numbers(NamedTuple):
 
 
 def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Accelerations f (k, n) and their derivatives (p, k, n) by the named parameters.
+    """Accelerations f (k, n) and their derivatives (p, k, n) with respect to the named parameters.
 
     Raises:
         SpecError: for a model with a flexible transmission, whose rotor is not measured, or an unknown parameter.

@@ -1,4 +1,4 @@
-"""Distortions judged by another convention of τ′. The changes that double the error do not depend on it."""
+"""Re-evaluates distortions in another convention of τ′. The changes that double the error do not depend on it."""
 
 from __future__ import annotations
 

@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-
-Floats = NDArray[np.float64]
+from model.arrays import Floats
 
 WIDTHS = tuple(float(w) for w in np.arange(0.5, 6.01, 0.25))
 """Standard deviations of the kernel that `chosen_width` tries, samples."""

@@ -7,12 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
-
-Floats = NDArray[np.float64]
+from model.arrays import Floats
 
 Errors = Callable[[Floats], Floats]
 """Mean squared errors (m,) of parameter sets (m, p); NaN or inf where a run diverged."""

@@ -23,7 +23,7 @@ Basis = Literal["length", "mass", "gaussian", "stated"]
 def gaussian_share(convention: Convention) -> float:
     """τ′/â of a parameter that must be positive: zero lies three standard deviations away.
 
-    The source takes the three as the argument of erf, not as a deviate of the normal density, hence its √2.
+    The source takes the three as the argument of erf, not as a deviate of the normal density, hence the √2.
     """
     return 1 / (3 * math.sqrt(2)) if convention == "source" else 1 / 3
 

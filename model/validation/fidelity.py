@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.simulation.prepared import Options
@@ -27,12 +27,10 @@ from model.validation.doubling import Doubling, doubling_changes
 from model.validation.expected_deviation import expected_deviation
 from model.validation.squared_error import SquaredError, squared_error
 
-Floats = NDArray[np.float64]
-
 SEARCH_DEVIATIONS = 50.0
 """Largest change that is tried, in expected deviations; a parameter that needs more adds less than 0.0003 to Σλ²."""
 CURVE_REACH = 1.5
-"""A curve reaches this many doubling changes to either side (expected deviations where no change doubles)."""
+"""Reach of an error curve to either side, in doubling changes (in expected deviations where no change doubles)."""
 MINIMUM_TOLERANCE = 0.98
 """Share of the error at the given parameters; a smaller error elsewhere shows that they are not the minimum."""
 

@@ -5,27 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model import layout as at
+from model.arrays import Floats, Mask
 from model.dynamics.compilation import compiled
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation import differentiation as d
 from model.validation.acceleration_model import MeasuredMotion, speed_answers
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 NOISE_SHARE = 0.05
 """Largest noise of an acceleration, as a share of the acceleration; the smoothing is chosen by it."""
 MOVING = 4.0
 """Speed above which a joint counts as moving, in standard deviations of the speed's noise."""
 FINE = 8
-"""Points a control period at which friction's change of direction is looked for."""
+"""Points per control period at which friction's change of direction is looked for."""
 SHORTEST = 12
 """Least number of samples of a trace."""
 
@@ -97,7 +94,7 @@ def position_noise(model: Model) -> Floats:
 def _friction_deflection(model: Model, measured: Floats) -> Floats:
     """Deflection of the friction contact (k, n) that follows the motion from rest, averaged as accelerations are.
 
-    Motion between samples is interpolated: friction changes sign within a period, and the moment matters.
+    Motion between samples is interpolated: friction changes sign within a period, and its moment matters.
     """
     presliding = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)[:, at.PRESLIDING]
     count = len(measured)

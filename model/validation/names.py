@@ -10,7 +10,7 @@ from model.machine_model.model import Model
 
 
 def names_to_validate(model: Model, patterns: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Names that match the patterns; without patterns what was fitted, else every number with an expected deviation.
+    """Names that match the patterns; without patterns the fitted parameters, or else all with an expected deviation.
 
     Raises SpecError for a pattern that matches nothing, or when nothing is left.
     """

@@ -1,4 +1,4 @@
-"""The noise floor of the time-domain form: the residual that is left of a record made by the model itself, rad/s².
+"""The noise floor of the time-domain form: the residual (rad/s²) that remains for records made by the model itself.
 
 Three causes add up, and only the first follows from a formula. (1) Noise and rounding of the readings are amplified by
 differentiation and by the model's dependence on speed (`measured_motion.observe`). (2) Between two samples the drive
@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import DaqError
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options
@@ -24,12 +24,10 @@ from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import Observation, observe
 
-Floats = NDArray[np.float64]
-
 FEWEST, MOST = 12, 40
 """Least and largest number of replicas of a record."""
 SECONDS = 400.0
-"""s of motion that the replicas of a record have together: in a short record friction changes sign only a few times."""
+"""Total length of motion (s) of a record's replicas: in a short record friction changes sign only a few times."""
 SEED = 1991
 
 

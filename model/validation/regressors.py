@@ -1,16 +1,15 @@
-"""What a variation may depend on (position, speed, direction, load and so on of a joint), and how strongly it does."""
+"""Quantities that a variation may depend on (a joint's position, speed, load and so on), and how strongly it does."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import gravity_loads
 from model.validation.measured_motion import Observation
 from model.validation.variation import Correlation
-
-Floats = NDArray[np.float64]
 
 FEWEST = 6
 """Least number of independent samples for a correlation."""

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.simulation.period import OUT_READING
 from model.simulation.prepared import Options
 from model.simulation.simulate import at_rows, parameter_vectors, simulate_many
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
+from model.arrays import Floats, Mask
 from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
-from model.validation.measured_motion import Mask, Observation, observe
+from model.validation.measured_motion import Observation, observe
 from model.validation.noise_floor import noise_floor
 from model.validation.regressors import correlations, regressors
 from model.validation.variation import JointResidual, TimeDomain, Variation
-
-Floats = NDArray[np.float64]
 
 SIGNIFICANT = 2.0
 """A variation counts as real beyond this many standard deviations of its noise."""
@@ -52,7 +50,7 @@ class _Solution:
 def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain:
     """How the named parameters would have to vary with time for the model to explain a trace.
 
-    At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, as far as noise allows
+    At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, regularised by noise
     (a Bayes estimate: α ~ N(0, τ′²), and the noise floor of `noise_floor`). Rounding of the drive, motion
     between samples and the delay are accounted for; a rotor's current, heat and sensors' errors are not varied.
 

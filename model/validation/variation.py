@@ -1,4 +1,4 @@
-"""What validation in the time domain finds, as data; a module that only shows it need not load the compiler."""
+"""The results of validation in the time domain, as data; a module that only shows them need not load the compiler."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class _Part(BaseModel):
 
 
 class Correlation(_Part):
-    """Pearson's correlation with one regressor of one joint. `noise` is what independent signals would show (1σ)."""
+    """Pearson's correlation with one regressor of one joint. `noise` is that of independent signals (1σ)."""
 
     regressor: str
     joint: int
@@ -24,7 +24,7 @@ class Correlation(_Part):
 
     @property
     def significant(self) -> bool:
-        """Beyond three standard deviations of what independent signals would show."""
+        """Whether it is beyond three standard deviations of the correlation of independent signals."""
         return abs(self.value) > 3 * self.noise
 
 

@@ -1,1 +1,1 @@
-"""Who may do what: tokens, roles, one-time tickets; and what browsers may not do behind a person's back."""
+"""Access control: tokens, roles, one-time tickets, limits, and protection from requests of other pages in a browser."""

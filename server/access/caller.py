@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Caller:
-    """A person or program that calls. `name` is that of their token; `local` for a user of this computer without one.
+    """A person or program that sends requests. `name` is their token's name; `local` for a user of this computer
+    without a token.
 
-    token: hash of the token that they were admitted with; None if none was needed
+    token: hash of the token with which they were admitted; None if none was needed
     """
 
     name: str
@@ -25,28 +26,28 @@ class Caller:
 
     @property
     def may_operate(self) -> bool:
-        """Whether they may change anything."""
+        """Whether they may change something."""
         return self.role == "operator"
 
 
 LOCAL = Caller("local", "operator")
-"""Whoever reaches a service on loopback without a token and without a proxy: a user of this computer."""
+"""A user of this computer: they reach a service on loopback without a token and without a proxy."""
 
 
 def caller_of(connection: HTTPConnection) -> Caller | None:
-    """The caller that the gate has admitted; None for an anonymous request."""
+    """Returns the caller that the gate has admitted; None for an anonymous request."""
     found: Caller | None = getattr(connection.state, "caller", None)
     return found
 
 
 def token_needed() -> ProblemError:
-    """A 401 for an anonymous caller."""
+    """Returns a 401 for an anonymous caller."""
     advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
     return ProblemError(401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"})
 
 
 def require_viewer(connection: HTTPConnection) -> Caller:
-    """The caller, who may see the robot. Raises a 401."""
+    """Returns the caller, who may see the robot. Raises a 401."""
     caller = caller_of(connection)
     if caller is None:
         raise token_needed()
@@ -54,7 +55,7 @@ def require_viewer(connection: HTTPConnection) -> Caller:
 
 
 def require_operator(connection: HTTPConnection) -> Caller:
-    """The caller, who may change something. Raises a 401 or a 403."""
+    """Returns the caller, who may change something. Raises a 401 or a 403."""
     caller = require_viewer(connection)
     if not caller.may_operate:
         line = f"{caller.name} may look, and stop the robot; this needs the role operator"

@@ -1,7 +1,7 @@
-"""What a connection may cost before anybody has said who they are: how many there are, and how long a head may be.
+"""Limits before a caller is known: the number of connections, and the length of a request's address and headers.
 
-The stop listener, the stop sockets, the database and the traces need files of the same process. uvicorn's parser keeps
-every header of a request, however many there are, before anything else is asked.
+Connections use up the open files that the process also needs for stop sockets, database and traces. And uvicorn's
+parser keeps every header of a request, however many there are, before the gate sees the request.
 """
 
 from __future__ import annotations
@@ -15,40 +15,41 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from server.problems import MEDIA_TYPE, ProblemError, details_of
 
 MOST_CONNECTIONS = 500
-"""Half of the files that a process may open where nobody has said otherwise (1024)."""
+"""Largest number of connections: half of the files that a process may open by default (1024)."""
 MOST_HEADERS = 100
-"""Of one request. Browsers send some twenty."""
+"""Largest number of headers of one request. Browsers send some twenty."""
 LARGEST_HEAD = 32 << 10
-"""Bytes of a request's address and headers together."""
+"""Largest size of a request's address and headers together, in bytes."""
 LINGER = 1.0
-"""s that a refused connection may go on sending."""
+"""Time (s) for which a refused connection may go on sending."""
 LONGEST_ADDRESS = 8 << 10
-"""Bytes of a request's address (URL): a cursor, a search and every filter need less than one kilobyte."""
+"""Largest size of a request's address (URL) in bytes: a cursor, a search and all filters need less than 1 kB."""
 
 
 class Connection(HttpToolsProtocol):
-    """uvicorn's, within the limits above.
+    """uvicorn's connection, within the limits above.
 
-    When there are too many connections, the newest takes the place of one that asks for nothing at the moment; where
-    all of them wait for answers or watch, it is closed. A request whose head is too large is answered with a 414 or 431
-    as soon as that is known, and its connection is closed.
+    If there are too many connections, one without a request under way is closed for the new one; if all have one, the
+    new one is closed. A request whose head (address and headers) is too large is answered with a 414 or 431 as soon as
+    that is known, and its connection is closed.
     """
 
+    most = MOST_CONNECTIONS
     _refusal: ProblemError | None = None
     _reading_head = False
     _headers = 0
-    """So far, of this request; trailers count, too."""
+    """Number of headers of this request so far, including trailers."""
     _head = 0
-    """Bytes that the parser has told of this request's head."""
+    """Number of bytes of this request's head that the parser has reported."""
     _untold = 0
-    """Bytes of it that came after its beginning, told or not: a header is told when it has ended."""
+    """Number of bytes received of the head, reported or not: the parser reports a header only when it has ended."""
     _silent = 0
-    """Bytes since the parser told of anything: it keeps a trailer after the body until that has ended."""
+    """Number of bytes since the parser's last report: it keeps a trailer after the body until that has ended."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """As uvicorn's."""
+        """Accepts a connection, or closes one if there are too many."""
         super().connection_made(transport)
-        if len(self.connections) > MOST_CONNECTIONS:
+        if len(self.connections) > self.most:
             others = (one for one in self.connections if isinstance(one, Connection) and one is not self)
             given_up = next((one for one in others if one.asks_nothing), self)
             self.connections.discard(given_up)
@@ -56,11 +57,11 @@ class Connection(HttpToolsProtocol):
 
     @property
     def asks_nothing(self) -> bool:
-        """Whether it has not asked yet, or has been answered."""
+        """Whether no request is under way."""
         return self.cycle is None or self.cycle.response_complete
 
     def data_received(self, data: bytes) -> None:
-        """As uvicorn's. A refused request's connection takes nothing more."""
+        """Parses data, and refuses a head that is too large. Data after a refusal is ignored."""
         if self._refusal is not None:
             return
         if self._reading_head:
@@ -73,13 +74,13 @@ class Connection(HttpToolsProtocol):
         super().data_received(data)
 
     def on_message_begin(self) -> None:
-        """A request begins."""
+        """Resets the counts at the beginning of a request."""
         self._silent = 0
         super().on_message_begin()
         self._reading_head, self._headers, self._head, self._untold = True, 0, 0, 0
 
     def on_url(self, url: bytes) -> None:
-        """A part of the address. Raises ProblemError, which the parser turns into an error of its own."""
+        """Counts a part of the address. Raises ProblemError, which the parser turns into an error of its own."""
         super().on_url(url)
         if len(self.url) > LONGEST_ADDRESS:
             line = f"the address has more than {LONGEST_ADDRESS >> 10} kB"
@@ -87,7 +88,7 @@ class Connection(HttpToolsProtocol):
         self._count(len(url))
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """A header, or a trailer after the body. Raises as `on_url`."""
+        """Counts a header, or a trailer after the body. Raises as `on_url` does."""
         self._silent = 0
         self._headers += 1
         if self._headers > MOST_HEADERS:
@@ -96,17 +97,17 @@ class Connection(HttpToolsProtocol):
         super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
-        """The head has ended."""
+        """Notes the end of the head."""
         self._reading_head = False
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
-        """A part of the body."""
+        """Passes on a part of the body."""
         self._silent = 0
         super().on_body(body)
 
     def send_400_response(self, msg: str) -> None:
-        """The refusal, where there is one; else uvicorn's."""
+        """Sends the refusal if there is one, otherwise uvicorn's answer."""
         if self._refusal is None:
             super().send_400_response(msg)
             return
@@ -118,8 +119,8 @@ class Connection(HttpToolsProtocol):
         )
         self.transport.write(head.encode() + content)
         if self.cycle is not None:
-            self.cycle.disconnected = True  # whoever works at the answer of a request before has nobody to give it to
-        # What is still on its way is taken and thrown away: else the system would throw away the answer with it.
+            self.cycle.disconnected = True  # the answer to an earlier request can no longer be sent
+        # Data still under way is read and discarded; otherwise the system would discard this answer with it.
         self.loop.call_later(LINGER, self.transport.close)
 
     def _count(self, size: int) -> None:

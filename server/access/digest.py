@@ -1,4 +1,4 @@
-"""The hash of a token, which is all that is stored of it."""
+"""The hash of a token. Only the hash is stored."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ import hashlib
 
 
 def digest_of(token: str) -> str:
-    """The SHA-256 of a token. It needs no salt: a token has 256 random bits, so no dictionary helps."""
+    """Returns the SHA-256 of a token. It needs no salt, since a token has 256 random bits and cannot be guessed."""
     return hashlib.sha256(token.encode()).hexdigest()

@@ -31,12 +31,12 @@ from server.database_errors import DamagedError
 from server.problems import ProblemError, of_damage, of_database, response
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
-"""Address of the stop, which no rate limit delays."""
+"""Addresses of the stop, which no rate limit delays."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
-"""Addresses whose POST takes a file, and counts its bytes itself."""
+"""Addresses whose POST takes a file. Their routes limit its size themselves."""
 NOT_ALLOWED, TRY_LATER = 1008, 1013
 MOST_SOCKETS = 100
-"""Most WebSockets of one caller, of 500 connections in all."""
+"""Largest number of WebSockets of one caller, out of 500 connections."""
 LOOK_EVERY = 1.0
 """Time (s) between two checks whether the token of an open WebSocket has been revoked."""
 log = logging.getLogger("server.access")
@@ -44,12 +44,12 @@ log = logging.getLogger("server.access")
 
 @dataclass
 class Gate:
-    """Decides who a caller is and whether a request goes on.
+    """Decides who a caller is and whether a request is admitted.
 
-    open_on_loopback: whether this computer's users are operators without a token: the service listens at loopback alone
-    stop_port:        of the stop listener, which the page may ask for a stop, too
-    observed:         called with method, status and seconds of every request
-    refused:          called with the kind of problem of every request and WebSocket that is let in no further
+    open_on_loopback: whether users of this computer are operators without a token; the service listens on loopback only
+    stop_port:        the port of the stop listener, at which the page may request a stop, too
+    observed:         called with method, status and duration (s) of every request
+    refused:          called with the kind of problem of every request and WebSocket that is refused
     """
 
     tokens: KnownTokens
@@ -61,11 +61,12 @@ class Gate:
     refused: Callable[[str], None] = lambda _reason: None
     buckets: Buckets = field(default_factory=Buckets)
     sockets: Counter[str] = field(default_factory=Counter)
-    """WebSockets that are open, by the caller's name."""
+    """Number of open WebSockets by caller's name."""
     turns: Turns = field(default_factory=Turns)
+    look_every: float = LOOK_EVERY
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
-        """`app` behind this gate."""
+        """Returns `app` behind this gate."""
 
         async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
             if scope["type"] == "http":
@@ -137,7 +138,7 @@ class Gate:
             await self._open_socket(app, caller, scope, receive, send)
         finally:
             self.sockets[name] -= 1
-            self.sockets += Counter()  # forgets names that have none
+            self.sockets += Counter()  # drops names with a count of zero
 
     async def _open_socket(
         self, app: ASGIApp, caller: Caller | None, scope: Scope, receive: Receive, send: Send
@@ -146,15 +147,15 @@ class Gate:
             await app(scope, receive, send)
         elif not await self._while_let_in(caller, app(scope, receive, send)):
             log.info("closed a WebSocket: the token of %s was revoked", caller.name)
-            with suppress(TimeoutError):  # of a client that reads nothing: its connection ends when this returns
-                async with asyncio.timeout(LOOK_EVERY):
+            with suppress(TimeoutError):  # the client reads nothing; its connection ends when this returns
+                async with asyncio.timeout(self.look_every):
                     await WebSocketClose(NOT_ALLOWED, "this token was revoked")(scope, receive, send)
 
     async def _while_let_in(self, caller: Caller, serving: Awaitable[None]) -> bool:
-        """Serves until the end, or until the caller's token is revoked: False then."""
+        """Serves until the connection ends (True), or until the caller's token is revoked (False)."""
         task = asyncio.ensure_future(serving)
         try:
-            while not (await asyncio.wait({task}, timeout=LOOK_EVERY))[0]:
+            while not (await asyncio.wait({task}, timeout=self.look_every))[0]:
                 if not await self.tokens.still_let_in(caller):
                     return False
             task.result()
@@ -165,7 +166,7 @@ class Gate:
                 await asyncio.gather(task, return_exceptions=True)
 
     async def _admit(self, scope: Scope) -> Caller | None:
-        """The caller of a request. Raises a 401, 403, 413, 429 or 503."""
+        """Returns the caller of a request. Raises a 401, 403, 413, 429 or 503."""
         headers = Headers(scope=scope)
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
@@ -178,7 +179,7 @@ class Gate:
         if not _is_post(scope, STOP):
             self._count(caller, scope)
         if caller is None and changes and scope["type"] == "http":
-            raise token_needed()  # before anything of a body is read, which the routes would do first
+            raise token_needed()  # before any of the body is read, which the routes would do
         length = headers.get("content-length", "0")
         if not _is_post(scope, UPLOADS) and (not length.isdecimal() or int(length) > LARGEST_BODY):
             raise ProblemError(413, "too-large", f"a body may have {LARGEST_BODY >> 20} MB", "send less at once")
@@ -189,7 +190,7 @@ class Gate:
         if token and kind.lower() == "bearer":
             known, caller = self.tokens.remembered(token.strip())
             if caller is None and not self.tokens.was_known(token.strip()) and not _is_post(scope, STOP):
-                self._count(None, scope)  # before the database is asked
+                self._count(None, scope)  # before the database is read
             if not known:
                 caller = await self._looked_up(token.strip())
             if caller is None:
@@ -207,7 +208,7 @@ class Gate:
         return LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
 
     async def _looked_up(self, token: str) -> Caller | None:
-        """Raises a 503 where the database has never said whose it is."""
+        """Looks a token up in the database. Raises a 503 if that has never been read."""
         try:
             return await asyncio.to_thread(self.tokens.look_up, token)
         except DamagedError as error:

@@ -1,7 +1,7 @@
-"""Lanes of expensive requests: reading a trace, planning a motion, searching. For the event loop alone.
+"""Lanes of expensive requests: reading a trace, planning a motion, searching. Use them on the event loop only.
 
-Each caller has a few requests in progress; their others wait without a thread. A caller with very many requests delays
-nobody else.
+Each caller may have a few requests in progress; their other requests wait without occupying a thread. So a caller with
+very many requests delays nobody else.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from server.problems import ProblemError
 
 AT_ONCE = 2
-"""Turns of one caller, of the 40 threads that there are for all. Every user of this computer is the same caller."""
+"""Number of requests of one caller in progress, out of 40 threads. All users of this computer are one caller."""
 MOST_WAITING = 50
-"""Requests of one caller that wait for a turn; one more is a 429."""
+"""Number of requests of one caller that may wait; a further one is a 429."""
 WAIT_AT_MOST = 30.0
-"""s; most programs have given up by then."""
+"""Longest wait (s); most programs have given up by then."""
 
 
 @dataclass
@@ -30,22 +30,25 @@ class _Lane:
 class Lanes:
     """The lanes of all callers; each exists while its caller has requests."""
 
-    def __init__(self) -> None:
+    def __init__(self, wait_at_most: float = WAIT_AT_MOST) -> None:
+        self._wait_at_most = wait_at_most
         self._lanes: dict[str, _Lane] = {}
 
     @asynccontextmanager
     async def turn(self, caller: str) -> AsyncIterator[None]:
-        """Within, it is this caller's turn. Raises a 429 when too many requests wait, or for too long."""
+        """Waits for this caller's turn, and holds it within the block. Raises a 429 if too many requests wait, or this
+        one has waited too long."""
         lane = self._lanes.setdefault(caller, _Lane())
         if lane.users >= AT_ONCE + MOST_WAITING:
             raise _too_many(f"{MOST_WAITING} requests of {caller} wait for their turn")
         lane.users += 1
         try:
             try:
-                async with asyncio.timeout(WAIT_AT_MOST):
+                async with asyncio.timeout(self._wait_at_most):
                     await lane.turns.acquire()
             except TimeoutError:
-                raise _too_many(f"requests of {caller} have waited for their turn for {WAIT_AT_MOST:g} s") from None
+                line = f"requests of {caller} have waited for their turn for {self._wait_at_most:g} s"
+                raise _too_many(line) from None
             try:
                 yield
             finally:

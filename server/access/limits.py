@@ -1,4 +1,4 @@
-"""How much a client may ask for: requests a second, and bytes a request. Pure but for what is remembered."""
+"""Limits of a client: requests per second, and bytes per request."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
 REQUESTS_A_SECOND = 300.0
-"""Sustained rate of one caller at one address: three times the load that the whole service is measured with."""
+"""Sustained rate of one caller at one address: three times the load with which the whole service was measured."""
 AT_ONCE = 600.0
+"""Number of requests that one caller at one address may send at once."""
 LARGEST_BODY = 16 << 20
-"""Bytes: a recorded path of an hour."""
+"""Largest body in bytes, enough for a recorded path of an hour."""
 MOST_REMEMBERED = 10_000
+"""Number of buckets beyond which full ones are forgotten."""
 
 
 @dataclass
@@ -43,7 +45,7 @@ class Buckets:
     _buckets: dict[tuple[str, str], Bucket] = field(default_factory=dict)
 
     def take(self, who: str, address: str, now: float) -> float:
-        """As `Bucket.take`."""
+        """Takes one request from the bucket of a caller and address, as `Bucket.take` does."""
         key = (who, address)
         bucket = self._buckets.get(key)
         if bucket is None:
@@ -53,12 +55,12 @@ class Buckets:
         return bucket.take(now)
 
     def _forget_full(self, now: float) -> None:
-        """A bucket that is full again remembers nothing."""
+        """Removes buckets that are full again, since a new one is full, too."""
         self._buckets = {k: b for k, b in self._buckets.items() if b.level + (now - b.at) * b.rate < b.size}
 
 
 def counted(receive: Receive, largest: int) -> Receive:
-    """`receive`, up to `largest` bytes of body; raises a 413 beyond."""
+    """Wraps `receive` so that it raises a 413 after more than `largest` bytes of body."""
     size = 0
 
     async def limited() -> Message:

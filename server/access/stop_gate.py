@@ -1,4 +1,4 @@
-"""The gate before the stop listener: the rules of the service's own gate, asked on whichever thread the request is."""
+"""The gate of the stop listener. It has the rules of the service's gate, and is called on the request's thread."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from server.problems import ProblemError
 
 
 class Tokens(Protocol):
-    """Whose a token is."""
+    """Finds the caller of a token."""
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
-        """Whether that is known without asking the database; and whose it is."""
+        """Returns whether the caller is known without reading the database, and the caller."""
         ...
 
     def look_up(self, token: str) -> Caller | None:
-        """Whose it is, from the database; None for one that opens nothing."""
+        """Returns the caller from the database; None for an unknown token."""
         ...
 
 
 @dataclass(frozen=True)
 class StopGate:
-    """Lets in whoever may see the robot. `service_port`: where the page comes from that may stop it, too."""
+    """Admits everybody who may see the robot. `service_port`: the port of the service's page, which may request a stop,
+    too."""
 
     tokens: Tokens
     open_on_loopback: bool
@@ -34,7 +35,7 @@ class StopGate:
     service_port: int
 
     def admit(self, headers: Mapping[str, str]) -> Caller:
-        """Who calls. Raises a 401 or 403."""
+        """Returns the caller. Raises a 401 or 403."""
         host = headers.get("host", "")
         if not is_known_name(host, self.names, loopback_only=self.open_on_loopback):
             line = f"this service is not called {host!r:.100}"
@@ -57,7 +58,7 @@ class StopGate:
         return caller
 
     def is_from_here(self, headers: Mapping[str, str]) -> bool:
-        """Whether this comes from the service's own page, or from a program: programs name no origin."""
+        """Whether a request comes from the service's own page, or from a program, which sends no origin."""
         origin = headers.get("origin")
         if origin is None:
             return headers.get("sec-fetch-site", "none") in ("none", "same-origin")

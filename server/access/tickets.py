@@ -1,4 +1,4 @@
-"""One-time tickets for WebSockets: browsers send no header with one, and a token in an address would be logged."""
+"""One-time tickets for WebSockets. A browser cannot add a header to one, and a token in its address would be logged."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from server.access.caller import Caller
 from server.clock import Clock
 
 GOOD_FOR = 30.0
-"""s: a page opens its WebSocket at once."""
+"""Time (s) for which a ticket is valid; a page opens its WebSocket at once."""
 MOST = 1000
+"""Largest number of tickets that are kept."""
 
 
 class Tickets:
-    """Tickets given and not yet used. Safe to use from any thread."""
+    """Tickets issued and not yet used. Safe to use from any thread."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -23,7 +24,7 @@ class Tickets:
         self._given: dict[str, tuple[Caller, float]] = {}
 
     def give(self, caller: Caller) -> Ticket:
-        """Issues a new ticket for `caller`. The oldest are dropped when there are too many."""
+        """Issues a new ticket for `caller`. The oldest are dropped if there are too many."""
         ticket = secrets.token_urlsafe(24)
         with self._lock:
             now = self._clock.monotonic()
@@ -34,7 +35,7 @@ class Tickets:
         return Ticket(ticket=ticket, seconds=GOOD_FOR)
 
     def take(self, ticket: str) -> Caller | None:
-        """The owner of a ticket, which is used up by this; None for one that is unknown, used or too old."""
+        """Returns the owner of a ticket, and uses it up; None if the ticket is unknown, used or too old."""
         with self._lock:
             found = self._given.pop(ticket, None)
         if found is None or found[1] <= self._clock.monotonic():

@@ -1,6 +1,6 @@
-"""Tokens: long random words, shown once, kept as their SHA-256.
+"""Tokens: long random words that are shown once and stored as their SHA-256.
 
-They have 256 random bits, so a plain hash is enough: there is nothing to guess, and no dictionary to try.
+They have 256 random bits and cannot be guessed, so a plain hash is enough.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from server.store.engine import Store
 from server.store.tables import TokenRow
 
 PREFIX = "daq_"
-"""Prefix of every token, by which one that was published by mistake is recognised."""
+"""Prefix of every token, by which a token published by mistake is recognised."""
 REMEMBERED_FOR = 2.0
-"""s after which a token is looked up again: one that was revoked is refused then."""
+"""Time (s) after which a token is looked up again, so that a revoked one is refused."""
 UNKNOWN_FOR = 0.2
-"""s after which the database is asked again for a token that it did not have: one made meanwhile opens what it should,
-and whoever tries tokens has the database asked five times a second at most."""
+"""Time (s) after which an unknown token is looked up again, so that a new one can be used soon, and guessing causes at
+most five reads of the database per second."""
 CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
-"""Raised where the database does not say whose a token is."""
+"""Errors that mean that the tokens cannot be read from the database."""
 log = logging.getLogger("server.access")
 
 
 @dataclass(frozen=True)
 class TokenInfo:
-    """What is known of a token: not the token."""
+    """What the database holds about a token."""
 
     name: str
     role: Role
@@ -54,32 +54,32 @@ class TokenStore:
         self._store = store
 
     def add(self, name: str, role: Role, now: datetime) -> str:
-        """Makes a new token and returns it, the only time. Raises SpecError when the name is taken."""
+        """Makes a new token and returns it; it cannot be shown again. Raises SpecError if the name is taken."""
         token = PREFIX + secrets.token_urlsafe(32)
         with self._store.writing() as session:
             if session.scalar(select(TokenRow).filter_by(name=name)) is not None:
-                raise SpecError(f"token {name!r}: there is one of this name; revoke it, or take another name")
+                raise SpecError(f"token {name!r}: a token of this name exists, or was revoked; choose another name")
             row = TokenRow(id=secrets.token_hex(6), name=name, role=role, digest=digest_of(token), created=now)
             session.add(row)
         return token
 
     def revoke(self, name: str, now: datetime) -> None:
-        """Revokes a token; its name stays taken. Raises SpecError when there is none of this name."""
+        """Revokes a token; its name stays taken. Raises SpecError if there is no token of this name."""
         with self._store.writing() as session:
             row = session.scalar(select(TokenRow).filter_by(name=name))
             if row is None:
-                raise SpecError(f"token {name!r}: there is none of this name; `daq token ls` lists them")
+                raise SpecError(f"token {name!r}: does not exist; `daq token ls` lists all tokens")
             row.revoked = row.revoked or now
 
     def all(self) -> list[TokenInfo]:
-        """All of them, the revoked ones too."""
+        """Returns all tokens, including the revoked ones."""
         with self._store.reading() as session:
             rows = session.scalars(select(TokenRow).order_by(TokenRow.created))
             return [TokenInfo(row.name, _role(row.role), row.created, row.revoked) for row in rows]
 
     def callers(self) -> dict[str, Caller]:
-        """Whose each token is that was not revoked, by its digest. Reads nothing else: a moment that is damaged keeps
-        nobody out."""
+        """Returns the caller of each token that is not revoked, by the token's digest. It reads no other columns, so
+        that a damaged time keeps nobody out."""
         with self._store.reading() as session:
             rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
             return {digest: Caller(name, _role(role), digest) for digest, name, role in rows}
@@ -87,15 +87,15 @@ class TokenStore:
 
 @dataclass(frozen=True)
 class _Known:
-    """Every token that opens something, by digest, as the database had them at a moment (s, monotonic)."""
+    """The callers of all valid tokens, by digest, as read from the database at the time `at` (s, monotonic)."""
 
     callers: dict[str, Caller]
     at: float
 
 
 class KnownTokens:
-    """The tokens there are, read now and then, so that the database is asked seldom, however many tokens are tried.
-    Safe to use from any thread."""
+    """The valid tokens, kept in memory, so that the database is read seldom however many tokens are tried. Safe to use
+    from any thread."""
 
     def __init__(self, tokens: TokenStore, clock: Clock) -> None:
         self._tokens = tokens
@@ -104,27 +104,28 @@ class KnownTokens:
         self._known = _Known({}, -math.inf)
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
-        """Whether it is known lately whose it is, or that it is nobody's; and whose."""
+        """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
         return self._remembered(digest_of(token))
 
     def was_known(self, token: str) -> bool:
-        """Whether the token was valid when the database was read last, however long ago."""
+        """Whether the token was valid when the database was last read, however long ago."""
         return digest_of(token) in self._known.callers
 
     def look_up(self, token: str) -> Caller | None:
-        """Whose it is, from the database. Where that cannot be read, from what it said last: nobody can have revoked
-        anything meanwhile, and whoever could stop the robot still can. Raises CANNOT_BE_READ where it never said."""
+        """Returns a token's caller from the database. If that cannot be read, the tokens read last stay valid: nobody
+        can have revoked one meanwhile, and nobody loses the ability to stop the robot. Raises CANNOT_BE_READ if the
+        database has never been read."""
         return self._look_up(digest_of(token))
 
     async def still_let_in(self, caller: Caller) -> bool:
-        """Whether the token that let somebody in does so still. From the event loop."""
+        """Whether the token with which a caller was admitted is still valid. Call this on the event loop."""
         if caller.token is None:
             return True
         known, found = self._remembered(caller.token)
         if not known:
             try:
                 found = await asyncio.to_thread(self._look_up, caller.token)
-            except CANNOT_BE_READ:  # asked again soon: nobody loses sight of the arm because a disk is busy
+            except CANNOT_BE_READ:  # it is read again soon: nobody loses sight of the arm because a disk is busy
                 return True
         return found == caller
 
@@ -136,7 +137,7 @@ class KnownTokens:
 
     def _look_up(self, digest: str) -> Caller | None:
         with self._reading:
-            known, caller = self._remembered(digest)  # somebody else may have asked meanwhile
+            known, caller = self._remembered(digest)  # another thread may have read them meanwhile
             if known:
                 return caller
             try:
@@ -144,7 +145,7 @@ class KnownTokens:
             except CANNOT_BE_READ as error:
                 if self._known.at == -math.inf:
                     raise
-                log.warning("tokens cannot be read, the last ones that were are taken: %s", error)
+                log.warning("tokens cannot be read; those read last stay valid: %s", error)
                 self._known = _Known(self._known.callers, self._clock.monotonic())
             return self._known.callers.get(digest)
 

@@ -15,31 +15,31 @@ from urllib.parse import parse_qs
 from starlette.types import Message, Scope, Send
 
 AT_ONCE = 8
-"""Requests handled at the same time: 10 to 20 ms of one round of the event loop."""
+"""Number of requests handled at the same time. They take 10 to 20 ms of one round of the event loop."""
 ASKS_THE_ROBOT = re.compile(r"/api/v1/robots/[^/]+/(gains|process)")
-"""These answers wait for the robot. Their number is limited elsewhere; they must not take the turns of others."""
+"""Addresses whose answers wait for the robot. Their number is limited elsewhere, and they must not occupy turns."""
 WAITS_FOR_AN_END = re.compile(r"/api/v1/robots/[^/]+/(experiments|jobs)/[^/]+")
-"""Where `wait` in the query lets the answer wait until something has ended."""
+"""Addresses whose answer waits until something has ended, if the query has `wait`."""
 READY = "/readyz"
-"""Anybody may ask it, and its answer waits for disk and database: one at a time is worked out, for all who ask."""
+"""The readiness check. It waits for disk and database; one check at a time answers all requests (`Readiness`)."""
 
 
 class Turns:
-    """On the event loop alone."""
+    """The turns of all requests. Use it on the event loop only."""
 
     def __init__(self) -> None:
         self._free = asyncio.Semaphore(AT_ONCE)
 
     async def taken(self, scope: Scope, send: Send) -> Turn:
-        """Waits for a turn, where this request needs one. It ends with the first byte of the answer: how fast a client
-        reads is nobody's turn."""
+        """Waits for a turn, if this request needs one. The turn ends with the first byte of the answer, so that a slow
+        client does not occupy it."""
         turn = Turn(self._free if _is_plain_question(scope) else None, send)
         await turn.begin()
         return turn
 
 
 class Turn:
-    """One request's; `send` is what its answer is sent by."""
+    """The turn of one request. The answer is sent through `send`, which ends the turn."""
 
     def __init__(self, free: asyncio.Semaphore | None, send: Send) -> None:
         self._free = free
@@ -57,7 +57,7 @@ class Turn:
             self._free = None
 
     async def send(self, message: Message) -> None:
-        """As the web server's."""
+        """Ends the turn, and sends a message of the answer."""
         self.end()
         await self._send(message)
 

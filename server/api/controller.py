@@ -19,7 +19,7 @@ OutputNumber = Annotated[int, Path(ge=0, le=7)]
 
 @router.get("/gains")
 def get_gains(rig: RobotDep, _: Viewer) -> JointGains:
-    """The gains P, I and D of every joint, read from the controller."""
+    """Reads the gains P, I and D of every joint from the controller."""
     return JointGains.model_validate(answer_of(rig.robot, ReadGains).data)
 
 
@@ -27,7 +27,7 @@ def get_gains(rig: RobotDep, _: Viewer) -> JointGains:
 def set_gains(
     request: JointGains, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
 ) -> JointGains:
-    """Writes gains of the named joints and reads all back. Refused for a joint off its set point, which would jump."""
+    """Writes gains of the named joints and reads all back. Refused for a joint that would jump to its set point."""
     rig.require_motion(lease)
     count = len(rig.robot.machine.joints)
     for joint in request.gains:
@@ -41,7 +41,7 @@ def set_gains(
 
 @router.get("/process")
 def get_process(rig: RobotDep, _: Viewer) -> ProcessState:
-    """The process inputs and outputs, and the gripper."""
+    """Reads the process inputs and outputs, and the gripper."""
     return _process(answer_of(rig.robot, ReadProcess))
 
 

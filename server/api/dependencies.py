@@ -22,7 +22,7 @@ from server.store.pages import Cursor
 
 
 def services_of(connection: HTTPConnection) -> Services:
-    """The services that the application was made with."""
+    """Returns the services with which the application was made."""
     services: Services = connection.app.state.services
     return services
 
@@ -38,7 +38,7 @@ async def robot_services(
     robot: Annotated[str, Path(max_length=64, examples=["ma2000"], description="Name of the robot.")],
     services: ServicesDep,
 ) -> RobotServices:
-    """The services of the robot in the address. Raises a 404."""
+    """Returns the services of the robot in the address. Raises a 404."""
     return services.robot(robot)
 
 
@@ -60,7 +60,7 @@ async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
 
 
 def let_others_ask(connection: HTTPConnection) -> None:
-    """Ends the request's turn among the quick requests: it waits in its caller's own lane instead."""
+    """Ends the request's turn among the quick requests, since it waits in its caller's own lane instead."""
     turn = getattr(connection.state, "turn", None)
     if turn is not None:
         turn.end()
@@ -82,27 +82,27 @@ Operator = Annotated[Caller, Depends(_operator)]
 
 
 def _require_cursor(cursor: str | None) -> str | None:
-    """Raises ValueError for a cursor that no list can have returned. Its number is that of a row or of a moment, and
-    its identity is text that can be encoded."""
+    """Raises ValueError for a cursor that no list can have returned. Its number must be that of a row or a time, and
+    its identity text that can be encoded."""
     if cursor is not None:
         try:
             place = Cursor.parse(cursor)
             datetime.fromtimestamp(place.number, UTC)
             place.identity.encode()
         except (ProblemError, ValueError, OverflowError, OSError):
-            raise ValueError("was not given out by a list; begin without a cursor") from None
+            raise ValueError("no list has returned this; begin without a cursor") from None
     return cursor
 
 
 Limit = Annotated[PageLimit, Query(description="Length of this part of the list.")]
 CursorOf = Annotated[
-    str | None, AfterValidator(_require_cursor), Query(max_length=200, description="`next` of the part before.")
+    str | None, AfterValidator(_require_cursor), Query(max_length=200, description="`next` of the previous part.")
 ]
 IdempotencyKey = Annotated[
     str | None,
-    Header(min_length=1, max_length=200, description="Sent again with the same request, it is carried out once."),
+    Header(min_length=1, max_length=200, description="A request sent again with the same key is carried out once."),
 ]
 LeaseHeader = Annotated[
-    str | None, Header(alias="Control-Lease", max_length=200, description="The lease that POST …/control gave.")
+    str | None, Header(alias="Control-Lease", max_length=200, description="The lease that POST …/control returned.")
 ]
 Identity = Annotated[str, Path(max_length=64)]

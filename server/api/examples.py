@@ -36,6 +36,7 @@ from daq.contracts.service.jobs import (
     ModelEntry,
     ModelLineage,
     ModelParameter,
+    ParameterWords,
     ValidateRequest,
 )
 from daq.contracts.service.live import LiveFrame, RobotMessage, SampleMessage, Ticket
@@ -79,6 +80,7 @@ ROBOT, TRACE, EXPERIMENT, JOB, MODEL = "ma2000", "3fa1c5d20b77", "c40d1a2b93ee",
 SPEC = ExperimentSpec(trajectory=Ramp(amplitude=0.377, duration=0.65), joints=(1, 2, 3), name="morning-ramp")
 PICK = Program(name="pick", instructions=(Absolute(angles={1: 3.14, 2: 1.4}), Gripper(closed=True), Wait(duration=1)))
 PROGRAM = ProgramEntry(name="pick", robot=ROBOT, revision=3, instructions=3, changed=NOON, changed_by="anna")
+COULOMB = ParameterWords(joint=2, group="joint 2", short="Coulomb friction torque", label="J2 Coulomb friction torque")
 QUEUE = QueueStatus(paused=False, reason="resumed by anna", since=NOON, queued=2, running=EXPERIMENT)
 NOBODY = Control(holder="nobody")
 IDENTITY = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=3)
@@ -192,6 +194,7 @@ def _robot() -> list[BaseModel]:
             confirmed=True,
             tick=90211,
             seconds=0.014,
+            detail="set points frozen at tick 90211.",
             text="stopped, confirmed by the board: set points frozen at tick 90211.",
         ),
         ResetRequest(here=False),
@@ -286,7 +289,15 @@ def _models() -> list[BaseModel]:
         job=JOB,
         traces=(TRACE,),
     )
-    parameter = ModelParameter(name="joint2.coulomb", unit="N·m", value=0.41, low=0.0, high=5.0, deviation=0.2)
+    parameter = ModelParameter(
+        name="joint2.coulomb_friction.torque",
+        words=COULOMB,
+        unit="N·m",
+        value=0.41,
+        low=0.0,
+        high=5.0,
+        deviation=0.2,
+    )
     fit = FitRequest(
         traces=(TRACE,), effects=(EffectChoice(name="coulomb_friction", joints=(2, 3)),), name="with friction"
     )
@@ -347,8 +358,10 @@ def _comparison() -> ComparisonJobResult:
         simulated=(((3.14, 3.151),),),
         residual=(((0.0, -0.001),),),
     )
-    difference = ParameterDifference(name="joint2.coulomb", unit="N·m", values=(None, 0.41), deviations=None)
-    data = ComparisonData(models=(agreement,), signals=(overlay,), differences=(difference,))
+    name = "joint2.coulomb_friction.torque"
+    difference = ParameterDifference(name=name, unit="N·m", values=(None, 0.41), deviations=None)
+    words = {name: COULOMB}
+    data = ComparisonData(models=(agreement,), signals=(overlay,), differences=(difference,), words=words)
     return ComparisonJobResult(id=JOB, data=data)
 
 

@@ -132,7 +132,7 @@ def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_
     length = least_length(spec)
     if length > LONGEST:
         line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"
-        raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter ones")
+        raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter experiments")
     order = WorkOutMotion(spec=spec, machine=rig.robot.machine, most_shown=most_shown)
     if length <= SHORT and spec.repeats == 1 and points_of(spec) <= FEW_POINTS:
         return preview_of(order)

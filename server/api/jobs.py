@@ -211,8 +211,9 @@ def change_model(model: Identity, change: ModelChange, rig: RobotDep, services: 
 @router.delete("/models/{model}", tags=["models"], status_code=204)
 def delete_model(model: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
     """Deletes a model for good. Refused while another model was made from it."""
+    name = services.models.get(rig.robot.name, model).name
     rig.models.remove(model)
-    services.record_event(rig.robot.name, "model", f"model {model} was deleted", actor=caller.name)
+    services.record_event(rig.robot.name, "model", f"model {name!r} was deleted", actor=caller.name)
     return Response(status_code=204)
 
 

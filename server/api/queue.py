@@ -28,7 +28,7 @@ router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 
 
 async def _seen(rig: RobotDep) -> Seen:
-    """What an operator could see when the request arrived, before it waited for a thread or for the queue."""
+    """Returns what an operator could see when the request arrived, before it waited for a thread or for the queue."""
     return rig.queue.notices.seen
 
 
@@ -50,16 +50,16 @@ def list_queue(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[Experim
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
     """Pauses the queue: no further experiment begins, and one that runs goes on."""
-    rig.queue.pause(f"paused by {caller.name}", caller.name)
+    rig.queue.pause(f"by {caller.name}", caller.name)
     return rig.queue.status()
 
 
 @router.post("/queue/resume", tags=["queue"])
 def resume_queue(request: QueueResume, rig: RobotDep, seen: SeenDep, caller: Operator) -> QueueStatus:
-    """Resumes the queue: the operator's consent that it may move the robot. A real arm needs `moves_real_arm`."""
+    """Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`."""
     identity = rig.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
-        line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's word"
+        line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's consent"
         raise ProblemError(409, "consent-needed", line, "is its workspace clear? then resume with moves_real_arm")
     rig.queue.resume(caller.name, moves_real_arm=request.moves_real_arm, seen=seen)
     return rig.queue.status()
@@ -114,7 +114,7 @@ def change_schedule(
 def delete_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
     """Deletes a schedule. The experiments that it has submitted are kept."""
     services.schedules.remove(rig.robot.name, schedule)
-    services.record_event(rig.robot.name, "schedule", f"schedule {schedule} taken away", actor=caller.name)
+    services.record_event(rig.robot.name, "schedule", f"schedule {schedule} deleted", actor=caller.name)
     return Response(status_code=204)
 
 
@@ -129,8 +129,8 @@ def take_control(request: ControlRequest, rig: RobotDep, services: ServicesDep, 
     """Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused."""
     identity = rig.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
-        line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's word"
-        raise ProblemError(409, "consent-needed", line, "is its workspace clear? then ask again with moves_real_arm")
+        line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's consent"
+        raise ProblemError(409, "consent-needed", line, "is its workspace clear? then try again with moves_real_arm")
     lease = rig.control.take(caller.name, moves_real_arm=request.moves_real_arm)
     services.record_event(rig.robot.name, "control", f"{caller.name} took control", actor=caller.name)
     return lease
@@ -138,19 +138,19 @@ def take_control(request: ControlRequest, rig: RobotDep, services: ServicesDep, 
 
 @router.put("/control", tags=["control"])
 def renew_control(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> ControlLease:
-    """Renews the control: the heartbeat of the client that has it."""
+    """Renews control. The client that has it sends this as its heartbeat."""
     return rig.control.renew(lease or "")
 
 
 @router.delete("/control", tags=["control"], status_code=204)
 def give_control_back(rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None) -> Response:
-    """Gives the control back. The arm holds its posture; a program that still runs is stopped.
+    """Gives control back. The arm holds its posture; a program that still runs is stopped.
 
     If experiments are waiting, the queue is paused until somebody resumes it.
     """
     rig.control.give_back(lease or "")
     rig.teaching.hold()
     rig.teaching.finish()
-    services.record_event(rig.robot.name, "control", f"{caller.name} gave the control back", actor=caller.name)
+    services.record_event(rig.robot.name, "control", f"{caller.name} gave control back", actor=caller.name)
     rig.queue.wake()
     return Response(status_code=204)

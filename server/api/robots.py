@@ -56,7 +56,7 @@ def disconnect_robot(rig: RobotDep, services: ServicesDep, caller: Operator, lea
     rig.control.require_free_of_others(lease)
     free = rig.keeper.disconnect()
     services.record_event(rig.robot.name, "connection", "disconnected", actor=caller.name)
-    return Done(text="the port is free" if free else "the owner still closes its trace; the port is free soon")
+    return Done(text="the port is free" if free else "the owner is still closing its trace; the port will be free soon")
 
 
 @router.post("/{robot}/stop", responses={200: {"description": "The outcome of the stop: read `confirmed`"}})
@@ -65,7 +65,7 @@ async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> St
 
     Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
     """
-    rig.queue.stop_asked(caller.name)  # first: nothing begins while the stop is on its way, nor after one that was lost
+    rig.queue.stop_asked(caller.name)  # first, so that nothing begins while the stop is under way, or if it is lost
     result = await rig.stop.stop()
     services.record_event_later(rig.robot.name, "stop", result.text, actor=caller.name)
     return result

@@ -30,7 +30,7 @@ class StateMetrics(Collector):
         self._services = services
 
     def collect(self) -> Iterable[Metric]:
-        """All metrics of the state."""
+        """Returns all metrics of the state."""
         yield from self._of_robots()
         yield from self._of_experiments()
         yield from self._of_jobs()

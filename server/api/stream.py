@@ -1,4 +1,4 @@
-"""One WebSocket from its first message to its last."""
+"""Serves one WebSocket."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
+from firmware_protocol.invalid import first_invalid
 from server.access.caller import Caller
 from server.access.limits import Bucket
 from server.live.hub import Client
@@ -21,28 +22,28 @@ from server.services import RobotServices
 
 BASE_RATE = 50
 WAITING_MESSAGES = 64
-"""Messages of a client that may wait to be carried out: what holds a key sends ten a second (an assumption)."""
+"""Number of a client's messages that may wait: a client that holds a key sends ten a second (an assumption)."""
 MESSAGES_A_SECOND, MESSAGES_AT_ONCE = 100.0, 500.0
-"""Messages of a client in the long run, and in one go; one that sends more is sent away."""
+"""Limits of a client's sustained rate of messages, and of messages at once; beyond them it is disconnected."""
 NOT_ALLOWED = 1008
 TOO_SLOW = 1013
 """Close code: try again later."""
 GOING_AWAY = 1001
 LOOK_EVERY = 1.0
-"""s between two looks at whether a client that takes nothing is to be dropped."""
-ADVICE = "docs/service.md tells what this socket takes"
+"""Time (s) between two checks whether a client that reads nothing must be dropped."""
+ADVICE = "docs/service.md describes the messages of this socket"
 log = logging.getLogger("server.live")
 Heard = tuple[str | None, float]
-"""A message's text, None where it is bytes, and when it arrived (s, monotonic)."""
+"""A message's text, None if it is bytes, and when it arrived (s, monotonic)."""
 
 
-async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
-    """Serves one client until it goes, or is dropped."""
+async def stream(socket: WebSocket, rig: RobotServices, caller: Caller, look_every: float = LOOK_EVERY) -> None:
+    """Serves one client until it leaves, or is dropped."""
     await socket.accept()
     client = Client(Outbox(rig.robot.clock.monotonic()), caller.name)
     rig.hub.join(client)
     heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
-    dropping = asyncio.create_task(_drop_if_hopeless(rig, client))
+    dropping = asyncio.create_task(_drop_if_hopeless(rig, client, look_every))
     tasks = [
         dropping,
         asyncio.create_task(_send(socket, rig, client)),
@@ -63,9 +64,9 @@ async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
     if dropping in done:
         rig.hub.dropped += 1
         log.warning("live client %s took nothing for too long and was dropped", client.name)
-        # Whoever reads nothing would not take the close either: the server ends the connection when this returns.
+        # A client that reads nothing does not read the close either; the server ends the connection when this returns.
         with suppress(TimeoutError, WebSocketDisconnect):
-            async with asyncio.timeout(LOOK_EVERY):
+            async with asyncio.timeout(look_every):
                 await socket.close(TOO_SLOW, "this client read too slowly")
 
 
@@ -85,8 +86,8 @@ async def _send(socket: WebSocket, rig: RobotServices, client: Client) -> None:
 
 
 async def _receive(socket: WebSocket, rig: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
-    """Waits for nothing but the client: the moment of a message is that of its arrival, whatever the one before it
-    waits for."""
+    """Receives messages, and waits for nothing else, so that each gets the time of its arrival even if the one before
+    it waits."""
     clock = rig.robot.clock
     room = Bucket(MESSAGES_A_SECOND, MESSAGES_AT_ONCE, MESSAGES_AT_ONCE, clock.monotonic())
     while True:
@@ -94,7 +95,7 @@ async def _receive(socket: WebSocket, rig: RobotServices, client: Client, heard:
         if message["type"] == "websocket.disconnect":
             return
         if room.take(clock.monotonic()) > 0:
-            log.warning("live client %s sends too many messages and was sent away", client.name)
+            log.warning("live client %s sends too many messages and was disconnected", client.name)
             await socket.close(NOT_ALLOWED, f"more than {MESSAGES_A_SECOND:g} messages a second")
             return
         try:
@@ -112,9 +113,9 @@ async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: 
         try:
             await _take(LiveRequest.model_validate_json(text), rig, client, caller, said)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = field_of(first["loc"]) if first["loc"] else "message"
-            _refuse(rig, client, f"{where}: {first['msg']}", ADVICE)
+            first = first_invalid(error)
+            where = field_of(first.place) if first.place else "message"
+            _refuse(rig, client, f"{where}: {first.message}", ADVICE)
         except ProblemError as error:
             _refuse(rig, client, error.detail, error.advice)
         except DaqError as error:
@@ -156,7 +157,7 @@ def _refuse(rig: RobotServices, client: Client, detail: str, advice: str) -> Non
     client.something.set()
 
 
-async def _drop_if_hopeless(rig: RobotServices, client: Client) -> None:
-    """Returns when the client is to be dropped."""
+async def _drop_if_hopeless(rig: RobotServices, client: Client, look_every: float) -> None:
+    """Returns when the client must be dropped."""
     while not client.outbox.is_hopeless(rig.robot.clock.monotonic()):
-        await asyncio.sleep(LOOK_EVERY)
+        await asyncio.sleep(look_every)

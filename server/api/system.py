@@ -26,7 +26,7 @@ from server.store.tables import TraceRow
 plain = APIRouter(tags=["system"])
 router = APIRouter(tags=["system"], responses=PROBLEMS)
 VERSION = version("ma2000-daq")
-NOT_WELL = "not well: a token is needed to be told more"
+NOT_WELL = "not well: details need a token"
 
 
 @plain.get("/healthz")
@@ -111,7 +111,7 @@ def _checks(services: Services) -> dict[str, str]:
 
 
 def _require_writable(folder: Path) -> None:
-    """Raises OSError where nothing can be written. The probe is a file without a name, so nobody sees it."""
+    """Raises OSError if nothing can be written. The probe is a file without a name, so nobody sees it."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(b"written")
 

@@ -17,10 +17,11 @@ from server.catalogue.catalogue import UPLOAD
 from server.catalogue.room import require_room
 from server.problems import ProblemError, conflict
 from server.services import RobotServices, Services
+from server.store.labels import trace_label
 
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
 LOOK_EVERY = 4 << 20
-"""Bytes after which is looked again whether the disk has room."""
+"""Number of bytes after which the free disk space is checked again."""
 ADVICE = "docs/traces.md tells what a trace looks like"
 
 
@@ -57,16 +58,18 @@ async def _write_body(request: Request, path: Path, largest: int) -> None:
 
 def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
     made = _read(path, rig, services)
-    target = rig.catalogue.folder / made.name
-    number = made.summary.trace_id or ""
-    if not rig.catalogue.move_in(made.path, target, made.summary):
-        raise conflict("trace-exists", f"trace {number} is there already", "nothing needs to be done")
-    services.record_event(rig.robot.name, "trace", f"trace {number} was uploaded", actor=caller.name)
-    return services.traces.get(rig.robot.name, number)
+    summary = made.summary
+    assert summary.trace_id is not None
+    assert summary.created is not None
+    label = trace_label(summary.name, summary.kind, made.name, summary.created)
+    if not rig.catalogue.move_in(made.path, rig.catalogue.folder / made.name, summary):
+        raise conflict("trace-exists", f"{label} exists already", "it is the same trace: nothing needs to be done")
+    services.record_event(rig.robot.name, "trace", f"{label} was uploaded", actor=caller.name)
+    return services.traces.get(rig.robot.name, summary.trace_id)
 
 
 def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
-    """Raises a 413 for what takes too much, a 422 for what is no trace."""
+    """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is not a trace."""
     try:
         limits = services.settings.traces.limits
         answer = services.uploads.ask(ReadUpload(path=path, folder=rig.catalogue.folder, limits=limits))
@@ -80,10 +83,10 @@ def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
         raise ProblemError(422, "not-a-trace", f"upload: {answer.problem}", ADVICE)
     made = UploadedTrace.model_validate(answer.data)
     if made.path.parent != path.parent:
-        raise ProblemError(422, "not-a-trace", "upload: its reader answered nonsense", ADVICE)
+        raise ProblemError(422, "not-a-trace", "upload: its reader gave an impossible answer", ADVICE)
     return made
 
 
 def _too_much(line: str) -> ProblemError:
-    advice = "server.upload_memory and server.upload_time set the limits, docs/service.md tells of them"
+    advice = "server.upload_memory and server.upload_time set the limits (docs/service.md)"
     return ProblemError(413, "too-large", f"upload: {line}", advice)

@@ -1,1 +1,1 @@
-"""Everything that a service keeps, in one file, and back: database, traces, models, results of jobs."""
+"""Backup and restore of everything that a service keeps, as one file: database, traces, models, results of jobs."""

@@ -1,4 +1,4 @@
-"""The database as a file of its own: copied while a service writes it, and looked at before it is trusted."""
+"""The database in a backup: copied while a service writes to it, and checked before it is restored."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from server.store.engine import BUSY_TIMEOUT_MS, migrations
 
 
 def copy_database(source: Path, target: Path) -> None:
-    """One moment of the database, whatever is written meanwhile (SQLite's online backup). Raises BackupError."""
+    """Copies the database as it is at one moment, whatever is written meanwhile (SQLite's online backup).
+    Raises BackupError."""
     if not source.is_file():
-        raise BackupError(f"database {source}: is not there: no service has run with this configuration yet")
+        raise BackupError(f"database {source}: does not exist: no service has run with this configuration yet")
     try:
         with (
             closing(sqlite3.connect(source, timeout=BUSY_TIMEOUT_MS / 1e3)) as here,
             closing(sqlite3.connect(target)) as there,
         ):
             here.backup(there)
-            there.execute("PRAGMA journal_mode=DELETE")  # one file, with nothing beside it
+            there.execute("PRAGMA journal_mode=DELETE")  # one file, without a write-ahead log beside it
     except sqlite3.Error as error:
         raise BackupError(f"database {source}: cannot be copied: {error}") from error
 
 
 def revision_of(database: Path) -> str | None:
-    """Of its tables; None for one without any. Raises BackupError when it is damaged."""
+    """Returns the revision of a database's tables; None if it has none. Raises BackupError when it is damaged."""
     try:
         with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
             found = connection.execute("PRAGMA integrity_check").fetchone()[0]
@@ -43,8 +44,8 @@ def revision_of(database: Path) -> str | None:
 
 
 def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
-    """The queue of `robot` is paused when a service begins with this database; one that is paused keeps its reason.
-    Raises BackupError."""
+    """Pauses the queue of `robot` in this database, for the service that will use it. A queue that is paused already
+    keeps its reason. Raises BackupError."""
     since = now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")  # as SQLAlchemy writes it
     line = "INSERT INTO queues (robot, paused, reason, since) VALUES (?, 1, ?, ?) ON CONFLICT (robot) DO UPDATE"
     changes = "SET paused = 1, reason = excluded.reason, since = excluded.since WHERE NOT paused"

@@ -1,4 +1,4 @@
-"""What a backup says about itself, and whether it is true."""
+"""The manifest of a backup, which lists its files with their digests, and the checks of the files against it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from typing import IO, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from firmware_protocol.invalid import first_invalid
 from server.backup.places import DATABASE, NAMES, BackupError
 
 FORMAT = 1
 MANIFEST = "manifest.json"
 LARGEST_MANIFEST = 256 << 20
 PIECE = 1 << 20
-"""Bytes read at once."""
+"""Number of bytes that are read at once."""
 DAMAGED = (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, UnicodeDecodeError, struct.error)
-"""What the reader of ZIP files raises for one whose structure is not as it should be."""
+"""Errors that `zipfile` raises for a damaged file."""
 Progress = Callable[[float, str], None]
 
 
@@ -36,7 +37,8 @@ class Entry(BaseModel):
 
 
 class Manifest(BaseModel):
-    """The whole backup. `revision` is that of the database's tables; `left_out` were deleted while it was made."""
+    """The list of a backup's files. `revision` is that of the database's tables; the files `left_out` were deleted
+    while the backup was made."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -50,26 +52,26 @@ class Manifest(BaseModel):
 
     @property
     def size(self) -> int:
-        """Bytes of all files."""
+        """The total size of all files, in bytes."""
         return sum(entry.size for entry in self.files)
 
     def count(self, kind: str) -> int:
-        """How many traces, models, jobs' files."""
+        """Returns the number of files of a kind: `traces`, `models` or `jobs`."""
         return sum(entry.name.startswith(f"{kind}/") for entry in self.files)
 
 
 @contextmanager
 def opened(archive: Path) -> Iterator[tuple[zipfile.ZipFile, Manifest]]:
-    """A backup, whose list of files is in order. Raises BackupError."""
+    """Opens a backup and checks its manifest. Raises BackupError."""
     try:
         with archive.open("rb") as stream, zipfile.ZipFile(stream) as pack:
             yield pack, _manifest(pack, archive)
     except DAMAGED as error:
-        raise BackupError(f"{archive}: is damaged, or no backup: {error}; nothing was changed") from error
+        raise BackupError(f"{archive}: is damaged, or not a backup: {error}; nothing was changed") from error
 
 
 def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) -> Manifest:
-    """Reads every byte of a backup. Raises BackupError unless all is there, and as it was written."""
+    """Reads every byte of a backup. Raises BackupError if a file is missing or differs from what was written."""
     try:
         with opened(archive) as (pack, manifest):
             done = 0
@@ -84,13 +86,13 @@ def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) ->
 
 
 def check(entry: Entry, found: str, archive: Path) -> None:
-    """Raises BackupError when a file is not as it was written."""
+    """Raises BackupError if the digest `found` differs from that of the file that was written."""
     if found != entry.sha256:
         raise BackupError(f"{archive}: {entry.name} is not as it was written: the backup is damaged")
 
 
 def pieces(stream: IO[bytes]) -> Iterator[bytes]:
-    """A file, piece by piece."""
+    """Reads a file piece by piece."""
     while piece := stream.read(PIECE):
         yield piece
 
@@ -105,13 +107,12 @@ def _digest(stream: IO[bytes]) -> str:
 def _manifest(pack: zipfile.ZipFile, archive: Path) -> Manifest:
     there = {info.filename: info for info in pack.infolist()}
     if MANIFEST not in there or there[MANIFEST].file_size > LARGEST_MANIFEST:
-        raise BackupError(f"{archive}: is no backup of a service: it has no {MANIFEST}; nothing was changed")
+        raise BackupError(f"{archive}: is not a backup of a service: it has no {MANIFEST}; nothing was changed")
     try:
         manifest = Manifest.model_validate_json(pack.read(MANIFEST))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        line = f"{archive}: {MANIFEST}: {where}: {first['msg']}; nothing was changed"
+        first = first_invalid(error)
+        line = f"{archive}: {MANIFEST}: {first.where()}: {first.message}; nothing was changed"
         raise BackupError(line) from error
     if manifest.format > FORMAT:
         line = f"{archive}: is a backup of format {manifest.format}, this version knows {FORMAT}; nothing was changed"
@@ -119,10 +120,10 @@ def _manifest(pack: zipfile.ZipFile, archive: Path) -> Manifest:
     listed = {entry.name: entry for entry in manifest.files}
     strange = next((name for name in listed if not NAMES.fullmatch(name)), None)
     if strange is not None:
-        raise BackupError(f"{archive}: {strange!r}: is no name of a file of a backup; nothing was changed")
+        raise BackupError(f"{archive}: {strange!r}: a backup has no file of this name; nothing was changed")
     wrong = sorted(set(listed) ^ (set(there) - {MANIFEST}))
     wrong += [name for name, entry in listed.items() if name in there and there[name].file_size != entry.size]
     if wrong or DATABASE not in listed or len(there) != len(pack.infolist()) or len(listed) != len(manifest.files):
-        line = f"{archive}: its files are not those of its list ({', '.join(wrong[:3]) or DATABASE}): it is damaged"
+        line = f"{archive}: its files differ from its list ({', '.join(wrong[:3]) or DATABASE}): it is damaged"
         raise BackupError(f"{line}; nothing was changed")
     return manifest

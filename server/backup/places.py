@@ -1,4 +1,4 @@
-"""Where a service keeps what is its own, and what each of it is called in a backup."""
+"""Where a service keeps its files, and the names of these files in a backup."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from daq.config import Settings
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.traces.layout import SUFFIX
 from server.store.lock import sqlite_file
@@ -17,18 +18,18 @@ NAMES = re.compile(
     r"database/service\.sqlite|traces/[^/\\]{1,250}\.mcap|models/[A-Za-z0-9_-]{1,64}\.json"
     r"|jobs/[0-9a-f]{12}/[A-Za-z0-9_-]{1,64}\.(json|html)"
 )
-"""What a backup may hold: nothing else is ever written anywhere."""
+"""Names that the files of a backup may have. A restore writes no file with any other name."""
 
 
 class BackupError(DaqError):
-    """A backup that cannot be made, is damaged, or does not belong here. Nothing was changed."""
+    """A backup cannot be made, is damaged, or belongs to another robot. Nothing was changed."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 @dataclass(frozen=True)
 class Places:
-    """Of one configuration. `url` is the database's, `database` its file."""
+    """Places of one configuration's files. `url` is the database's address, `database` its file."""
 
     robot: str
     url: str
@@ -37,14 +38,14 @@ class Places:
     service: Path
 
     def target(self, name: str) -> Path:
-        """Where a file of a backup belongs."""
+        """Returns the place of the file that has this name in a backup."""
         if name == DATABASE:
             return self.database
         kind, _, rest = name.partition("/")
         return (self.traces if kind == "traces" else self.service / kind) / rest
 
     def files(self) -> Iterator[tuple[str, Path]]:
-        """All files but the database, by their names in a backup. Those that are still being written are left out."""
+        """Yields all files except the database, with their names in a backup. It skips those still being written."""
         for path in sorted(self.traces.glob(f"*{SUFFIX}")):
             yield f"traces/{path.name}", path
         for path in sorted((self.service / "models").glob("*.json")):
@@ -56,10 +57,12 @@ class Places:
 
 
 def places_of(settings: Settings) -> Places:
-    """Raises BackupError for a database that is no file."""
+    """Returns the places of a configuration. Raises BackupError if its database is not a file."""
     url = settings.server.database_url
     database = sqlite_file(url)
     if database is None:
-        raise BackupError(f"database {url.partition(':')[0]}: is no file; use its own means, and copy the folders")
+        raise BackupError(
+            f"database {url.partition(':')[0]}: is not a file; back it up with its own tools, and copy the folders"
+        )
     traces, service = settings.traces.folder.absolute(), settings.server.folder.absolute()
     return Places(settings.robot.name, url, database, traces, service)

@@ -1,6 +1,6 @@
-"""Brings a backup back: checked to its last byte before anything is touched.
+"""Restores a backup, after every byte of it has been checked.
 
-What was there is put aside, and never deleted.
+Existing files are moved aside, and never deleted.
 """
 
 from __future__ import annotations
@@ -30,30 +30,38 @@ CHECK_SHARE, WRITE_SHARE = 0.4, 0.98
 
 @dataclass(frozen=True)
 class Restored:
-    """What was brought back, and the folders into which was put what had been there."""
+    """What was restored, and the folders into which the files that existed before were moved."""
 
     manifest: Manifest
     put_aside: tuple[Path, ...]
 
 
-def restore(archive: Path, places: Places, now: datetime, progress: Progress, *, overwrite: bool = False) -> Restored:
-    """Brings everything of a backup to the places of this configuration.
+def restore(
+    archive: Path,
+    places: Places,
+    now: datetime,
+    progress: Progress,
+    *,
+    overwrite: bool = False,
+    reserve: int = RESERVE,
+) -> Restored:
+    """Writes all files of a backup to the places of this configuration.
 
-    Raises BackupError when the backup is damaged or another robot's, or something is there and `overwrite` is False;
-    InUseError while a service runs. Nothing has been changed then.
+    Raises BackupError if the backup is damaged or another robot's, or if files exist there and `overwrite` is False;
+    raises InUseError while a service runs. Nothing has been changed then.
     """
     manifest = verify(archive, lambda fraction, text: progress(CHECK_SHARE * fraction, text))
     if manifest.robot != places.robot:
-        line = f"{archive}: is of robot {manifest.robot!r}, this configuration's is {places.robot!r}"
+        line = f"{archive}: is of robot {manifest.robot!r}; this configuration is for {places.robot!r}"
         raise BackupError(f"{line}; nothing was changed")
     require_known(manifest.revision)
     with sole_use(places.url):
         there = occupied(places)
         if there and not overwrite:
             names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
-            line = f"{len(there)} files or folders are there already ({names})"
-            raise BackupError(f"{line}: with --overwrite they are put aside; nothing was changed")
-        staged = _Staged(archive, places, now)
+            line = f"{len(there)} files or folders exist already ({names})"
+            raise BackupError(f"{line}: with --overwrite they are moved aside; nothing was changed")
+        staged = _Staged(archive, places, now, reserve)
         try:
             staged.write(manifest, lambda f, text: progress(CHECK_SHARE + (WRITE_SHARE - CHECK_SHARE) * f, text))
             aside = _put_aside(there, now)
@@ -66,7 +74,7 @@ def restore(archive: Path, places: Places, now: datetime, progress: Progress, *,
 
 
 def occupied(places: Places) -> list[Path]:
-    """What a restore would replace: the database and what belongs to it, traces, models, results of jobs."""
+    """Returns what a restore would replace: the database and its write-ahead log, traces, models, results of jobs."""
     beside = [places.database.with_name(places.database.name + end) for end in ("", "-wal", "-shm")]
     traces = [path for path in _entries(places.traces) if path.name.endswith((SUFFIX, PART_SUFFIX))]
     folders = [folder for name in ("models", "jobs") if _entries(folder := places.service / name)]
@@ -74,17 +82,18 @@ def occupied(places: Places) -> list[Path]:
 
 
 class _Staged:
-    """Files on their way: beside their places, on the same disk, so that moving them in is renaming."""
+    """Files extracted beside their places, on the same disk, so that moving each into place is a rename."""
 
-    def __init__(self, archive: Path, places: Places, now: datetime) -> None:
+    def __init__(self, archive: Path, places: Places, now: datetime, reserve: int) -> None:
         self._archive = archive
         self._now = now
         self._places = places
+        self._reserve = reserve
         self._moves: list[tuple[Path, Path]] = []
         self._folders = {folder / STAGING for folder in (places.database.parent, places.traces, places.service)}
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
-        """All files, each with its digest looked at once more. Raises BackupError, OSError."""
+        """Extracts all files, and checks the digest of each once more. Raises BackupError, OSError."""
         self.clear()
         for folder in self._folders:
             folder.mkdir(parents=True)
@@ -96,13 +105,13 @@ class _Staged:
                 self._extract(pack, entry)
                 done += entry.size
         if revision_of(self._staged(DATABASE)) != manifest.revision:
-            raise BackupError(f"{self._archive}: its database is not the one that its list tells of")
+            raise BackupError(f"{self._archive}: its database is not the one that its list names")
         if manifest.revision is not None:
             line = "restored from a backup: look at the arm, then resume the queue"
             hold_queue(self._staged(DATABASE), manifest.robot, line, self._now)
 
     def move_in(self) -> None:
-        """Every file to its place, and the names to the disk."""
+        """Moves every file into its place, and writes the folders to the disk."""
         for staged, target in self._moves:
             target.parent.mkdir(parents=True, exist_ok=True)
             staged.replace(target)
@@ -110,7 +119,7 @@ class _Staged:
             disk.sync_folder(folder)
 
     def clear(self) -> None:
-        """Nothing is left on its way."""
+        """Removes all extracted files that have not been moved."""
         for folder in self._folders:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -135,7 +144,7 @@ class _Staged:
         self._moves.append((path, self._places.target(entry.name)))
 
     def _lead_to_places(self, request: Path) -> None:
-        """A job says where its traces and models lie: here that is elsewhere, under the same names."""
+        """Changes the paths of traces and models in a job's request to this configuration's folders."""
         task = json.loads(request.read_text("utf-8"))
         for kind, folder in (("traces", self._places.traces), ("models", self._places.service / "models")):
             task[kind] = {number: str(folder / Path(file).name) for number, file in task.get(kind, {}).items()}
@@ -147,8 +156,8 @@ class _Staged:
     def _require_room(self, manifest: Manifest) -> None:
         for folder in self._folders:
             free = shutil.disk_usage(folder).free
-            if free < manifest.size + RESERVE:
-                needed = (manifest.size + RESERVE) / 1e6
+            if free < manifest.size + self._reserve:
+                needed = (manifest.size + self._reserve) / 1e6
                 raise BackupError(f"{folder.parent}: {free / 1e6:.0f} MB are free, {needed:.0f} MB are needed")
 
 

@@ -1,4 +1,4 @@
-"""Makes a backup, also while the service runs."""
+"""Writes a backup, also while the service runs."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from server.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, 
 from server.backup.places import DATABASE, BackupError, Places
 
 RESERVE = 20_000_000
-"""Bytes that stay free beside a backup."""
+"""Number of bytes that must stay free on the disk beside a backup."""
 
 
-def back_up(places: Places, target: Path, now: datetime, progress: Progress) -> Manifest:
-    """Writes a backup to `target`, whole or not at all, for nobody else to read: hashes of tokens are in it.
+def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, reserve: int = RESERVE) -> Manifest:
+    """Writes a backup to `target`, completely or not at all. Other users cannot read it: it holds hashes of tokens.
 
-    The database is taken first, in one moment: every file that it names is there by then, and is taken after it. What
-    is deleted meanwhile is left out, and told. Raises BackupError.
+    The database is copied first, as it is at one moment: every file that it names exists by then, and is copied after
+    it. Files deleted meanwhile are left out, and the manifest lists them. Raises BackupError.
     """
     if target.exists():
-        raise BackupError(f"{target}: is there already; a backup is never written over")
+        raise BackupError(f"{target}: exists already; a backup is never overwritten")
     try:
         with tempfile.TemporaryDirectory(prefix=".backup-", dir=target.absolute().parent) as folder:
             database = Path(folder) / "service.sqlite"
             copy_database(places.database, database)
             revision = revision_of(database)
             files = [(DATABASE, database), *places.files()]
-            _require_room(target.absolute().parent, files)
+            _require_room(target.absolute().parent, files, reserve)
             part = Path(folder) / "backup.zip"
             entries, left_out = _pack(part, files, progress)
             manifest = Manifest(
@@ -51,7 +51,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress) -> 
             with part.open("rb") as stream:
                 os.fsync(stream.fileno())
             if target.exists():
-                raise BackupError(f"{target}: was made by somebody else meanwhile; it was not written over")
+                raise BackupError(f"{target}: was made by somebody else meanwhile; it was not overwritten")
             part.replace(target)
             disk.sync_folder(target.absolute().parent)
     except OSError as error:
@@ -60,7 +60,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress) -> 
 
 
 def _pack(part: Path, files: list[tuple[str, Path]], progress: Progress) -> tuple[list[Entry], list[str]]:
-    """What was put in, and what had gone."""
+    """Writes the files into the archive. Returns the entries written, and the names of files that were gone."""
     entries, left_out = [], []
     descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
     with os.fdopen(descriptor, "w+b") as stream, zipfile.ZipFile(stream, "w") as pack:
@@ -83,8 +83,8 @@ def _put(pack: zipfile.ZipFile, name: str, path: Path) -> Entry:
     return Entry(name=name, size=size, sha256=digest.hexdigest())
 
 
-def _require_room(folder: Path, files: list[tuple[str, Path]]) -> None:
-    needed = sum(path.stat().st_size for _, path in files if path.is_file()) + RESERVE
+def _require_room(folder: Path, files: list[tuple[str, Path]], reserve: int) -> None:
+    needed = sum(path.stat().st_size for _, path in files if path.is_file()) + reserve
     free = shutil.disk_usage(folder).free
     if free < needed:
         raise BackupError(f"{folder}: {free / 1e6:.0f} MB are free, a backup needs {needed / 1e6:.0f} MB")

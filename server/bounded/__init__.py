@@ -1,1 +1,1 @@
-"""Processes with limits of memory and time, which handle untrusted input so that it cannot harm the service."""
+"""Processes with limited memory and time, which handle untrusted input so that it cannot harm the service."""

@@ -1,5 +1,5 @@
-"""Orders to a process with limits, and its answers: one JSON object a line each way, so that nothing that a file makes
-of its reader can reach the service but data."""
+"""Orders to a process with limits, and its answers: one JSON object a line in each direction, so that nothing but data
+reaches the service, whatever a file does to its reader."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class _Message(BaseModel):
 
 
 class Limits(_Message):
-    """What one order may take: bytes of memory, and s."""
+    """What one order may use: `memory` in bytes, and time in s."""
 
     memory: int
     seconds: float
 
 
 class ReadUpload(_Message):
-    """Read a file from elsewhere as a trace. `folder`: where a trace that is made of a CSV file is written."""
+    """Reads an uploaded file as a trace. `folder`: where the trace made from a CSV file is written."""
 
     kind: Literal["upload"] = "upload"
     path: Path
@@ -35,7 +35,8 @@ class ReadUpload(_Message):
 
 
 class WorkOutMotion(_Message):
-    """Plan an experiment and hold it against the machine's limits; `most_shown`: set points of the answer."""
+    """Plans an experiment and checks it against the machine's limits. `most_shown`: the number of set points in the
+    answer, at most."""
 
     kind: Literal["motion"] = "motion"
     spec: ExperimentSpec
@@ -48,7 +49,7 @@ ORDER: TypeAdapter[ReadUpload | WorkOutMotion] = TypeAdapter(Order)
 
 
 class UploadedTrace(_Message):
-    """A file that is a trace: where it lies, the name that it gets, what it says about itself."""
+    """An uploaded file that is a trace: its path, the name that it gets, and its summary."""
 
     path: Path
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,120}\.mcap$")]
@@ -56,9 +57,14 @@ class UploadedTrace(_Message):
 
 
 class Answer(_Message):
-    """`problem`: what is wrong with what was sent, in one line; empty where nothing is. `exhausted`: it is nothing but
-    too much. `no_room`: nothing is wrong but that the disk is full. `fault`: a traceback, where the line is that of an
-    error that nobody has foreseen. `spent`: this process has grown, and is not to be used again."""
+    """The answer to an order.
+
+    problem:   what is wrong with the input, in one line; empty if nothing is
+    exhausted: the input needs too much memory
+    no_room:   the disk is full; nothing else is wrong
+    fault:     the traceback of an unforeseen error, whose text is in `problem`
+    spent:     this process has grown too large or has failed, and must not be used again
+    """
 
     problem: str = ""
     exhausted: bool = False

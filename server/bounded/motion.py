@@ -1,4 +1,4 @@
-"""The motion of an experiment, worked out and held against the machine's limits."""
+"""The motion of an experiment, computed and checked against the machine's limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from server.bounded.messages import WorkOutMotion
 
 
 def preview_of(order: WorkOutMotion) -> MotionPreview:
-    """Of a longer motion than is shown every second, third, … set point. Raises SpecError."""
+    """Plans the motion. If it has more than `most_shown` set points, the preview has every second, third, … one.
+    Raises SpecError."""
     machine = order.machine
     motion = plan(order.spec, machine, start_angles(order.spec, machine))
     violations = check_plan(motion, machine, machine.limits)
@@ -29,7 +30,7 @@ def preview_of(order: WorkOutMotion) -> MotionPreview:
 
 
 def _as_json(violation: Violation) -> MotionViolation:
-    """JSON knows no infinity."""
+    """Converts a violation for JSON, which has no infinity: such a number becomes None."""
     value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
     return MotionViolation(
         rule=violation.rule,

@@ -1,4 +1,4 @@
-"""A process with limits, from its first order to its last."""
+"""The main program of a process with limited memory and time."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from server.problems import NO_ROOM
 
 NICENESS = 10
 GROWN = 256 << 20
-"""Bytes of resident memory at most, so far, beyond which a process is ended rather than kept."""
+"""Peak resident memory in bytes beyond which a process ends after its answer, and is not reused."""
 LONGEST_LINE = 300
 OOM_SCORE = "800"
-"""Of 1000: where the computer runs out of memory, this process goes and not the service."""
+"""Out of 1000: when the computer runs out of memory, the kernel ends this process before the service."""
 
 
 def main() -> int:
-    """Reads the limits, then orders, and answers them, until the service closes its end."""
+    """Reads the limits, then reads orders and answers them until the service closes its end."""
     os.nice(NICENESS)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE, "ascii")
@@ -45,7 +45,7 @@ def main() -> int:
 
 
 def answer_order(line: str, limits: Limits) -> Answer:
-    """One order carried out. Whatever is wrong with what was sent is a line."""
+    """Carries out one order. Whatever is wrong with the input becomes one line of the answer."""
     try:
         order = ORDER.validate_json(line)
         done = read_upload(order) if isinstance(order, ReadUpload) else preview_of(order)
@@ -53,17 +53,17 @@ def answer_order(line: str, limits: Limits) -> Answer:
     except DaqError as error:
         return Answer(problem=_short(str(error)), no_room=_is_of_the_disk(error), spent=_has_grown())
     except MemoryError:
-        line = f"needs more than the {limits.memory >> 20} MB of memory that there are for it"
+        line = f"needs more than the {limits.memory >> 20} MB of memory that it may use"
         return Answer(problem=line, exhausted=True, spent=True)
     except RecursionError:
         return Answer(problem="is nested too deeply", spent=True)
-    except Exception as error:  # noqa: BLE001 - whatever a file makes of its reader is what is wrong with the file
+    except Exception as error:  # noqa: BLE001 - whatever its reader raises, the file is to blame
         line = f"cannot be read: {type(error).__name__}: {error}"
         return Answer(problem=_short(line), fault=traceback.format_exc()[-4000:], spent=True)
 
 
 def _is_of_the_disk(error: BaseException | None) -> bool:
-    """Whether nothing more can be written, at the end of what caused an error."""
+    """Whether an error, or one of its causes, says that nothing more can be written."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             return True
@@ -72,38 +72,38 @@ def _is_of_the_disk(error: BaseException | None) -> bool:
 
 
 def _listen(orders: queue.SimpleQueue[str]) -> None:
-    """Ends this process with the service, in the middle of whatever it does."""
+    """Passes on the orders, and ends this process at once when the service ends, whatever it is doing."""
     for line in sys.stdin:
         orders.put(line)
     os._exit(0)
 
 
 def _limit(limits: Limits) -> None:
-    """Of what this process may have; what it had for itself when it began is not counted."""
+    """Limits the memory of this process, not counting what it used when it began, and switches off core dumps."""
     own = _virtual_data()
     resource.setrlimit(resource.RLIMIT_DATA, (own + limits.memory, own + limits.memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _limit_time(seconds: float) -> None:
-    """Where nobody is there any more to end it, the system does."""
+    """Limits the processor time of an order, so that the system ends this process if the service no longer can."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime + seconds) + 2, hard))
 
 
 def _virtual_data() -> int:
-    """Bytes that RLIMIT_DATA counts."""
+    """Returns the number of bytes that RLIMIT_DATA counts."""
     return _memory("VmData")
 
 
 def _has_grown() -> bool:
-    """Not by `ru_maxrss`, which a process inherits from the one that starts it."""
+    """Whether its peak memory exceeds GROWN. `ru_maxrss` does not tell: a process inherits it from its parent."""
     return _memory("VmHWM") > GROWN
 
 
 def _memory(name: str) -> int:
-    """Bytes of a kind of memory of this process, as the kernel counts it; 0 where it does not say."""
+    """Returns the bytes of one kind of memory of this process, as the kernel counts it; 0 if it does not say."""
     with suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/self/status").read_text("ascii").splitlines():
             if line.startswith(f"{name}:"):

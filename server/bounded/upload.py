@@ -1,4 +1,4 @@
-"""Reading a file from elsewhere as a trace: all of it, so that nothing that the service does with it later is new."""
+"""Reads an uploaded file as a trace, completely, so that the service can rely on every part of it later."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from daq.traces.summary import joint_figures
 from server.bounded.messages import ReadUpload, UploadedTrace
 
 SAFE_NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
-"""A file's number becomes part of its name: nothing in it may be a path."""
+"""A trace's number becomes part of its file's name, so it must not hold parts of a path."""
 LONGEST = {"operator": 100, "robot": 100, "software": 200, "notes": 10_000}
-"""Characters of what a record says about itself: lists show it."""
+"""Largest number of characters of the texts of a record that lists show."""
 SIGNALS = ("time", "position", "set_point", "error", "drive", "velocity", "host_time")
 
 
 def read_upload(order: ReadUpload) -> UploadedTrace:
-    """The trace in a file. Raises TraceError, and whatever a damaged file makes of its reader."""
+    """Reads the trace in a file. Raises TraceError, and any error that a damaged file causes in its reader."""
     path = order.path
     try:
         trace = import_csv(path, order.limits) if path.suffix == ".csv" else read_trace(path, order.limits)
@@ -44,10 +44,10 @@ def read_upload(order: ReadUpload) -> UploadedTrace:
 
 
 def _require_sound(trace: Trace) -> None:
-    """Raises TraceError for what could be read, and not be shown."""
+    """Raises TraceError for a trace that can be read but not shown."""
     record = trace.record
     if not SAFE_NUMBER.fullmatch(record.trace_id):
-        raise TraceError("trace_id: is not the number of a trace: letters, digits, - and _ are allowed, 64 at most")
+        raise TraceError("trace_id: is not a valid number of a trace: letters, digits, - and _ are allowed, 64 at most")
     for name, most in LONGEST.items():
         told = getattr(record, name) or ""
         if len(told) > most:
@@ -66,7 +66,7 @@ def _require_sound(trace: Trace) -> None:
 
 
 def _require_finite(record: TraceRecord, trace: Trace) -> None:
-    """What is worked out of a trace can be told in JSON, which knows no infinity. Raises TraceError."""
+    """Raises TraceError if a figure computed from the trace is not finite: JSON has no infinity."""
     with np.errstate(all="ignore"):
         figures = [figure.model_dump() for figure in joint_figures(trace)]
     told = {"record": record.model_dump(), "figures": figures, "events": [event.model_dump() for event in trace.events]}
@@ -76,7 +76,7 @@ def _require_finite(record: TraceRecord, trace: Trace) -> None:
 
 
 def _not_finite(value: object, where: str) -> str | None:
-    """Where a number is that is not finite; None where all are."""
+    """Returns the place of the first number that is not finite; None if all are."""
     if isinstance(value, float):
         return None if math.isfinite(value) else where
     parts: list[tuple[object, object]] = []
@@ -89,12 +89,12 @@ def _not_finite(value: object, where: str) -> str | None:
 
 
 def _require_true(summary: TraceSummary, trace: Trace) -> None:
-    """The catalogue takes what the end of a file says; here it is held against the file. Raises TraceError."""
+    """Checks the summary at the end of a file, which the catalogue relies on, against the file. Raises TraceError."""
     if summary.state != "finished" or summary.trace_id != trace.record.trace_id or summary.joints != trace.joints:
-        raise TraceError(summary.problem or "its index is not that of its records")
+        raise TraceError(summary.problem or "its index does not match its records")
     length = float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0
     told = summary.samples, summary.duration
     if told != (None, None) and (
         told[0] != len(trace) or told[1] is None or not math.isclose(told[1], length, abs_tol=1e-6)
     ):
-        raise TraceError(f"its end tells of {told[0]} samples in {told[1]} s; it has {len(trace)} in {length:g} s")
+        raise TraceError(f"its summary says {told[0]} samples in {told[1]} s; it has {len(trace)} in {length:g} s")

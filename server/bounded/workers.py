@@ -1,4 +1,4 @@
-"""The service's side: starts processes with limits, gives them orders, and ends those that take too much."""
+"""The service's side: starts processes with limits, gives them orders, and ends those that use too much."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from server.bounded.messages import Answer, Limits, ReadUpload, WorkOutMotion
 from server.problems import ProblemError
 
 LARGEST_ANSWER = 64 << 20
-"""Bytes of one line."""
+"""Number of bytes of one line, at most."""
 PIECE = 1 << 16
 START_WITHIN = 30.0
-"""s for a process to begin, on a computer that is busy: not counted as the order's own."""
+"""Time (s) for a process to start on a busy computer. It is granted in addition to the order's own time."""
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 log = logging.getLogger("server.bounded")
 
 
 class ExhaustedError(Exception):
-    """An order that took more than it may, or the process with it. Its text is one line."""
+    """An order used more time or memory than it may, or its process ended. The text is one line."""
 
 
 class Workers:
-    """Up to `most` processes, started when they are needed and kept while they stay small. Safe to use from any thread;
-    `ask` waits, and belongs into a thread."""
+    """Up to `most` processes, started when they are needed and kept while they stay small. Safe to use from any thread.
+    `ask` blocks, so call it on a thread."""
 
-    def __init__(self, limits: Limits, most: int) -> None:
+    def __init__(self, limits: Limits, most: int, start_within: float = START_WITHIN) -> None:
         self._limits = limits
+        self._start_within = start_within
         self._room = threading.BoundedSemaphore(most)
         self._lock = threading.Lock()
         self._idle: list[_Worker] = []
@@ -41,7 +42,8 @@ class Workers:
         self._closed = False
 
     def ask(self, order: ReadUpload | WorkOutMotion) -> Answer:
-        """Its answer. Raises ExhaustedError where there is none, and a 503 once the service ends."""
+        """Has an order carried out, and returns the answer. Raises ExhaustedError if there is none, and a 503 once the
+        service ends."""
         with self._room:
             worker = self._taken()
             try:
@@ -60,23 +62,23 @@ class Workers:
         return answer
 
     def close(self) -> None:
-        """Ends all of them, whatever they do."""
+        """Ends all processes, whatever they are doing."""
         with self._lock:
             self._closed = True
             idle, busy = self._idle, set(self._busy)
             self._idle = []
         for worker in busy:
-            worker.end()  # whoever asked it tidies up
+            worker.end()  # the thread that waits for it tidies up
         for worker in idle:
             worker.kill()
 
     def idle_processes(self) -> tuple[int, ...]:
-        """Numbers of those that wait for an order."""
+        """Returns the process numbers of those that wait for an order."""
         with self._lock:
             return tuple(worker.number for worker in self._idle)
 
     def busy_processes(self) -> tuple[int, ...]:
-        """Numbers of those that carry one out."""
+        """Returns the process numbers of those that carry out an order."""
         with self._lock:
             return tuple(worker.number for worker in self._busy)
 
@@ -90,7 +92,7 @@ class Workers:
                     break
                 worker.kill()
             else:
-                worker = _Worker(self._limits)
+                worker = _Worker(self._limits, self._start_within)
             self._busy.add(worker)
             return worker
 
@@ -103,7 +105,7 @@ class Workers:
 
 
 class _Worker:
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, start_within: float) -> None:
         self._limits = limits
         self._process = subprocess.Popen(
             [sys.executable, "-m", "server.bounded"],
@@ -113,21 +115,21 @@ class _Worker:
             start_new_session=True,
             env=os.environ | ONE_THREAD,
         )
-        self._allowance = START_WITHIN
+        self._allowance = start_within
         self._write(limits.model_dump_json())
 
     @property
     def number(self) -> int:
-        """Of the process."""
+        """The process number."""
         return self._process.pid
 
     @property
     def lives(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the process is still running."""
         return self._process.poll() is None
 
     def ask(self, order: ReadUpload | WorkOutMotion) -> Answer:
-        """Raises ExhaustedError."""
+        """Sends an order and waits for the answer. Raises ExhaustedError."""
         until = time.monotonic() + self._limits.seconds + self._allowance
         self._allowance = 0.0
         self._write(order.model_dump_json())
@@ -135,15 +137,15 @@ class _Worker:
         try:
             return Answer.model_validate_json(line)
         except ValueError:
-            raise ExhaustedError("its reader answered nothing that can be understood") from None
+            raise ExhaustedError("its reader sent an answer that cannot be understood") from None
 
     def end(self) -> None:
-        """At once. From any thread."""
+        """Ends the process at once. May be called from any thread."""
         with suppress(ProcessLookupError):
             self._process.kill()
 
     def kill(self) -> None:
-        """The same, and tidies up. It may be called again."""
+        """Ends the process and closes its streams. May be called again."""
         self.end()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
@@ -154,7 +156,7 @@ class _Worker:
 
     def _write(self, line: str) -> None:
         assert self._process.stdin is not None
-        with suppress(OSError):  # it has ended, which its answer tells
+        with suppress(OSError):  # the process has ended; reading its answer will say why
             self._process.stdin.write(line.encode() + b"\n")
             self._process.stdin.flush()
 
@@ -164,20 +166,20 @@ class _Worker:
         poll.register(number, select.POLLIN)
         while not pieces.endswith(b"\n"):
             if not poll.poll(max(0.0, 1e3 * (until - time.monotonic()))):
-                raise ExhaustedError(f"takes more than the {self._limits.seconds:g} s that there are for it")
+                raise ExhaustedError(f"takes more than the {self._limits.seconds:g} s that it may take")
             piece = os.read(number, PIECE)
             if not piece:
                 raise ExhaustedError(self._why_ended())
             pieces += piece
             if len(pieces) > LARGEST_ANSWER:
-                raise ExhaustedError("its reader answered too much")
+                raise ExhaustedError("its reader sent too long an answer")
         return bytes(pieces)
 
     def _why_ended(self) -> str:
         with suppress(subprocess.TimeoutExpired):
             code = self._process.wait(1.0)
             if code == -signal.SIGXCPU:
-                return f"takes more than the {self._limits.seconds:g} s that there are for it"
+                return f"takes more than the {self._limits.seconds:g} s that it may take"
             if code < 0:
                 name = signal.Signals(-code).name
                 return f"its reader was ended by {name}: it is damaged, or needs too much memory"
@@ -185,5 +187,5 @@ class _Worker:
 
 
 def ending() -> ProblemError:
-    """A 503: the service ends."""
-    return ProblemError(503, "ending", "the service ends", "ask again when it is back", (), {"Retry-After": "10"})
+    """Returns a 503: the service is ending."""
+    return ProblemError(503, "ending", "the service is ending", "try again when it is back", (), {"Retry-After": "10"})

@@ -1,1 +1,1 @@
-"""The traces of the folder, in the catalogue: what lies there is the truth, the table finds it."""
+"""The catalogue of the traces in the folder. The files are authoritative; the table makes them searchable."""

@@ -20,16 +20,16 @@ from server.store.experiments import ExperimentStore
 from server.store.traces import NewTrace, TraceStore
 
 UPLOAD = ".upload-"
-"""Begins the name of a folder that an upload is written to."""
+"""Beginning of the name of a folder into which an upload is written."""
 UPLOAD_IS_OLD = 2 * 3600.0
-"""s after which nothing is written to it any more: its reader has an hour at most."""
+"""Time (s) after which such a folder is no longer in use, since its reader has an hour at most."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
-"""Characters of an error that the log shows."""
+"""Number of characters of an error that the log shows."""
 
 
 def is_text(name: str) -> bool:
-    """Whether a name of a file can be written as UTF-8, as the database keeps it."""
+    """Whether the name of a file can be written as UTF-8, as the database needs it."""
     return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
@@ -52,7 +52,8 @@ class Catalogue:
         self.limits = limits
 
     def bring_up_to_date(self) -> int:
-        """Finishes what a crash left, and takes in every file that the table does not know. Returns how many."""
+        """Salvages traces that a crash left unfinished, and adds every file that is not in the table. Returns how many
+        were added."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with self._lock:
             for salvaged in salvage_folder(self.folder, self.limits):
@@ -67,28 +68,27 @@ class Catalogue:
             return sum(self._take_in(self.folder / name) is not None for name in sorted(there - known))
 
     def clear_uploads(self) -> None:
-        """Takes away what uploads left that were interrupted. Young ones may be another service's on this folder."""
+        """Deletes the folders of interrupted uploads. Recent ones may belong to another service with this folder."""
         old = time.time() - UPLOAD_IS_OLD
         for left in self.folder.glob(f"{UPLOAD}*"):
-            with suppress(OSError):  # another may be at it
+            with suppress(OSError):  # another service may be deleting it
                 if left.is_dir() and not left.is_symlink() and left.stat().st_mtime < old:
                     shutil.rmtree(left)
-                    log.info("took away %s: its upload was interrupted", left)
+                    log.info("deleted %s: its upload was interrupted", left)
 
     def add(self, path: Path) -> str | None:
-        """Takes in one finished file. Returns its number; None when it is no trace, which the log tells."""
+        """Adds one finished file. Returns the trace's number; None if the file is not a trace, which the log says."""
         with self._lock:
             summary = self._take_in(path)
             return None if summary is None else summary.trace_id
 
     def move_in(self, source: Path, target: Path, summary: TraceSummary) -> bool:
-        """Takes in a finished file from elsewhere on this disk, as `target` of the folder, which says `summary` about
-        itself; False, and nothing is changed, when a trace of this number is there. Raises a 409 when a file of this
-        name is."""
-        with self._lock:  # whoever else looks into the folder finds both file and row, or neither
+        """Moves a finished file with this summary from elsewhere on the disk to `target` in the folder, and adds it.
+        Returns False, and changes nothing, if a trace with its number exists. Raises a 409 if `target` exists."""
+        with self._lock:  # others who look into the folder find both file and row, or neither
             if target.exists():
                 advice = "it is the same trace: nothing needs to be done"
-                raise conflict("trace-exists", f"{target.name} is there already", advice)
+                raise conflict("trace-exists", f"{target.name} exists already", advice)
             taken = False
             try:
                 disk.rename(source, target)
@@ -96,13 +96,13 @@ class Catalogue:
             finally:
                 if not taken:
                     target.unlink(missing_ok=True)
-            if taken:  # whatever becomes of this, the trace is there: file and row
+            if taken:  # even if this fails, the trace is in the catalogue, with file and row
                 self._tell(summary)
             return taken
 
     def remove(self, identity: str) -> Path:
-        """Takes a trace away for good, also one whose file is gone already; where its file was. Raises a 404, a 409
-        when something refers to it, and OSError where the file cannot be taken away: nothing has changed then."""
+        """Deletes a trace for good, also if its file is gone already, and returns the file's path. Raises a 404, a 409
+        if something uses the trace, and OSError if the file cannot be deleted; nothing has changed then."""
         path = self.folder / self._traces.file_of(self._robot, identity)
 
         def take_away() -> None:
@@ -114,16 +114,17 @@ class Catalogue:
         return path
 
     def path_of(self, identity: str) -> Path:
-        """The file of a trace. Raises a 404, also when the file has been taken away."""
+        """Returns the file of a trace. Raises a 404, also if the file is gone."""
         name = self._traces.file_of(self._robot, identity)
         path = self.folder / name
         if not path.is_file():
-            advice = "it was taken out of the folder of traces: upload it again, or delete it"
+            advice = "it was removed from the folder of traces: upload it again, or delete the trace"
             raise not_found(f"file for trace {identity!r} any more", advice)
         return path
 
     def _take_in(self, path: Path) -> TraceSummary | None:
-        """Whatever one file is or says, the others are taken in. Raises OperationalError: the database fails."""
+        """Adds one file. A file that cannot be added is logged, so that it does not keep the others out. Raises
+        OperationalError if the database fails."""
         try:
             if not is_text(path.name):
                 log.warning("not in the catalogue: %r: its name is not UTF-8; rename it", str(path))
@@ -141,7 +142,7 @@ class Catalogue:
         return summary
 
     def _tell(self, summary: TraceSummary) -> None:
-        """Tells the experiment that the trace is of, where there is one."""
+        """Passes the outcome on to the experiment of the trace, if there is one."""
         assert summary.trace_id is not None
         self._experiments.traced(summary.trace_id, summary.outcome)
 

@@ -1,4 +1,4 @@
-"""The room that there is for traces, and whether it is enough for another: asked when an experiment is submitted."""
+"""The free disk space for traces, and whether it is enough for another one, checked when an experiment is submitted."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from server.problems import ProblemError
 
 
 def free_room(folder: Path) -> int:
-    """Bytes that are free for traces. Raises a 503 where the folder is away: a disk that is not mounted, say."""
+    """Returns the free bytes for traces. Raises a 503 if the folder does not exist: its disk may not be mounted."""
     try:
         return shutil.disk_usage(folder).free
     except OSError as error:
@@ -19,7 +19,7 @@ def free_room(folder: Path) -> int:
 
 
 def require_room(folder: Path) -> None:
-    """Raises a 507 where there is too little, a 503 where the folder is away."""
+    """Raises a 507 if too little space is free, and a 503 if the folder does not exist."""
     free = free_room(folder)
     if free < RESERVE:
         line = f"{free / 1e6:.0f} MB are free for traces, {RESERVE / 1e6:.0f} MB stay free"

@@ -1,4 +1,4 @@
-"""Signals of a trace for a plot of so many points. Pure."""
+"""Thins the signals of a trace for a plot with a given number of points. Pure."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ SIGNALS = ("position", "set_point", "error", "drive")
 
 @dataclass(frozen=True)
 class Thinned:
-    """`time` (p,) s; each signal (p, j), or None where the trace has not got it."""
+    """`time` (p,) in s; each signal (p, j), or None if the trace does not have it."""
 
     time: Floats
     signals: dict[str, Floats | None]
 
 
 def thinned(trace: Trace, points: int, start: float | None = None, end: float | None = None) -> Thinned:
-    """Signals between `start` and `end` (s) in about `points` points.
+    """Returns the signals between `start` and `end` (s) in about `points` points.
 
-    Stretches of equal length are replaced by their smallest and their largest value, at the stretch's first and last
-    moment: no peak is lost, and none is moved by more than one stretch. Their order is that of the stretch's ends,
-    rising or falling.
+    Each of many stretches of equal length is replaced by its smallest and its largest value, at the stretch's first and
+    last time. So no peak is lost, and none is moved by more than one stretch. The larger value comes first if the
+    signal falls from the stretch's first sample to its last.
     """
     chosen = np.ones(len(trace), bool)
     if start is not None:
@@ -41,19 +41,19 @@ def thinned(trace: Trace, points: int, start: float | None = None, end: float | 
 
 
 def stretches(samples: int, points: int) -> NDArray[np.int64] | None:
-    """Where each of `points // 2` stretches begins; None where there are not more samples than points."""
+    """Returns the first sample of each of `points // 2` stretches; None if there are no more samples than points."""
     if samples <= max(points, 2):
         return None
     return np.linspace(0, samples, max(1, points // 2) + 1).astype(np.int64)[:-1]
 
 
 def moments(time: Floats, first: NDArray[np.int64]) -> Floats:
-    """(2 · stretches,): the first and the last moment of every stretch."""
+    """Returns (2 · stretches,): the first and the last time of every stretch."""
     return np.stack([time[first], time[_last(len(time), first)]], axis=1).ravel()
 
 
 def extremes(signal: Floats, first: NDArray[np.int64]) -> Floats:
-    """(2 · stretches, j): of every stretch the smaller and the larger extreme, the earlier one first."""
+    """Returns (2 · stretches, j): the minimum and the maximum of every stretch; the maximum first if it falls."""
     low, high = np.minimum.reduceat(signal, first), np.maximum.reduceat(signal, first)
     falling = signal[first] > signal[_last(len(signal), first)]
     pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=1)

@@ -1,16 +1,14 @@
-"""What the end of a run means for its experiment and for the queue. Pure."""
+"""The meaning of a run's end for its experiment and for the queue. Pure."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from daq.contracts import exit_codes
 from daq.contracts.trace import Outcome
 from server.experiments.states import Event
 from server.owner.messages import Answer
 
-EXIT_REFUSED = (2, 4)
-EXIT_NOT_REACHED = 3
-EXIT_STOPPED = 6
 _OF_OUTCOME: dict[Outcome, Event] = {
     "complete": Event.COMPLETED,
     "stopped": Event.STOPPED,
@@ -21,10 +19,7 @@ _OF_OUTCOME: dict[Outcome, Event] = {
 
 @dataclass(frozen=True)
 class Ending:
-    """How an experiment ended. `holds_queue`: a person looks at the arm before the next one runs.
-
-    untaken: its trace could not be taken into the catalogue
-    """
+    """How an experiment ended. `untaken`: its trace could not be added to the catalogue."""
 
     event: Event
     reason: str
@@ -33,16 +28,17 @@ class Ending:
 
     @property
     def holds_queue(self) -> bool:
-        """All but a plan carried out, its trace being known, and a plan refused before anything moved."""
+        """Whether a person must look at the arm before the next experiment runs: always, except after a completed plan
+        whose trace is in the catalogue, or after a plan refused before anything moved."""
         return self.untaken or self.event not in (Event.COMPLETED, Event.REFUSED)
 
 
 def ending_of(answer: Answer) -> Ending:
-    """The ending that the owner's answer reports."""
+    """Returns the ending that the answer of the port's owner reports."""
     if answer.finished is not None:
         return Ending(_OF_OUTCOME[answer.finished.outcome], answer.finished.reason, answer.finished.outcome)
-    if answer.exit_code in EXIT_REFUSED:
+    if answer.exit_code in (exit_codes.WRONG_INPUT, exit_codes.REFUSED):
         return Ending(Event.REFUSED, answer.problem)
-    if answer.exit_code == EXIT_NOT_REACHED:
+    if answer.exit_code == exit_codes.NOT_REACHED:
         return Ending(Event.LOST, answer.problem)
-    return Ending(Event.STOPPED if answer.exit_code == EXIT_STOPPED else Event.FAULT, answer.problem)
+    return Ending(Event.STOPPED if answer.exit_code == exit_codes.STOPPED else Event.FAULT, answer.problem)

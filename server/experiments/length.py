@@ -1,4 +1,4 @@
-"""The least length of an experiment, by which one that is far too long is refused before it is planned. Pure."""
+"""The least duration of an experiment, so that one that is far too long is refused before it is planned. Pure."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ from daq.contracts.experiment import (
 )
 
 LONGEST = 4 * 3600.0
-"""s of one experiment: 720 000 control periods, a trace of some 300 MB. A choice; a schedule makes longer studies."""
+"""Longest duration (s) of one experiment: 720 000 control periods, a trace of some 300 MB. It was chosen freely; a
+schedule runs longer studies."""
 
 
 def least_length(spec: ExperimentSpec) -> float:
-    """s that the record takes, the slow ways back between repeats left out: the planner refuses what they make longer
-    than 4 h, and fills no memory until then."""
+    """Returns the duration (s) of the record without the slow returns between repeats. The planner refuses a plan that
+    these make longer than 4 h, before it fills the memory."""
     return spec.repeats * (spec.settle + _of(spec.trajectory) + spec.hold)
 
 
 def points_of(spec: ExperimentSpec) -> int:
-    """Set points, via points or segments that the specification itself has; those of its segments, too."""
+    """Returns the number of set points, via points and segments in a specification, including those of its segments."""
     return _points(spec.trajectory)
 
 

@@ -1,4 +1,4 @@
-"""When a schedule submits its next run. Pure."""
+"""Computes when a schedule submits its next run. Pure."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class Plan:
 
 
 def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> datetime | None:
-    """The run after the one that was due at `last`, `submitted` runs having been made; None when it was the last.
+    """Returns the time of the run after the one due at `last`, after `submitted` runs; None if that was the last run.
 
-    Always one of `starts + n · every`, after `last`, and the first after `now`: runs that were due while nobody could
-    submit them are left out. A clock that is set back does not make the run of `last` due again.
+    It is the first of the times `starts + n · every` that is after `last` and after `now`: runs that were due while
+    the service was not running are left out. A clock that is set back does not make the run at `last` due again.
     """
     if plan.count is not None and submitted >= plan.count:
         return None
@@ -34,5 +34,5 @@ def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> date
 
 
 def is_due(next_run: datetime | None, now: datetime) -> bool:
-    """Whether a run is to be submitted now."""
+    """Whether a run must be submitted now."""
     return next_run is not None and next_run <= now

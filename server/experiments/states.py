@@ -1,7 +1,7 @@
-"""The states of an experiment, and what each event does to them. Pure.
+"""The states of an experiment, and the transitions between them. Pure.
 
-queued → running → done | failed | cancelled | interrupted, and queued → cancelled. Nothing leaves an end: what was
-interrupted never runs again by itself; who wants it again submits it again.
+queued → running → done | failed | cancelled | interrupted, and queued → cancelled. An experiment never leaves an end
+state: an interrupted one does not run again by itself, but must be submitted again.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ class Event(StrEnum):
     TAKEN = "taken"
     """The worker begins it."""
     COMPLETED = "completed"
-    """The plan was carried out to its end."""
+    """The plan was carried out completely."""
     REFUSED = "refused"
-    """Something spoke against it; nothing moved."""
+    """A check failed before anything moved."""
     FAULT = "fault"
-    """A guard ended it."""
+    """A safety check ended it."""
     STOPPED = "stopped"
     """Somebody stopped the arm, or cancelled the experiment while it ran."""
     CANCELLED = "cancelled"
-    """Taken back before it began."""
+    """Somebody cancelled it before it began."""
     LOST = "lost"
-    """The link, a process, or the power."""
+    """The link, a process or the power failed."""
 
 
 class IllegalEventError(Exception):
-    """An event that the state does not allow; nothing has changed."""
+    """The state does not allow this event; nothing has changed."""
 
     def __init__(self, state: ExperimentState, event: Event) -> None:
         super().__init__(f"an experiment that is {state} cannot be {event}")
@@ -51,12 +51,12 @@ _TRANSITIONS: dict[tuple[ExperimentState, Event], ExperimentState] = {
 
 
 def advance(state: ExperimentState, event: Event) -> ExperimentState:
-    """The state after `event`. Raises IllegalEventError."""
+    """Returns the state after `event`. Raises IllegalEventError."""
     if (state, event) not in _TRANSITIONS:
         raise IllegalEventError(state, event)
     return _TRANSITIONS[state, event]
 
 
 def after_restart(state: ExperimentState) -> ExperimentState:
-    """What a state means when the service begins: what ran is interrupted, whatever became of it; all else stays."""
+    """Returns the state after a restart of the service: a running experiment is interrupted; other states stay."""
     return advance(state, Event.LOST) if state == "running" else state

@@ -1,1 +1,1 @@
-"""Computations in worker processes, at low priority. The executor is the seam for a cluster."""
+"""Computations in worker processes, at low priority. Another executor could run them on a cluster."""

@@ -1,6 +1,6 @@
-"""What a diagnosis may ask for: the library of experiments, as far as the machine's limits allow them.
+"""The experiments that a diagnosis may ask for: those of the library that the machine's limits allow.
 
-Of the service, of `daq diagnose`, and of the process that diagnoses in a blind trial.
+The service, `daq diagnose` and the diagnosing process of a blind trial use this.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 def asker(machine: Machine, budget: float | None = None) -> Asker:
-    """The library of experiments, planned and checked for a machine. Running one is for who asked.
+    """Returns the library of experiments, planned and checked for a machine. The caller runs those asked for.
 
     Args:
-        budget: s of robot time that are left; None for no limit.
+        budget: remaining robot time (s); None for no limit.
     """
     from model.discrepancy.experiment_design.next_experiment import Asker
 

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis with what its pictures need besides: overlays, what moved, what chance does."""
+"""The answer of a diagnosis with the data of its plots: overlays, changed parameters, significance by chance."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
 from model.fitting.records import noise_floor, records_of
+from model.machine_model.effect_parameters import effect_parameters
+from model.machine_model.parameter_words import words_by_name
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
@@ -20,6 +22,7 @@ from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from daq.contracts.service.jobs import ParameterWords
     from daq.contracts.trace import Trace
     from model.comparison.compare import Comparison
     from model.discrepancy.diagnosis import Diagnosis, Step
@@ -27,7 +30,8 @@ if TYPE_CHECKING:
 
 
 def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: GivenWhere | None = None) -> DiagnosisData:
-    """The answer, ready for plots. comparison: of the models before and after, where those can be simulated."""
+    """Returns the answer with the data of its plots. `comparison`: of the models before and after, if they can be
+    simulated."""
     return DiagnosisData(
         **{
             **dict(found),
@@ -37,15 +41,26 @@ def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: Given
             "signals": () if comparison is None else overlays(comparison),
             "differences": differences((found.model_before, found.model_after)),
             "given": given,
+            "words": _words(found),
         }
     )
 
 
-def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
-    """Where a model disagrees with traces before anything is fitted; None where its simulation does not stay finite.
+def _words(found: Diagnosis) -> dict[str, ParameterWords]:
+    """Words for the parameters of both models, and of the effects that were tried and not added."""
+    machine = found.model_before.machine
+    rejected = [
+        parameter
+        for step in found.steps
+        if step.effect is not None and not step.adopted
+        for parameter in effect_parameters(machine, step.effect, step.joints, shared=False)
+    ]
+    return words_by_name([*found.model_before.parameters, *found.model_after.parameters, *rejected])
 
-    Raises TraceError, SpecError for traces that cannot be simulated.
-    """
+
+def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
+    """Returns where a model disagrees with traces before anything is fitted; None if its simulation does not stay
+    finite. Raises TraceError, SpecError for traces that cannot be simulated."""
     records = records_of(traces, model.machine, "position")
     runs = [simulate(model, record.inputs, Options(quantise=False)) for record in records]
     left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]

@@ -7,7 +7,7 @@ from model.effects.library import library
 
 
 def known_effects() -> tuple[KnownEffect, ...]:
-    """In the order of the shared list: those of one family stand together."""
+    """Returns the effects in the order of the shared list, in which those of one family are together."""
     return tuple(
         KnownEffect(
             name=one.name,

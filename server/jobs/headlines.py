@@ -1,4 +1,4 @@
-"""What a job found, in one line for lists. Pure."""
+"""The result of a job in one line, for lists. Pure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNDECIDED_SHOWN = 3
 
 
 def of_fit(found: FitResult, comparison: Comparison) -> str:
-    """How many parameters are known, and what that does to the error."""
+    """Says how many parameters are known, and how the fit changes the error."""
     known = sum(p.verdict == "known" for p in found.parameters)
     before, after = comparison.models
     held = before.held_out is not None and after.held_out is not None
@@ -30,19 +30,19 @@ def of_fit(found: FitResult, comparison: Comparison) -> str:
 
 
 def of_validation(found: Fidelity) -> str:
-    """Whether expected deviations explain what is left."""
+    """Says whether expected deviations explain the residual."""
     said = "expected deviations explain the residual" if found.explains else "the model lacks something"
     return f"Σλ² = {found.sum_of_contributions:.3g}: {said}"
 
 
 def of_comparison(found: Comparison) -> str:
-    """The error of each model over all traces."""
+    """Says the error of each model over all traces."""
     errors = [f"{m.label.partition(' (')[0]} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
     return f"error {'; '.join(errors)}"
 
 
 def of_diagnosis(found: Diagnosis) -> str:
-    """The verdict with its names."""
+    """Says the verdict and the effects that it names."""
     if found.verdict == "named":
         return f"named: {'; '.join(_named(s) for s in found.steps if s.adopted)}"
     if found.verdict == "ambiguous" and found.steps:
@@ -57,7 +57,7 @@ def _named(one: Step | Candidate) -> str:
 
 
 def _error(joints: Sequence[JointAgreement]) -> str:
-    """Root mean square over the joints that turn, in degrees; of those that slide, in mm."""
+    """Says the root mean square over the revolute joints in degrees, and over the prismatic joints in mm."""
     turning = [j.rmse for j in joints if j.unit == "rad"]
     sliding = [j.rmse for j in joints if j.unit == "m"]
     told = []

@@ -1,4 +1,4 @@
-"""Lanes of jobs: one that is bounded from the outset does not wait behind one that computes until it converges."""
+"""Lanes of jobs: a job of known, short duration does not wait behind one that iterates until it converges."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from daq.contracts.service.jobs import CompareRequest, Job, JobRequest, Validate
 Lane = Literal["short", "long"]
 LANES: tuple[Lane, ...] = get_args(Lane)
 SHORT_LANE_WORKERS = 1
-"""Worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 250 MB."""
+"""Number of worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 250
+MB."""
 MOST_PASSES = 20
-"""Passes over a trace that a short job may consist of; one takes a second or so. A comparison of more is as long as a
+"""Largest number of passes over a trace in a short job; one takes about 1 s. A longer comparison takes as long as a
 fit."""
 
 
 def lane_of(request: JobRequest) -> Lane:
-    """The lane of a job, from what it has to compute. Fits and diagnoses iterate: they are always long."""
+    """Returns the lane of a job, from what it has to compute. Fits and diagnoses iterate and are always long."""
     match request:
         case CompareRequest():
             passes = len(request.traces) * len(request.models)
@@ -29,10 +30,10 @@ def lane_of(request: JobRequest) -> Lane:
 
 
 def with_what_it_waits_for(job: Job, running: Iterable[Job], waiting: Sequence[Job]) -> Job:
-    """A queued job with the job that it waits behind, in `waits_behind`.
+    """Returns a queued job with the job that it waits behind, in `waits_behind`.
 
     Args:
-        running: jobs that are computed now, of any lane
+        running: jobs of any lane that are being computed
         waiting: queued jobs of any lane, the first submitted first
     """
     lane = lane_of(job.request)

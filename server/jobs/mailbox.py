@@ -1,5 +1,5 @@
-"""What a job's folder holds: its request, how far it is, whether it is to end, its result. Files, so that a worker on
-another computer can share them; each is written whole or not at all."""
+"""The folder of a job: its request, its progress, whether it must end, its result. These are files, so that a worker on
+another computer could share them; each is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 TELL_EVERY = 0.2
-"""s between two reports of progress, and between two looks at whether the job is to end."""
+"""Time (s) between two reports of progress, and between two checks whether the job must end."""
 REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
     "request.json",
     "progress.json",
@@ -41,11 +41,11 @@ class Mailbox:
         self._cancelled = False
 
     def write(self, name: str, data: Any) -> None:
-        """A JSON file."""
+        """Writes a JSON file."""
         self.write_text(name, json.dumps(data, allow_nan=False))
 
     def write_text(self, name: str, text: str) -> None:
-        """A text file, there whole or not at all."""
+        """Writes a text file, completely or not at all."""
         part = self.folder / f"{name}.part"
         with part.open("w", encoding="utf-8") as stream:
             stream.write(text)
@@ -54,7 +54,7 @@ class Mailbox:
         part.replace(self.folder / name)
 
     def read(self, name: str) -> Any:
-        """A JSON file; None when it is not there."""
+        """Reads a JSON file; returns None if it does not exist."""
         try:
             return json.loads((self.folder / name).read_text("utf-8"))
         except FileNotFoundError:
@@ -65,15 +65,15 @@ class Mailbox:
         (self.folder / CANCEL).touch()
 
     def reported(self) -> Reported | None:
-        """The progress of the job; None before it has begun."""
+        """Returns the progress of the job; None before it has begun."""
         data = self.read(PROGRESS)
         return None if data is None else Reported(data["fraction"], data["text"], data["process"])
 
     # ---- the worker's side
 
     def tell(self, fraction: float, text: str, *, at_once: bool = False) -> None:
-        """Progress, as `daq.contracts.progress.Progress`. What comes too soon after the report before it is left out,
-        unless it is to be told `at_once`: the beginning of something long."""
+        """Reports progress, as `daq.contracts.progress.Progress`. A report too soon after the one before is left out,
+        unless it is `at_once`, as for the beginning of something long."""
         now = time.monotonic()
         if now - self._told < TELL_EVERY and not at_once:
             return
@@ -83,7 +83,7 @@ class Mailbox:
         part.replace(self.folder / PROGRESS)
 
     def is_set(self) -> bool:
-        """Whether the job is to end, as `daq.contracts.progress.Cancel`."""
+        """Whether the job must end, as `daq.contracts.progress.Cancel`."""
         now = time.monotonic()
         if not self._cancelled and now - self._looked >= TELL_EVERY:
             self._looked = now

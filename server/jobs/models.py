@@ -1,4 +1,4 @@
-"""The models of one robot: files in a folder, found by the database."""
+"""The models of one robot: files in a folder, listed in the database."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectChoice, ModelDetails, ModelParameter
 from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import load_model, save_model
+from model.machine_model.parameter_words import words_of
 from server.clock import Clock
 from server.problems import ProblemError
 from server.store.models import ModelStore, NewModel
 
 AS_FITTED = "send a file as `daq fit` writes it"
 LARGEST_MODEL = 16 << 20
+"""Largest size of a model's file in bytes."""
 
 
 class Models:
-    """Takes models in and finds them. Safe to use from any thread."""
+    """Adds models and finds them. Safe to use from any thread."""
 
     def __init__(self, folder: Path, robot: str, machine: Machine, store: ModelStore, clock: Clock) -> None:
         self.folder = folder
@@ -31,7 +33,7 @@ class Models:
         self._clock = clock
 
     def take_in(self, path: Path, name: str, by: str, job: str | None) -> str:
-        """A model's file; returns the model's number. The same model twice is one. Raises SpecError."""
+        """Adds a model from its file, and returns its number. Adding it again changes nothing. Raises SpecError."""
         model = load_model(path)
         self.folder.mkdir(parents=True, exist_ok=True)
         file = f"{model.identity}.json"
@@ -57,7 +59,7 @@ class Models:
         return model.identity
 
     def take_in_text(self, text: bytes, name: str, by: str) -> str:
-        """A model from elsewhere. Raises a 422, also for one that brings a program of its own with it."""
+        """Adds an uploaded model. Raises a 422, also if the model has effects that are programs."""
         try:
             data = parse_json(text.decode("utf-8"), "upload")
         except UnicodeDecodeError as error:
@@ -79,15 +81,15 @@ class Models:
             path.unlink(missing_ok=True)
 
     def path_of(self, identity: str) -> Path:
-        """Raises a 404."""
+        """Returns a model's file. Raises a 404."""
         return self.folder / self.store.file_of(self._robot, identity)
 
     def name_of(self, identity: str) -> str:
-        """For tables. Raises a 404."""
+        """Returns a model's name, for tables. Raises a 404."""
         return self._machine.name if identity == MACHINE else self.store.get(self._robot, identity).name
 
     def details(self, identity: str) -> ModelDetails:
-        """One model: effects, parameters, ancestors. Raises a 404."""
+        """Returns a model's effects, parameters and ancestors. Raises a 404."""
         entry = self.store.get(self._robot, identity)
         model = load_model(self.path_of(identity))
         return ModelDetails(
@@ -98,15 +100,15 @@ class Models:
         )
 
     def machine_identity(self) -> str:
-        """Of the model that the machine file describes."""
+        """Returns the number of the model that the machine file describes."""
         return base_model(self._machine).identity
 
     def machine_parameters(self) -> tuple[ModelParameter, ...]:
-        """Those of the model that the machine file describes."""
+        """Returns the parameters of the model that the machine file describes."""
         return _parameters(base_model(self._machine))
 
     def remove(self, identity: str) -> None:
-        """Row and file. Raises a 404, 409."""
+        """Deletes a model's row and file. Raises a 404, 409."""
         file = self.store.remove(self._robot, identity)
         (self.folder / file).unlink(missing_ok=True)
 
@@ -115,6 +117,7 @@ def _parameters(model: Model) -> tuple[ModelParameter, ...]:
     return tuple(
         ModelParameter(
             name=one.name,
+            words=words_of(one),
             unit=one.unit,
             value=one.value,
             low=_finite(one.low),
@@ -130,7 +133,7 @@ def _finite(value: float | None) -> float | None:
 
 
 def _has_program(data: Any) -> bool:
-    """Whether any effect in it comes with a file."""
+    """Whether any effect in the data has a program file."""
     if isinstance(data, dict):
         effects = data.get("effects")
         own = isinstance(effects, list) and any(isinstance(use, dict) and use.get("file") for use in effects)

@@ -1,4 +1,5 @@
-"""Signals of a comparison for a plot: so many points that a page draws them at once, and no peak lost."""
+"""Thins the signals of a comparison for a plot, to a number of points that a page draws at once, without losing a
+peak."""
 
 from __future__ import annotations
 
@@ -17,23 +18,23 @@ if TYPE_CHECKING:
     from model.validation.variation import TimeDomain
 
 MOST_POINTS, LEAST_POINTS = 1600, 200
-"""Of one trace, and how far that goes down when there are many."""
+"""Number of points of one trace, and the least number if there are many traces."""
 ALL_POINTS = 16_000
-"""Of all traces of one result together."""
+"""Number of points of all traces of one result together."""
 DIGITS = 7
-"""Decimals of rad, m and s that are sent: a count of the sensor is a thousand times as large."""
+"""Number of decimal places of rad, m and s that are sent: a count of the sensor is a thousand times larger."""
 VARIATION_POINTS = 800
-"""Of a parameter's variation with time, which is smooth."""
+"""Number of points of a parameter's variation with time, which is smooth."""
 
 
 def overlays(found: Comparison) -> tuple[Overlay, ...]:
-    """Every trace of a comparison beside its simulations."""
+    """Returns every trace of a comparison beside its simulations."""
     points = int(np.clip(ALL_POINTS // max(1, len(found.signals)), LEAST_POINTS, MOST_POINTS))
     return tuple(overlay(one, points) for one in found.signals)
 
 
 def overlay(one: TraceSignals, points: int) -> Overlay:
-    """One trace in about so many points."""
+    """Returns one trace beside its simulations in about `points` points."""
     first = stretches(len(one.time), points)
 
     def rows(signal: Floats) -> tuple[Row, ...]:
@@ -56,7 +57,8 @@ def overlay(one: TraceSignals, points: int) -> Overlay:
 
 
 def thinned_variation(one: TimeDomain) -> TimeDomain:
-    """The same in at most so many moments, evenly picked: accelerations were smoothed over more than that."""
+    """Returns a variation with time at VARIATION_POINTS evenly spaced times at most. Accelerations were smoothed over
+    longer times than their distance."""
     stride = max(1, -(-len(one.time) // VARIATION_POINTS))
     joints = tuple(j.model_copy(update={"values": j.values[::stride]}) for j in one.joints)
     parameters = tuple(
@@ -66,5 +68,5 @@ def thinned_variation(one: TimeDomain) -> TimeDomain:
 
 
 def _row(values: Sequence[float] | Floats) -> Row:
-    """JSON knows no NaN and no infinity: what has no number is None."""
+    """Converts values for JSON, which has no NaN and no infinity: these become None."""
     return tuple(v if np.isfinite(v) else None for v in np.round(values, DIGITS).tolist())

@@ -1,4 +1,4 @@
-"""Results of jobs as clients get them: the data of the command's `--json`, and signals for plots."""
+"""Results of jobs as clients get them: the data of the commands' `--json`, and signals for plots."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from daq.contracts.service.jobs import ParameterWords
 from model.comparison.agreement import ModelAgreement
 from model.comparison.difference import ParameterDifference
 from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
@@ -13,8 +14,10 @@ from model.fitting.result import FitResult
 from model.validation.criterion import Fidelity
 from model.validation.variation import TimeDomain
 
+Words = dict[str, ParameterWords]
+"""How people write the parameters that a result names, by the parameter's name."""
 Row = tuple[float | None, ...]
-"""One signal of one joint; None where a simulation did not stay finite."""
+"""One signal of one joint; None for samples at which a simulation was not finite."""
 
 
 class _Part(BaseModel):
@@ -22,10 +25,10 @@ class _Part(BaseModel):
 
 
 class Overlay(_Part):
-    """One trace beside its simulations, thinned so that no peak is lost: of every stretch the extremes are kept.
+    """One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
 
-    `time` is in s; signals have one row a joint, in the order of `joints`, in `units`. `simulated` and `residual`
-    (measured − simulated, thinned by itself) have such rows for every model, in the order of the result's `models`.
+    `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
+    (measured − simulated, thinned separately) have such rows for every model, in the order of the result's `models`.
     """
 
     trace: str
@@ -33,7 +36,7 @@ class Overlay(_Part):
     joints: tuple[int, ...]
     units: tuple[str, ...]
     samples: int
-    """Before thinning."""
+    """Number of samples before thinning."""
     time: tuple[float, ...]
     measured: tuple[Row, ...]
     set_point: tuple[Row, ...] | None
@@ -42,19 +45,22 @@ class Overlay(_Part):
 
 
 class FitData(FitResult):
-    """A fit, and the models before and after it beside the traces."""
+    """A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces
+    cannot determine, a sentence each, with the parameters as people write them."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
+    undetermined: tuple[str, ...] = ()
 
 
 class ValidationData(_Part):
-    """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other (its curves
-    are the same), and what would have to move with time, a trace each, thinned."""
+    """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
+    same curves), and for each trace, thinned, how parameters would have to vary with time."""
 
     fidelity: Fidelity
     three_sigma: Fidelity
     time_domain: tuple[TimeDomain, ...]
+    words: Words = Field(default_factory=dict)
 
 
 class ComparisonData(_Part):
@@ -63,6 +69,7 @@ class ComparisonData(_Part):
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
     differences: tuple[ParameterDifference, ...]
+    words: Words = Field(default_factory=dict)
 
 
 class TriedEffect(Candidate):
@@ -75,7 +82,7 @@ class DiagnosisStep(Step):
     candidates: tuple[TriedEffect, ...]
     group: tuple[TriedEffect, ...] = ()
     chance: float
-    """Significance that noise alone exceeds in some cell of `where` in one record of a hundred."""
+    """Significance that noise alone exceeds in any cell of `where` in one record out of a hundred."""
 
 
 class GivenWhere(_Part):
@@ -86,9 +93,9 @@ class GivenWhere(_Part):
 
 
 class DiagnosisData(Diagnosis):
-    """A diagnosis (docs/diagnosis-json.md), and the models before and after it beside the traces where those can be
-    simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
-    model disagreed with the traces as it was given, before anything was fitted."""
+    """A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
+    these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
+    where the given model disagreed with the traces before anything was fitted."""
 
     steps: tuple[DiagnosisStep, ...]
     candidates: tuple[TriedEffect, ...] = ()
@@ -96,6 +103,7 @@ class DiagnosisData(Diagnosis):
     signals: tuple[Overlay, ...] = ()
     differences: tuple[ParameterDifference, ...] = ()
     given: GivenWhere | None = None
+    words: Words = Field(default_factory=dict)
 
 
 class FitJobResult(_Part):

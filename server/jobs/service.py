@@ -1,4 +1,4 @@
-"""The jobs of one robot: queued, computed in the worker processes of their lanes, followed, cancelled, kept."""
+"""The jobs of one robot: queues them, has worker processes of two lanes compute them, and keeps their results."""
 
 from __future__ import annotations
 
@@ -28,24 +28,25 @@ from server.jobs.work import Ended, Task, carry_out
 from server.jobs.yielding import begin_worker
 from server.problems import ProblemError, conflict, not_found
 from server.store.jobs import JobStore, models_of, traces_of
+from server.store.labels import job_label
 
 LOOK_EVERY = 0.5
-"""s between two looks at how far the jobs are."""
+"""Time (s) between two checks of the jobs' progress."""
 MOST_TOLD = 50
-"""Waiting jobs that are told anew when one before them has begun or ended."""
+"""Number of waiting jobs that are published again when a job before them has begun or ended."""
 log = logging.getLogger("server.jobs")
 
 
 def worker_processes(count: int) -> Executor:
-    """The executor of one computer. Spawned, not forked: this process has threads."""
+    """Makes the executor of one computer. Its processes are spawned, not forked, because this process has threads."""
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker)
 
 
 @dataclass(frozen=True)
 class JobContext:
-    """Stores, services and callbacks of the jobs of one robot. `changed` is called with every job that has changed and
-    must not block. `at_once`: workers of the long lane."""
+    """Stores, services and callbacks of the jobs of one robot. `changed` is called with every job that has changed, and
+    must not block. `at_once`: the number of workers of the long lane."""
 
     robot: str
     machine: Machine
@@ -72,14 +73,15 @@ class JobService:
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
     def start(self) -> None:
-        """Starts to compute waiting jobs; a job moves nothing."""
+        """Starts to compute waiting jobs. Jobs never move the arm."""
         self._thread.start()
 
     def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
-        """Queues a job. Raises a 404 for an unknown trace or model, a 409 for a key of another request."""
+        """Queues a job, and returns it with True; or returns the one that the key made before, with False. Raises a 404
+        for an unknown trace or model, and a 409 if the key was used for another request."""
         context = self._context
         before = context.jobs.made_before(context.robot, request, key)
-        if before is not None:  # whatever has become of its traces and models since
+        if before is not None:  # even if its traces and models have been deleted since
             return before, False
         task = Task(
             request=request,
@@ -95,7 +97,7 @@ class JobService:
             folder.mkdir(parents=True)
             try:
                 Mailbox(folder).write(REQUEST, task.model_dump(mode="json"))
-            except OSError:  # no room: nothing of it stays
+            except OSError:  # the disk may be full: leave nothing of the job there
                 shutil.rmtree(folder, ignore_errors=True)
                 raise
 
@@ -112,7 +114,7 @@ class JobService:
             job = context.jobs.change(
                 context.robot, identity, Event.CANCELLED, context.clock.utc(), f"cancelled by {by}"
             )
-        except ProblemError:  # it does not wait, or not any more
+        except ProblemError:  # it is not waiting, or no longer
             job = context.jobs.get(context.robot, identity)
             if job.state != "running":
                 raise
@@ -127,10 +129,12 @@ class JobService:
         shutil.rmtree(self._folder(identity), ignore_errors=True)
 
     def result_file(self, identity: str, name: str) -> Path:
-        """The result (`RESULT`) or report (`REPORT`) of a job. Raises a 404, and a 409 while there is none."""
+        """Returns the file of a job's result (`RESULT`) or report (`REPORT`). Raises a 404, and a 409 if the job is not
+        done."""
         job = self._context.jobs.get(self._context.robot, identity)
         if job.state != "done":
-            line = f"job {identity} is {job.state}{': ' if job.reason else ''}{job.reason}"
+            label = job_label(job.request.kind, job.submitted)
+            line = f"{label} is {job.state}{': ' if job.reason else ''}{job.reason}"
             raise conflict("job-state", line, "only a job that is done has a result")
         path = self._folder(identity) / name
         if not path.is_file():
@@ -138,11 +142,11 @@ class JobService:
         return path
 
     def with_progress(self, job: Job) -> Job:
-        """`job` with its progress while it runs, or with the job that it waits behind."""
+        """Returns `job` with its progress if it runs, or with the job that it waits behind."""
         return self.with_progress_all((job,))[0]
 
     def with_progress_all(self, jobs: Iterable[Job]) -> tuple[Job, ...]:
-        """The same for several jobs, with one query of the waiting jobs."""
+        """Does the same for several jobs, with one query of the waiting jobs."""
         jobs = tuple(jobs)
         waiting = self._context.jobs.waiting(self._context.robot) if any(job.state == "queued" for job in jobs) else []
         running = [job for job, _future in list(self._running.values())]
@@ -196,13 +200,13 @@ class JobService:
                     self._tell_waiting()
                 self._tell_progress(told)
             except Exception:
-                # A disk that is full, a database that is locked: the next look may go better.
+                # The disk may be full, or the database locked: try again at the next check.
                 log.exception("jobs")
                 failed = True
             self._wake.wait(LOOK_EVERY if self._running or failed else None)
 
     def _begin(self) -> bool:
-        """Hands waiting jobs to free workers of their lanes. True if any has begun."""
+        """Hands waiting jobs to free workers of their lanes. Returns whether any has begun."""
         context = self._context
         places = {"short": SHORT_LANE_WORKERS, "long": context.at_once}
         free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
@@ -211,9 +215,9 @@ class JobService:
             lane = lane_of(job.request)
             if free[lane] <= 0:
                 continue
-            try:  # its state first: what is cancelled before that is never computed
+            try:  # its state first: a job cancelled before that is never computed
                 begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
-            except ProblemError:  # cancelled in this moment
+            except ProblemError:  # it has just been cancelled
                 continue
             future = self._handed_over(job.id, lane, places[lane])
             self._running[job.id] = begun, future
@@ -229,7 +233,7 @@ class JobService:
         return sum(lane_of(job.request) == lane and not future.done() for job, future in running)
 
     def _handed_over(self, identity: str, lane: Lane, workers: int) -> Future[Ended]:
-        """The job in the executor of its lane; in a new one where the end of a worker has broken the one there was."""
+        """Hands a job to the executor of its lane, or to a new executor if the death of a worker has broken it."""
         for _ in range(2):
             executor = self._executors.get(lane)
             if executor is None:
@@ -244,7 +248,8 @@ class JobService:
         return _failed(BrokenExecutor())
 
     def _collect(self) -> bool:
-        """Records the end of finished jobs; one whose end cannot be written delays no other. True if any has ended."""
+        """Records the end of finished jobs. A job whose end cannot be written delays no other. Returns whether any has
+        ended."""
         has_ended = False
         for identity, (job, future) in list(self._running.items()):
             if not future.done():
@@ -252,7 +257,7 @@ class JobService:
             try:
                 self._end(identity, lane_of(job.request), future)
             except (OSError, OperationalError) as error:
-                # A disk that is full, a database that is locked: the next look may go better.
+                # The disk may be full, or the database locked: try again at the next check.
                 log.warning("job %s: its end is not written yet: %s", identity, error)
                 continue
             except Exception:
@@ -287,7 +292,7 @@ class JobService:
                     log.exception("job %s: its model", identity)
                     event, reason = Event.FAULT, _fault(error)
         self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
-        (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: its end may have to be written again
+        (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: writing the end may have to be repeated
 
     def _keep_model(self, identity: str) -> str:
         context = self._context
@@ -297,7 +302,7 @@ class JobService:
         return context.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
 
     def _tell_waiting(self) -> None:
-        """Publishes waiting jobs anew, since the jobs that they wait behind have changed."""
+        """Publishes waiting jobs again, since the jobs that they wait behind have changed."""
         for job in self.with_progress_all(self._context.jobs.waiting(self._context.robot)[:MOST_TOLD]):
             self._context.changed(job)
 

@@ -1,4 +1,4 @@
-"""A job as its worker process does it: files in, files out."""
+"""Carries out a job in a worker process. Its input and output are files."""
 
 from __future__ import annotations
 
@@ -37,14 +37,15 @@ if TYPE_CHECKING:
     AnyResult = FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult
 
 CURVE_POINTS = 21
+"""Number of points of each curve of a validation."""
 FIT_SHARE, VALIDATION_SHARE, DIAGNOSIS_SHARE = 0.9, 0.7, 0.9
-"""Of the progress, before comparison and report."""
+"""Share of the progress before comparison and report."""
 MAP_SHARE, REPORT_SHARE = 0.94, 0.98
-"""Of the progress, before the map of disagreement of a diagnosis, and before the report."""
+"""Share of the progress before the map of disagreement of a diagnosis, and before the report."""
 
 
 class Task(BaseModel):
-    """What a worker is given: the request, and where everything is that it names."""
+    """The input of a worker: the request, and the files of the traces and models that it names."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -53,14 +54,14 @@ class Task(BaseModel):
     traces: dict[str, Path]
     models: dict[str, Path]
     names: dict[str, str]
-    """Names of models, for tables."""
+    """The names of the models, for tables."""
     limits: TraceLimits = DEFAULT_TRACE_LIMITS
-    """Of the traces that are read."""
+    """The limits within which traces are read."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a job ended. `problem` is empty when it is done."""
+    """How a job ended. `problem` is empty if it is done."""
 
     problem: str = ""
     cancelled: bool = False
@@ -69,7 +70,7 @@ class Ended:
 
 
 def carry_out(folder: Path) -> Ended:
-    """Does the job of a folder. Raises nothing that is the user's to see: it is in what is returned."""
+    """Carries out the job in a folder. Errors that the user should see are returned, not raised."""
     mailbox = Mailbox(folder)
     mailbox.tell(0.0, "reading")
     task = Task.model_validate(mailbox.read(REQUEST))
@@ -87,7 +88,7 @@ class _Worker:
         self.mailbox = mailbox
 
     def do(self) -> Ended:
-        """By kind."""
+        """Carries out the request, according to its kind."""
         match self.task.request:
             case FitRequest() as request:
                 return self.fit(request)
@@ -99,9 +100,11 @@ class _Worker:
                 return self.diagnose(request)
 
     def fit(self, request: FitRequest) -> Ended:
-        """As `daq fit`."""
+        """Does the same as `daq fit`."""
         from model.fitting.fit import fit
+        from model.fitting.identifiability import undetermined_in_words
         from model.fitting.options import FitOptions
+        from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
         from server.jobs.overlays import overlays
         from server.jobs.results import FitData, FitJobResult
@@ -123,12 +126,18 @@ class _Worker:
             [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
         )
         self._keep_model(found.model)
-        data = FitData(**dict(found), models=comparison.models, signals=overlays(comparison))
+        data = FitData(
+            **dict(found),
+            models=comparison.models,
+            signals=overlays(comparison),
+            undetermined=undetermined_in_words(found.identifiability, words_by_name(found.model.parameters)),
+        )
         result = FitJobResult(id=self._job, data=data)
         return self._done(result, fit_report(found, comparison), of_fit(found, comparison), found.model)
 
     def validate(self, request: ValidateRequest) -> Ended:
-        """As `daq validate`."""
+        """Does the same as `daq validate`."""
+        from model.machine_model.parameter_words import words_by_name
         from model.reports.validation_report import validation_report
         from model.simulation.prepared import Options
         from model.validation.conventions import in_convention
@@ -161,13 +170,15 @@ class _Worker:
             fidelity=fidelity,
             three_sigma=three.model_copy(update={"curves": ()}),
             time_domain=tuple(thinned_variation(one) for one in in_time),
+            words=words_by_name(model.parameters),
         )
         report = validation_report(self._name(request.model), (fidelity, three), in_time, model.machine)
         return self._done(ValidationJobResult(id=self._job, data=data), report, of_validation(fidelity))
 
     def compare(self, request: CompareRequest) -> Ended:
-        """As `daq compare`; also one model beside traces."""
+        """Does the same as `daq compare`, also for a single model."""
         from model.comparison.difference import differences
+        from model.machine_model.parameter_words import words_by_name
         from model.reports.comparison_report import comparison_report
         from server.jobs.overlays import overlays
         from server.jobs.results import ComparisonData, ComparisonJobResult
@@ -176,15 +187,20 @@ class _Worker:
         traces = self._traces(request.traces)
         fitted = {trace for model in models for trace in model.lineage.traces}
         held = [trace.record.trace_id for trace in traces if trace.record.trace_id not in fitted] if fitted else None
-        labels = [f"{self._name(number)} ({number})" for number in request.models]
+        labels = self._labels(request.models)
         comparison = self._compared(list(zip(labels, models, strict=True)), traces, held, 0.0)
         differing = differences(models)
-        data = ComparisonData(models=comparison.models, signals=overlays(comparison), differences=differing)
+        data = ComparisonData(
+            models=comparison.models,
+            signals=overlays(comparison),
+            differences=differing,
+            words=words_by_name(parameter for model in models for parameter in model.parameters),
+        )
         result = ComparisonJobResult(id=self._job, data=data)
         return self._done(result, comparison_report(comparison, differing), of_comparison(comparison))
 
     def diagnose(self, request: DiagnoseRequest) -> Ended:
-        """As `daq diagnose`."""
+        """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
@@ -245,8 +261,18 @@ class _Worker:
     def _name(self, number: str) -> str:
         return self.task.names.get(number, number)
 
+    def _labels(self, numbers: Sequence[str]) -> list[str]:
+        """The names of models, with their numbers where the names alone do not tell them apart."""
+        names = [self._name(number) for number in numbers]
+        alike = len(set(names)) < len(names)
+        return [
+            f"{name} ({number})" if alike or number == MACHINE else name
+            for name, number in zip(names, numbers, strict=True)
+        ]
+
     def _tell(self, begin: float, end: float, fraction: float, text: str) -> None:
-        """A stage's progress as the job's. The end of a stage ends no job, and what follows says what it is."""
+        """Reports a stage's progress as part of the job's. The end of a stage is left out, since the next stage reports
+        itself."""
         if fraction < 1:
             self.mailbox.tell(begin + (end - begin) * fraction, text)
 

@@ -1,1 +1,1 @@
-"""Live data for clients: one hub a robot, one outbox a client, and a ring buffer of the last minutes."""
+"""Live data for clients: a hub for each robot, an outbox for each client, and a ring buffer of the last minutes."""

@@ -1,4 +1,4 @@
-"""The last minutes of samples, for a client that joins: a ring of columns."""
+"""The samples of the last minutes, for clients that join, in a ring buffer."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from server.owner.messages import LiveSample
 
 SIGNALS = ("set_point", "position", "error", "drive")
 DIGITS = 5
-"""Of values sent: 1e-5 rad is a hundredth of what the sensors resolve."""
+"""Number of decimal places of values sent: 1e-5 rad is a hundredth of the sensors' resolution."""
 EVENTS = 500
+"""Number of events that are kept."""
 
 
 class History:
-    """Samples of `joints` joints, as many as fit into `seconds` s of `period` s each. Safe to use from any thread."""
+    """The samples of the last `seconds` s for `joints` joints, one every `period` s. Safe to use from any thread."""
 
     def __init__(self, joints: int, period: float, seconds: float) -> None:
         self._joints = joints
@@ -31,7 +32,7 @@ class History:
         self._events: deque[RecordEventMessage] = deque(maxlen=EVENTS)
 
     def add(self, sample: LiveSample) -> None:
-        """One more; the oldest goes when there is no room."""
+        """Adds a sample; it replaces the oldest one if the buffer is full."""
         place = self._count % self._room
         columns = [joint - 1 for joint in sample.joints]
         with self._lock:
@@ -43,12 +44,12 @@ class History:
             self._count += 1
 
     def add_event(self, event: RecordEventMessage) -> None:
-        """Something in the record, to be marked in the plot."""
+        """Adds an event of the record, which plots mark."""
         with self._lock:
             self._events.append(event)
 
     def since(self, begin: float, points: int) -> HistoryMessage:
-        """Samples after `begin` (s, monotonic), thinned to about `points`; the extremes of every stretch stay."""
+        """Returns the samples after `begin` (s, monotonic), thinned to about `points`, with all extremes kept."""
         with self._lock:
             order = np.arange(max(0, self._count - self._room), self._count) % self._room
             order = order[self._time[order] >= begin]
@@ -67,7 +68,7 @@ class History:
 
 
 def _rows(values: Floats) -> tuple[tuple[float | None, ...], ...]:
-    """(n, j) as j rows; NaN as None."""
+    """Converts (n, j) to j rows, and NaN to None."""
     rounded = np.round(values.T, DIGITS)
     return tuple(tuple(None if value != value else value for value in row) for row in rounded.tolist())  # noqa: PLR0124
 

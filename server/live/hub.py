@@ -33,7 +33,7 @@ LOOK_EVERY = 1.0
 MOST_OFTEN = 0.05
 """Shortest time (s) between two reads of the status."""
 PROGRESS_EVERY = 0.2
-"""s between two messages about progress."""
+"""Time (s) between two messages about progress."""
 log = logging.getLogger("server.live")
 
 
@@ -75,7 +75,7 @@ class Hub:
         self._progressed = 0.0
 
     def open(self, experiment: Callable[[], str | None]) -> None:
-        """On the event loop, before the first client. `experiment`: the one that runs now."""
+        """Starts sending. Call this on the event loop before the first client. `experiment` returns the running one."""
         self._loop = asyncio.get_running_loop()
         self._experiment = experiment
         self._watching = self._loop.create_task(self._watch())
@@ -170,7 +170,7 @@ class Hub:
         if loop is not None:
             try:
                 loop.call_soon_threadsafe(call)
-            except RuntimeError:  # closed in this moment: nobody watches any more
+            except RuntimeError:  # the loop has just been closed
                 self._loop = None
 
     def _put(self, topic: Topic, message: str, tick: int | None) -> None:
@@ -222,7 +222,7 @@ def _parts(status: RobotStatus, now: float) -> list[tuple[Topic, BaseModel]]:
 
 
 def _comparable(encoded: str, message: BaseModel) -> str:
-    """Without what changes all the time: a lease's remaining seconds, a link's time."""
+    """Returns a message without what changes all the time: a lease's remaining time, the time of a link's counters."""
     if isinstance(message, RobotMessage):
         control = message.control.model_copy(update={"expires": None, "remaining": None})
         return message.model_copy(update={"control": control}).model_dump_json()
@@ -232,7 +232,7 @@ def _comparable(encoded: str, message: BaseModel) -> str:
 
 
 def encoded_sample(sample: LiveSample) -> str:
-    """As SampleMessage; by hand, since it is done fifty times a second."""
+    """Encodes a SampleMessage, by hand for speed, since this is done fifty times a second."""
     return json.dumps(
         {
             "topic": "sample",

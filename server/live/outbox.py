@@ -1,8 +1,8 @@
-"""What one client is still to be sent, and what happens when it reads too slowly. Pure: the caller says the time.
+"""The messages that wait for one client, and what happens if it reads too slowly. Pure: the caller passes the time.
 
-A client that does not keep up gets fewer samples first: those that wait are thinned to every second one, again and
-again. Many at once, after a hiccup of the service itself, are no reason yet. One that has not taken anything for
-DROP_AFTER is dropped. Messages that are no samples are never left out.
+If a client does not keep up, every second one of its waiting samples is left out, repeatedly if need be. Many samples
+at once, after a pause of the service itself, are not enough reason. A client that has not taken anything for DROP_AFTER
+is dropped. Messages other than samples are never left out.
 """
 
 from __future__ import annotations
@@ -11,22 +11,24 @@ from collections import deque
 from dataclasses import dataclass, field
 
 THIN_BEYOND = 50
-"""Samples that wait before they are thinned: one second's,"""
+"""Number of waiting samples (those of 1 s) beyond which they are thinned, if the client has taken nothing for
+THIN_AFTER."""
 THIN_AFTER = 1.0
-"""s without a frame taken, too."""
+"""Time (s) since the client last took messages, after which its samples may be thinned."""
 DROP_AFTER = 10.0
-"""s without a frame taken, while something waits."""
+"""Time (s) since the client last took messages, after which it is dropped if any wait."""
 MOST_WAITING = 4096
-"""Messages of any kind: a client that far behind is dropped at once."""
+"""Number of waiting messages of any kind beyond which a client is dropped at once."""
 
 
 @dataclass
 class Outbox:
-    """Encoded messages that wait, in order. `True` marks a sample."""
+    """Encoded messages that wait, in order."""
 
     taken_at: float
+    """When the client last took messages, or the first of those that wait was put in."""
     left_out: int = 0
-    """Samples left out since the client was last told."""
+    """Number of samples left out since the client was last told."""
     _waiting: deque[tuple[bool, str]] = field(default_factory=deque)
     _samples: int = 0
 
@@ -34,7 +36,7 @@ class Outbox:
         return len(self._waiting)
 
     def put(self, message: str, now: float, *, sample: bool = False) -> None:
-        """One more. Samples are thinned when too many wait."""
+        """Adds a message. Samples are thinned if too many wait."""
         if not self._waiting:
             self.taken_at = now
         self._waiting.append((sample, message))
@@ -44,7 +46,7 @@ class Outbox:
                 self._thin()
 
     def take(self, now: float) -> list[str]:
-        """All that wait, in order; the client takes them now."""
+        """Removes and returns all messages that wait, in order; the client takes them now."""
         messages = [message for _, message in self._waiting]
         self._waiting.clear()
         self._samples = 0
@@ -52,7 +54,7 @@ class Outbox:
         return messages
 
     def is_hopeless(self, now: float) -> bool:
-        """Whether the client is to be dropped."""
+        """Whether the client must be dropped."""
         return bool(self._waiting) and (now - self.taken_at > DROP_AFTER or len(self._waiting) > MOST_WAITING)
 
     def _thin(self) -> None:

@@ -1,4 +1,4 @@
-"""Long polling: answers that wait until something has ended, for clients without a WebSocket."""
+"""Long polling: the answer waits until something has ended, for clients without a WebSocket."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from daq.contracts.service.live import Topic
 from server.live.hub import Hub
 
 LOOK_EVERY = 5.0
-"""s after which the state is read even without news: news may be lost while the database is busy."""
+"""Time (s) after which the state is read even without news, which may be lost while the database is busy."""
 Wait = Annotated[float, Query(ge=0, le=60, description="Longest time (s) to wait for the end; 0 answers at once.")]
 T = TypeVar("T")
 
 
 async def when_ended(hub: Hub, topics: set[Topic], look: Callable[[], T], ended: Callable[[T], bool], wait: float) -> T:
-    """What `look`, called on a thread, returns once it has `ended`; or what it returns after `wait` s, or when the
-    service ends."""
+    """Returns what `look`, called on a thread, returns once that has `ended`, or after `wait` s, or when the service
+    ends."""
     loop = asyncio.get_running_loop()
     until = loop.time() + wait
     with hub.listening(topics) as news:

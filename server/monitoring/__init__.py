@@ -1,1 +1,1 @@
-"""What the service counts about itself, and whether it is ready to take experiments."""
+"""Metrics of the service, and the check whether it is ready to take experiments."""

@@ -1,4 +1,4 @@
-"""Counters and histograms for Prometheus, updated where things happen."""
+"""Counters and histograms for Prometheus."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Metrics:
         )
         self._lateness = self._histogram(
             "daq_sample_lateness_seconds",
-            "Time by which a sample came later than the quickest ones.",
+            "Delay of a sample compared with the quickest ones.",
             ("robot",),
             LATENESS_BUCKETS,
         )
-        self._samples = Counter("daq_samples", "Control periods seen.", ("robot",), registry=self.registry)
+        self._samples = Counter("daq_samples", "Samples received.", ("robot",), registry=self.registry)
         self._jobs = Counter("daq_jobs", "Jobs that have ended.", ("robot", "kind", "state"), registry=self.registry)
         self._job_times = self._histogram(
-            "daq_job_seconds", "Time that a job was computed for.", ("robot", "kind"), JOB_BUCKETS
+            "daq_job_seconds", "Time for which a job was computed.", ("robot", "kind"), JOB_BUCKETS
         )
-        self._stops = Counter("daq_stops", "Stops asked of the service.", ("robot",), registry=self.registry)
+        self._stops = Counter("daq_stops", "Stops requested.", ("robot",), registry=self.registry)
         refused = "Requests refused by the gate, by the kind of the problem: "
         refused += "`token-unknown` for a token that is not known or was revoked."
         self._refused = Counter("daq_refused_requests", refused, ("reason",), registry=self.registry)

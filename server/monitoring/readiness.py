@@ -9,13 +9,14 @@ from collections.abc import Callable
 from server.clock import Clock
 
 KEPT_FOR = 1.0
-"""s for which a result is reused: a check writes to the disk, and may wait for the database."""
+"""Time (s) for which a result is reused, since a check writes to the disk and may wait for the database."""
 Checks = dict[str, str]
-"""What is wrong, by the name of what was checked; an empty text where nothing is."""
+"""What is wrong, by the name of the check; an empty text if nothing is."""
 
 
 class Readiness:
-    """Runs one check at a time, on a thread; requests that come meanwhile get its result. For the event loop alone."""
+    """Runs one check at a time, on a thread; requests that come meanwhile get its result. Use it on the event loop
+    only."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -24,7 +25,8 @@ class Readiness:
         self._running: asyncio.Task[Checks] | None = None
 
     async def check(self, look: Callable[[], Checks]) -> Checks:
-        """What `look`, called on a thread, returns; or returned less than KEPT_FOR s ago. Raises what it raises."""
+        """Returns what `look`, called on a thread, returns, or returned less than KEPT_FOR s ago. Raises what it
+        raises."""
         if self._clock.monotonic() - self._at < KEPT_FOR:
             return self._checks
         if self._running is None or self._running.done():

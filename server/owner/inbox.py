@@ -1,6 +1,6 @@
-"""Orders on their way from the service to the owner, read on a thread of their own.
+"""Reads orders of the service to the owner, on a thread of its own.
 
-An order that ends what runs takes effect at once, through the guardian, whatever the main thread is doing.
+An order that ends running work takes effect at once, through the guardian, whatever the main thread is doing.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from daq.acquisition.guardian import CANCEL
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 from server.owner.messages import (
     ORDER,
     Close,
@@ -33,14 +34,14 @@ from server.owner.messages import (
 )
 
 LONGEST_ORDER = 256 << 20
-"""Bytes: a recorded path of hours."""
+"""Largest order in bytes, enough for a recorded path of hours."""
 
 
 class Inbox:
-    """Reads orders until the service closes its end, or says `close`.
+    """Reads orders until the service closes its end, or sends `Close`.
 
-    closing: the service wants the port back, or is gone
-    finish:  the teaching under way is to end in good order
+    closing: the service wants the port back, or has died
+    finish:  the teaching under way must end in good order
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -52,40 +53,40 @@ class Inbox:
         self._lock = threading.Lock()
         self._drive: JogDrive | None = None
         self._said = -math.inf
-        """When the newest jog command was said."""
+        """When the newest jog command was given."""
         self._long = 0
-        """Long orders that wait or run: while there are any, the loss of the service is a reason to freeze."""
+        """Number of long orders that wait or run. If there are any, the loss of the service freezes the arm."""
         self._thread = threading.Thread(target=self._read_all, name="inbox", daemon=True)
 
     def first(self) -> Open:
-        """The first order. Raises SpecError when it is not the one that says which robot."""
+        """Reads the first order. Raises SpecError if it is not `Open`."""
         line = self._input.readline(LONGEST_ORDER)
         try:
             return Open.model_validate_json(line)
         except ValidationError as error:
-            raise SpecError(f"owner: the first order: {error.errors()[0]['msg']}") from error
+            raise SpecError(f"owner: the first order: {first_invalid(error).message}") from error
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Orders are read within. The thread ends with the input, or with the process."""
+        """Reads orders from now on. The thread ends with the input, or with the process."""
         self._thread.start()
         yield
 
     def take(self, patience: float = 0.0) -> Long | Quick | None:
-        """The next order that waits; None when none comes within `patience` s, or the service is leaving."""
+        """Returns the next order; None if none comes within `patience` s, or the service ends."""
         try:
             return self._waiting.get(timeout=patience) if patience else self._waiting.get_nowait()
         except queue.Empty:
             return None
 
     def drive(self) -> JogDrive | None:
-        """The newest jog command, once."""
+        """Returns the newest jog command, and forgets it."""
         with self._lock:
             command, self._drive = self._drive, None
         return command
 
     def done(self) -> None:
-        """A long order has been carried out, or refused."""
+        """Notes that a long order has been carried out, or refused."""
         with self._lock:
             self._long -= 1
 
@@ -112,13 +113,13 @@ class Inbox:
                 self.finish.set()
             case JogDrive():
                 with self._lock:
-                    if order.said >= self._said:  # one that a newer one has overtaken drives nothing
+                    if order.said >= self._said:  # a command overtaken by a newer one is ignored
                         self._drive, self._said = order, order.said
             case Open() | Close():
                 raise SpecError("owner: this robot is open already")
             case RunExperiment() | JogBegin() | RunProgram() | LeadBegin():
                 with self._lock:
-                    if not self._long:  # else that word, and that command, are for what still goes on
+                    if not self._long:  # otherwise the command, and the request to finish, concern the running work
                         self._drive = None
                         self.finish.clear()
                     self._long += 1
@@ -132,7 +133,7 @@ class Inbox:
                 os.write(self._to_guardian, said)
 
     def _leave(self, told: bool) -> None:
-        """The guardian takes the end of its pipe as the loss of whoever started the work."""
+        """Tells the guardian to end the work. The end of the guardian's pipe means that the service has died."""
         if told:
             self._end_what_runs(b"stop\n")
         elif self._long:

@@ -1,4 +1,4 @@
-"""Orders that move the arm: an experiment, jogging, a taught program, leading by hand. One at a time."""
+"""Carries out orders that move the arm, one at a time: an experiment, jogging, a taught program, leading by hand."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from server.owner.quick_orders import carry_out
 
 
 def require_in_time(order: Long) -> None:
-    """Raises ReachError for an order that comes so late that an arm which begins now would surprise."""
+    """Raises ReachError for an order so late that a motion now would surprise people."""
     waited = time.monotonic() - order.asked
     if waited > BEGINS_WITHIN:
         line = f"the robot's process came to it after {waited:.1f} s, {BEGINS_WITHIN:g} s are allowed"
@@ -39,7 +39,7 @@ def require_in_time(order: Long) -> None:
 
 
 def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
-    """An experiment, as `daq run` does it."""
+    """Runs an experiment as `daq run` does."""
     result = run_experiment(
         RunSetup(
             robot.controller,
@@ -67,7 +67,7 @@ def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
 
 
 def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
-    """Jogging: the newest command drives the arm, for 0.3 s at most."""
+    """Jogs: the newest command drives the arm, for 0.3 s at most."""
     _require_ready(robot)
     newest: JogCommand | None = None
 
@@ -85,7 +85,7 @@ def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
 
 
 def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
-    """A taught program, checked from end to end before its first motion."""
+    """Runs a taught program, which is checked completely before its first motion."""
     _require_ready(robot)
     here = robot.arm().next_sample()
     planned = plan_program(order.program, robot.machine, here.set_point)
@@ -102,7 +102,7 @@ def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
 
 
 def lead(robot: OwnedRobot, order: LeadBegin) -> Answer:
-    """Joints led by hand until finished; the recorded path comes back, also of one that was stopped."""
+    """Lets joints be led by hand until `Finish`. The answer has the recorded path, even after a stop."""
     _require_ready(robot)
     kept: dict[str, object] = {}
 
@@ -118,7 +118,7 @@ def lead(robot: OwnedRobot, order: LeadBegin) -> Answer:
 
 
 def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
-    """A quick order's answer; its refusal is an answer too."""
+    """Returns the answer to a quick order; a refusal is an answer, too."""
     try:
         return Answer(number=order.number, data=carry_out(robot, order))
     except DaqError as error:
@@ -128,9 +128,9 @@ def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
 
 
 def _require_ready(robot: OwnedRobot) -> None:
-    """Raises SafetyError or StoppedError when neither keys nor programs may move the arm."""
+    """Raises SafetyError or StoppedError if neither keys nor programs may move the arm."""
     if (cause := robot.ended() or robot.control.halted) is not None:
-        raise StoppedError(f"the arm has been stopped: {cause}")
+        raise StoppedError(cause)
     line = limp_line(robot.read_gains())
     if line:
         raise SafetyError(f"{line}; hold the arm, reset it here, then set their gains; nothing moved")
@@ -149,7 +149,7 @@ def _between_samples(robot: OwnedRobot) -> None:
 
 
 def _allowed(robot: OwnedRobot, said: JogDrive) -> bool:
-    """One that drives a joint that is not there, or too fast, is refused; the arm holds."""
+    """Whether a jog command is allowed: every joint exists and is not driven too fast. Otherwise the arm holds."""
     for joint, velocity in said.velocities.items():
         if not 1 <= joint <= len(robot.machine.joints) or not abs(velocity) <= top_speed(robot.limits, joint):
             robot.say(f"jog refused: joint {joint} at {velocity:g} rad/s")

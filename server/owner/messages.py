@@ -1,4 +1,4 @@
-"""What the owner of a robot is told, and what it tells: one JSON object a line, on its standard input and output."""
+"""Messages to and from the owner of a robot: one JSON object a line, on its standard input and output."""
 
 from __future__ import annotations
 
@@ -15,22 +15,21 @@ from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
 from daq.teaching import Program
 
 WAITS_AT_MOST = 2.0
-"""s after which a quick order is not carried out any more: less than its asker waits for the answer (an assumption)."""
-
+"""Time (s) after which a quick order is refused: less than the service waits for the answer (an assumption)."""
 
 BEGINS_WITHIN = 5.0
-"""s after which an order that moves the arm is not begun any more: its process was put aside, say, and goes on now."""
+"""Time (s) after which an order that moves the arm is refused: the process may have been suspended meanwhile."""
 
 
 class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-# ---- what it is told
+# ---- to the owner
 
 
 class Open(_Message):
-    """The first line: which robot, where."""
+    """The first line: which robot to open, and where."""
 
     kind: Literal["open"] = "open"
     url: str
@@ -39,30 +38,31 @@ class Open(_Message):
     folder: Path
     robot: str
     memory_map: str | None = None
-    """Text of a memory map file; None for the one that ships."""
+    """Text of a memory map file; None for the one in the package."""
 
 
 class _Request(_Message):
-    """`number` comes back with the answer."""
+    """A request. The answer has the same `number`."""
 
     number: int
 
 
 class _QuickRequest(_Request):
-    """`asked` is the monotonic clock (s) of this computer when it was asked for. One that has waited longer than
-    WAITS_AT_MOST is refused: its asker may have given up, and the arm may be another's by now."""
+    """A quick request, made at the time `asked` (s, this computer's monotonic clock). It is refused after
+    WAITS_AT_MOST: the client may have given up, and another may have control of the arm by now."""
 
     asked: float
 
 
 class _LongRequest(_Request):
-    """As a quick one: one that has waited longer than BEGINS_WITHIN moves nothing, since nobody expects it any more."""
+    """A request that moves the arm, made at the time `asked`. It is refused after BEGINS_WITHIN, since nobody expects
+    the motion any more."""
 
     asked: float
 
 
 class RunExperiment(_LongRequest):
-    """Runs an experiment; answered when its trace is closed."""
+    """Runs an experiment. The answer comes when its trace is closed."""
 
     activity: ClassVar[Activity] = "experiment"
     kind: Literal["run"] = "run"
@@ -72,15 +72,15 @@ class RunExperiment(_LongRequest):
 
 
 class JogBegin(_LongRequest):
-    """Jogging until `Finish`; answered at its end."""
+    """Jogs until `Finish`. The answer comes at the end."""
 
     activity: ClassVar[Activity] = "jog"
     kind: Literal["jog_begin"] = "jog_begin"
 
 
 class JogDrive(_Message):
-    """Velocities (rad/s) for the next moment; replaces the command before. No answer. `said` is the monotonic clock
-    (s) of this computer when the client's command arrived: one that was held up on its way moves nothing."""
+    """Drives joints at these velocities (rad/s) for 0.3 s at most; replaces the command before. It has no answer.
+    `said`: when the client's command arrived (s, this computer's monotonic clock); a delayed command moves nothing."""
 
     kind: Literal["jog_drive"] = "jog_drive"
     velocities: dict[int, float]
@@ -88,7 +88,7 @@ class JogDrive(_Message):
 
 
 class RunProgram(_LongRequest):
-    """Carries out a taught program, or the one instruction of a step; answered at its end."""
+    """Runs a taught program, or a step, which is a program of one instruction. The answer comes at the end."""
 
     kind: Literal["program"] = "program"
     activity: Literal["program", "step"] = "program"
@@ -96,7 +96,7 @@ class RunProgram(_LongRequest):
 
 
 class LeadBegin(_LongRequest):
-    """Joints are led by hand until `Finish`; answered with the recorded path."""
+    """Lets joints be led by hand until `Finish`. The answer has the recorded path."""
 
     activity: ClassVar[Activity] = "lead"
     kind: Literal["lead_begin"] = "lead_begin"
@@ -116,26 +116,26 @@ class HaltRun(_Message):
 
 
 class ReadGains(_QuickRequest):
-    """P, I, D of all joints."""
+    """Reads P, I, D of all joints."""
 
     kind: Literal["read_gains"] = "read_gains"
 
 
 class WriteGains(_QuickRequest):
-    """Refused for a joint that would jump to its set point."""
+    """Writes gains. It is refused for a joint that would jump to its set point."""
 
     kind: Literal["write_gains"] = "write_gains"
     gains: dict[int, Gain]
 
 
 class ReadProcess(_QuickRequest):
-    """Process inputs, outputs, gripper."""
+    """Reads process inputs, outputs and gripper."""
 
     kind: Literal["read_process"] = "read_process"
 
 
 class WriteOutput(_QuickRequest):
-    """One process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped`."""
+    """Switches one process output, 0 to 7. It is refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["write_output"] = "write_output"
     output: int
@@ -144,7 +144,7 @@ class WriteOutput(_QuickRequest):
 
 
 class MoveGripper(_QuickRequest):
-    """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped`."""
+    """Closes or opens the gripper. It is refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["gripper"] = "gripper"
     closed: StrictBool
@@ -152,14 +152,14 @@ class MoveGripper(_QuickRequest):
 
 
 class Reset(_QuickRequest):
-    """The explicit end of a stop."""
+    """Ends a stop."""
 
     kind: Literal["reset"] = "reset"
     here: StrictBool
 
 
 class Close(_Message):
-    """Gives the port back. Ends what runs with a stop first."""
+    """Frees the port, after a stop of running work."""
 
     kind: Literal["close"] = "close"
 
@@ -188,11 +188,11 @@ Long = RunExperiment | JogBegin | RunProgram | LeadBegin
 Quick = ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
 
 
-# ---- what it tells
+# ---- from the owner
 
 
 class Opened(_Message):
-    """The controller has been greeted."""
+    """The controller has answered, and the robot is connected."""
 
     kind: Literal["opened"] = "opened"
     simulated: bool
@@ -202,16 +202,16 @@ class Opened(_Message):
 
 
 class LiveSample(ControlPeriod):
-    """One control period, whatever is going on."""
+    """The sample of one control period, whatever the arm is doing."""
 
     kind: Literal["live"] = "live"
     status: int
     lateness: float
-    """s by which it came later than the quickest samples after their ticks."""
+    """Delay (s) compared with the quickest samples."""
 
 
 class ArmReport(_Message):
-    """State of the arm and of the link; told when it changes, and once a second."""
+    """The state of the arm and of the link. It is sent when it changes, and once a second."""
 
     kind: Literal["arm"] = "arm"
     arm: ArmState
@@ -223,14 +223,14 @@ class ArmReport(_Message):
 
 
 class TeachingText(_Message):
-    """A line for whoever is teaching."""
+    """A line for the person who is teaching."""
 
     kind: Literal["told"] = "told"
     text: str
 
 
 class Answer(_Message):
-    """What became of a request. `problem` is empty when it was carried out; `exit_code` as the command line's."""
+    """The answer to a request. `problem` is empty if it was carried out; `exit_code` is that of the command line."""
 
     kind: Literal["answer"] = "answer"
     number: int
@@ -238,7 +238,7 @@ class Answer(_Message):
     problem: str = ""
     exit_code: int = 0
     finished: Finished | None = None
-    """Of an experiment that left a trace."""
+    """The end of an experiment that left a trace."""
 
 
 class CannotOpen(_Message):
@@ -248,7 +248,7 @@ class CannotOpen(_Message):
     problem: str
     exit_code: int
     busy: bool = False
-    """Another program has the port."""
+    """Whether another program uses the port."""
 
 
 Report = Annotated[

@@ -22,7 +22,7 @@ from server.owner.messages import ArmReport, TeachingText
 from server.owner.watched_controller import SampleMaker, WatchedController
 
 REPORT_EVERY = 1.0
-"""s between two reports of the arm's state when nothing changes."""
+"""Time (s) between two reports of the arm's state if nothing changes."""
 
 
 @dataclass
@@ -53,16 +53,16 @@ class OwnedRobot:
         self.controller.listener = listen
 
     def ended(self) -> str | None:
-        """Why the running work is to end; None if it is not."""
+        """Returns why the running work must end; None if it need not."""
         cause = self.guardian.cause
         return None if cause is None else cause.value
 
     def arm(self) -> ControllerArm:
-        """The controller as an arm that can be taught."""
+        """Returns the controller as an arm that can be taught."""
         return ControllerArm(self.controller, self.control, self.machine, self.ended)
 
     def read_gains(self) -> dict[int, Gain]:
-        """Reads the gains of the machine's joints, and keeps them for the report of limp joints."""
+        """Reads the gains of the machine's joints, and remembers them to report limp joints."""
         count = len(self.machine.joints)
         self.gains = {joint: gain for joint, gain in self.controller.gains().items() if joint <= count}
         return self.gains
@@ -74,7 +74,7 @@ class OwnedRobot:
     def tell_arm(self, *, anew: bool = False) -> None:
         """Reports the arm's state if it has changed, or once a second; in any case with `anew`."""
         arm, ended = self.control.arm, self.ended()
-        # Also before the board has confirmed it:
+        # The arm counts as stopped even before the board has confirmed it:
         stopping = ended is not None and arm.connected and arm.state is not State.FAULT
         counters = self.controller.counters.numbers() if self._due() else (self._told.counters if self._told else {})
         report = ArmReport(

@@ -1,4 +1,4 @@
-"""The owner's main loop: an order when one waits, else the next sample; back to the robot when the link was lost."""
+"""The owner's main loop: it carries out a waiting order, or else reads the next sample, and restores a lost link."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from server.owner.owned_robot import OwnedRobot
 from server.owner.watched_controller import is_frozen
 
 LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.DEAF)
-"""Ends of the work that are ends of this process too."""
+"""Causes that end not only the work but this process."""
 
 
 @dataclass
 class _BetweenAttempts:
-    """Waits between two attempts to connect again; whoever asks for something meanwhile is told how it is."""
+    """Waits between two attempts to reconnect, and refuses orders meanwhile."""
 
     robot: OwnedRobot
 
     def wait(self, timeout: float) -> bool:
-        """True when the service wants the port back, or somebody ends this process."""
+        """Returns True if the service wants the port back, or somebody ends this process."""
         until = time.monotonic() + timeout
         while not _leaving(self.robot):
             self.robot.tell_arm()
@@ -42,7 +42,7 @@ class _BetweenAttempts:
 
 
 def serve(robot: OwnedRobot) -> None:
-    """Until the service wants the port back. Raises what is no DaqError: a fault of this program; the arm is frozen."""
+    """Runs until the service wants the port back. Faults of this program freeze the arm and are raised."""
     _notice_a_stop_before_us(robot)
     last: int | None = None
     with robot.control.frozen_on_error():
@@ -67,18 +67,18 @@ def serve(robot: OwnedRobot) -> None:
 
 
 def _watch(robot: OwnedRobot, last: int | None) -> int:
-    """The next sample of an arm that nobody moves. Returns its tick."""
+    """Reads the next sample of an arm that nobody moves. Returns its tick."""
     snapshot = robot.controller.next_snapshot(last)
     if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
-        robot.control.stop("stopped on the board by somebody else")
+        robot.control.stop("on the board, by somebody else")
     return snapshot.tick
 
 
 def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
     if isinstance(order, Quick):
         answer = long_orders.answered_quickly(robot, order)
-        # Before the answer, since who has heard of a reset may resume the queue at once; and also where it looks as it
-        # did when it was told last: the service may have noted a stop since, which this process never came to tell.
+        # Before the answer, since a client that knows of a reset may resume the queue at once. Even if the state equals
+        # that of the last report: the service may have noted a stop since, which this process has never reported.
         robot.tell_arm(anew=True)
         robot.speaker.ended(answer)
         return
@@ -87,7 +87,7 @@ def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
             raise ReachError(_being_tried(robot))
         long_orders.require_in_time(order)
         robot.activity = order.activity
-        robot.tell_arm()  # at once: what cannot be done meanwhile is refused by the service
+        robot.tell_arm()  # at once, so that the service refuses orders that are not possible meanwhile
         answer = _moved(robot, order)
     except DaqError as error:
         answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
@@ -117,16 +117,16 @@ def _link_lost(robot: OwnedRobot, why: str) -> None:
 
 
 def _is_away(robot: OwnedRobot) -> bool:
-    """Whether the link has been lost, or the robot was silent for so long that it counted as lost."""
+    """Whether the link is lost, or the robot was silent for so long that it counts as lost."""
     return robot.controller.link.state is LinkState.LOST or not robot.control.arm.connected
 
 
 def _being_tried(robot: OwnedRobot) -> str:
-    return f"{robot.controller.link.url}: the link is lost; it is being tried again"
+    return f"{robot.controller.link.url}: the link is lost; the service tries to reconnect"
 
 
 def _come_back(robot: OwnedRobot) -> None:
-    """Tries until the link is there again. A stop that could not be delivered is delivered before anything else."""
+    """Tries to restore the link. A stop that could not be delivered is delivered before anything else."""
     _link_lost(robot, "link lost")
     try:
         if robot.controller.link.state is LinkState.LOST:
@@ -142,7 +142,7 @@ def _come_back(robot: OwnedRobot) -> None:
 
 
 def _answers_again(robot: OwnedRobot) -> None:
-    """One that was silent has to give a sample before it counts as there. Raises LinkError, NoSampleError."""
+    """Reads a sample of a robot that was silent, to check that it answers. Raises LinkError, NoSampleError."""
     if (cause := robot.control.halted) is not None:
         robot.control.stop(cause)
     robot.controller.next_snapshot()
@@ -150,7 +150,7 @@ def _answers_again(robot: OwnedRobot) -> None:
 
 def _notice_a_stop_before_us(robot: OwnedRobot) -> None:
     if StatusFlag.FROZEN in robot.controller.status().flags and robot.control.arm.state is State.IDLE:
-        robot.control.stop("stopped before this connection")
+        robot.control.stop("before this connection")
 
 
 def _refuse(robot: OwnedRobot, order: Long | Quick, line: str, exit_code: int) -> None:

@@ -1,4 +1,4 @@
-"""The owner of a robot from its first line of input to its last line of output."""
+"""The main program of the owner of a robot."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def main() -> int:
 
 
 def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
-    """Holds the port until the service wants it back. Raises DaqError, ProtocolError when it cannot be had."""
+    """Owns the port until the service wants it back. Raises DaqError, ProtocolError if it cannot be opened."""
     memory_map = default_memory_map() if opening.memory_map is None else parse_memory_map(opening.memory_map)
     with port_session(
         WatchedController.connect, opening.robot, opening.url, memory_map, parent=inbox.guardian_end

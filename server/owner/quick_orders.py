@@ -1,9 +1,10 @@
-"""Orders carried out between two samples: gains, process signals, gripper, reset. Nothing here moves joints."""
+"""Carries out orders between two samples: gains, process signals, gripper, reset. Nothing here moves joints."""
 
 from __future__ import annotations
 
 import time
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
 from daq.link import RequestRefusedError
@@ -29,11 +30,12 @@ _WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
 class NotFrozenError(DaqError):
     """The board has not confirmed that it took the measured posture as its set points."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
-    """The answer's data. Raises DaqError; nothing has changed then, except where its line says so."""
+    """Carries out an order, and returns the answer's data. Raises DaqError; nothing has changed then, unless the error
+    says so."""
     waited = time.monotonic() - order.asked
     if waited > WAITS_AT_MOST:
         line = f"{order.kind}: the robot's process came to it after {waited:.1f} s, {WAITS_AT_MOST:g} s are allowed"
@@ -69,10 +71,11 @@ def _write_gains(robot: OwnedRobot, order: WriteGains) -> dict[str, object]:
 
 
 def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) -> None:
-    """Raises StoppedError: after a stop nothing is switched but by somebody who says that they know of it."""
+    """Raises StoppedError if the arm is stopped, unless the order says that its sender knows of the stop."""
     cause = robot.ended() or robot.control.halted
     if cause is not None and not order.while_stopped:
-        raise StoppedError(f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still")
+        line = f"the arm has been stopped ({cause}): nothing was switched; while_stopped overrides this"
+        raise StoppedError(cause, line)
 
 
 def _process(robot: OwnedRobot) -> dict[str, object]:
@@ -85,11 +88,11 @@ def _process(robot: OwnedRobot) -> dict[str, object]:
 
 
 def _release(robot: OwnedRobot, order: Reset) -> None:
-    """Raises RequestRefusedError or SafetyError when another stop has come since the reset was asked for.
+    """Releases the arm. Raises RequestRefusedError or SafetyError if another stop has come since the reset was
+    requested.
 
-    The stop's number is read before the guardian is asked: a stop through the guardian reaches the guardian first and
-    then the board, so one that came before the number was read is known to the guardian, and a later one has another
-    number.
+    The stop's number is read before the guardian is asked. A stop through the guardian reaches the guardian first and
+    then the board, so the guardian knows of any stop before that read, and any later stop has another number.
     """
     controller, control = robot.controller, robot.control
     seen = controller.status().stop
@@ -115,7 +118,7 @@ def _overtaken(robot: OwnedRobot) -> SafetyError:
 
 
 def _reset(robot: OwnedRobot, order: Reset) -> str:
-    """Ends the stop, or the fault, that there was when it was asked for. One that has come since wins."""
+    """Ends the stop or fault that existed when the reset was requested. A stop that has come since remains."""
     control, here = robot.control, order.here
     if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
         return "was not stopped"
@@ -124,7 +127,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
-        control.stop(robot.ended() or "stopped on the board by somebody else")
+        control.stop(robot.ended() or "on the board, by somebody else")
         raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
     if (cause := robot.ended()) is not None:
         control.stop(cause)

@@ -1,4 +1,4 @@
-"""The controller with a listener: whoever takes a snapshot, for whatever reason, the live view has it too."""
+"""A controller with a listener, so that the live view gets every snapshot, whoever reads it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from server.owner.messages import LiveSample
 
 
 class WatchedController(Controller):
-    """A controller that tells `listener` every snapshot it delivers. The listener must not wait for anybody."""
+    """A controller that passes every snapshot to `listener`, which must not block."""
 
     listener: Callable[[BoardSnapshot], None] | None = None
 
@@ -22,7 +22,7 @@ class WatchedController(Controller):
         joints: Sequence[int] = EVERY_JOINT,
         set_points: Mapping[int, int] | None = None,
     ) -> BoardSnapshot:
-        """As `Controller.next_snapshot`."""
+        """Reads the next snapshot as `Controller.next_snapshot` does, and passes it on."""
         snapshot = super().next_snapshot(after, joints, set_points)
         if self.listener is not None:
             self.listener(snapshot)
@@ -38,7 +38,7 @@ class SampleMaker:
         self._rows: dict[tuple[int, ...], RowMaker] = {}
 
     def sample(self, snapshot: BoardSnapshot, now: float) -> LiveSample:
-        """`now` is the host's monotonic clock in s."""
+        """Converts a snapshot taken at the time `now` (s, monotonic)."""
         count = len(self._machine.joints)
         joints = tuple(joint for joint, _ in snapshot.joints if joint <= count)
         rows = self._rows.setdefault(joints, RowMaker(self._machine, joints, self._period))
@@ -57,5 +57,5 @@ class SampleMaker:
 
 
 def is_frozen(snapshot: BoardSnapshot) -> bool:
-    """Whether the board has been stopped, by whomever."""
+    """Whether the board is stopped, whoever stopped it."""
     return StatusFlag.FROZEN in snapshot.flags

@@ -1,1 +1,1 @@
-"""The queue of one robot: pure rules (states, order, schedule), and what carries them out."""
+"""The queue of one robot: it runs experiments one at a time, and pauses when a person must look first."""

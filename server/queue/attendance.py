@@ -14,8 +14,8 @@ class Attendance:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._until: float | None = None
-        """On the clock that goes on while the computer sleeps (s); None while nobody has said so, or somebody's leaving
-        has been noticed."""
+        """When the confirmation expires (s, on the clock that goes on during sleep); None if nobody has confirmed, or
+        the expiry has been noticed."""
 
     def say(self) -> None:
         """Confirms that an operator is present for the next ATTENDANCE s."""

@@ -37,5 +37,5 @@ class QueueContext:
     recorded: Callable[[Answer], None]
     """Called with the answer of every run that left a trace."""
     unfinished: Callable[[], None]
-    """Called after a run whose trace could not be closed, or taken in: what was written of it is there."""
+    """Called after a run whose trace could not be closed or added to the catalogue, to add what was written of it."""
     unattended: bool

@@ -1,4 +1,4 @@
-"""Runs of schedules, submitted when they are due."""
+"""Submits the runs of schedules when they are due."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ class DueRuns:
     def __init__(self, context: QueueContext) -> None:
         self._context = context
         self._hindered: dict[str, type[Exception]] = {}
-        """Schedules whose run is due and cannot be submitted, and what has been said about it."""
+        """The last error of each schedule whose run is due and cannot be submitted; it is reported once."""
         self._left_out: set[str] = set()
-        """Schedules whose runs are left out since the one before waits: said once, however many there are."""
+        """Schedules whose runs are skipped while the previous one waits; this is reported once."""
 
     def leave_out_missed(self) -> None:
-        """At the start: what was due while nobody was there to submit it is not made up for."""
+        """Skips the runs that were due while the service was not running. Called at the start."""
         context = self._context
         for identity in context.schedules.leave_out_missed(context.robot.name, context.clock.utc()):
             line = "runs that were due while the service was off were skipped"
             context.record_event("schedule", f"schedule {identity}: {line}")
 
     def submit(self) -> None:
-        """A run that cannot be submitted stays due, and is tried again; it holds up no other, and not the queue."""
+        """Submits all runs that are due. A run that cannot be submitted stays due and is tried again; it delays neither
+        other runs nor the queue."""
         now = self._context.clock.utc()
         for identity in self._context.schedules.due(self._context.robot.name, now):
             try:
@@ -39,7 +40,7 @@ class DueRuns:
                 self._hindered.pop(identity, None)
             except Exception as error:
                 if self._hindered.get(identity) is type(error):
-                    continue  # it has been said
+                    continue  # it has been reported
                 self._hindered[identity] = type(error)
                 log.exception("schedule %s", identity)
                 why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"

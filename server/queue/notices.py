@@ -1,7 +1,8 @@
-"""Why the queue is to be held until a person has looked: what was heard of since one last answered for it.
+"""Reasons to pause the queue until a person has looked, noted since a person last resumed it.
 
-Nothing that ends a person's part in the arm's motion may begin an experiment: a stop, a control that lapses or is given
-back, a connection that ends or comes back. Nobody who tells of these waits for the queue, so each is only noted here.
+An event that ends a person's part in the arm's motion must not start an experiment: a stop, control that lapses or is
+given back, a connection that ends or comes back. The threads that report these must not wait for the queue, so each is
+only noted here.
 """
 
 from __future__ import annotations
@@ -17,51 +18,52 @@ LOOK_FIRST = "look at the arm, then resume the queue"
 
 @dataclass(frozen=True)
 class Seen:
-    """What there was for a person to see when a request arrived. `notices`, `connections`: how many there had been."""
+    """What a person could have seen when a request arrived: the number of notices and of ended connections so far."""
 
     notices: int
     connections: int
 
 
 class Notices:
-    """The reason that waits to hold the queue. Its lock is held for a few assignments: call from any thread."""
+    """The reason to pause the queue. Safe to use from any thread, since its lock is held for a few assignments only."""
 
     def __init__(self) -> None:
         self.reason = ""
-        """Empty while nothing speaks for holding the queue."""
+        """The first reason noted; empty if there is none."""
         self._lock = threading.Lock()
         self._noted = 0
         self._newest = ""
         self._connections = 0
-        """Connections that have ended."""
+        """Number of connections that have ended."""
         self._connected = False
         self._link_lost = False
 
     def take(self) -> str:
-        """The reason, once."""
+        """Returns the reason, and forgets it."""
         with self._lock:
             reason, self.reason = self.reason, ""
             return reason
 
     @property
     def seen(self) -> Seen:
-        """What can be answered for by a request that arrives now."""
+        """What a person who sends a request now can have seen."""
         with self._lock:
             return Seen(self._noted, self._connections)
 
     def answer_for(self, seen: Seen) -> None:
-        """Forgets what a person had `seen`; anything newer, also where it was taken, waits to hold the queue."""
+        """Forgets the notices that a person had `seen`. The newest of any later ones becomes the reason, even if a
+        reason has been taken since."""
         with self._lock:
             self.reason = self._newest if self._noted > seen.notices else ""
 
     def note(self, reason: str) -> None:
-        """Anything else; the first reason stays until it is taken."""
+        """Notes a reason. The first one stays until it is taken."""
         with self._lock:
             self.reason = self.reason or reason
             self._newest, self._noted = reason, self._noted + 1
 
     def arm_reported(self, arm: ArmReport) -> None:
-        """A stop, a fault, or a link that is lost, and one that comes back: somebody may be at the cable."""
+        """Notes a stop, a fault, a lost link, or a link that comes back: somebody may be at the cable."""
         lost = arm.link == "lost"
         if held := why_held(arm):
             self.note(held)
@@ -70,30 +72,31 @@ class Notices:
         self._link_lost = lost
 
     def control_lapsed(self, name: str) -> None:
-        """A client that had the control went silent: nobody knows where its person is."""
-        self.note(f"the control of {name} has lapsed: {LOOK_FIRST}")
+        """Notes that a client that had control went silent, so that nobody knows where its person is."""
+        self.note(f"{name}'s control has lapsed: {LOOK_FIRST}")
 
     def control_given_back(self, name: str, waiting: int) -> None:
-        """On purpose. Whoever moved the arm by hand may still be beside it, and need not know what waits."""
+        """Notes that a person gave control back while experiments wait: they may still be beside the arm, unaware of
+        the experiments."""
         if waiting:
-            self.note(f"{name} gave the control back while {_counted(waiting)}: {LOOK_FIRST}")
+            self.note(f"{name} gave control back while {_counted(waiting)}: {LOOK_FIRST}")
 
     def stop_asked(self, name: str) -> None:
-        """Somebody wants nothing to move, whatever became of the stop: no arm need be connected that could tell."""
-        self.note(f"{name} asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+        """Notes that somebody requested a stop, even if it was not delivered, or no arm is connected."""
+        self.note(f"{name} requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
 
     def operator_left(self) -> None:
-        """An operator who had said to be there has not said so for too long."""
-        self.note(f"no operator says to be there any more: {LOOK_FIRST}")
+        """Notes that an operator's confirmed presence has expired."""
+        self.note(f"no operator confirms presence any more: {LOOK_FIRST}")
 
     def connection_made(self, waiting: int) -> None:
-        """Connecting moves nothing, whatever waits."""
+        """Notes that the robot was connected while experiments wait, since connecting must not start them."""
         self._connected, self._link_lost = True, False
         if waiting:
             self.note(f"the robot was connected while {_counted(waiting)}: {LOOK_FIRST}")
 
     def connection_ended(self, why: str) -> None:
-        """With its process; nothing where there was none, but an attempt to make one."""
+        """Notes the end of a connection. An attempt to connect that failed is not noted."""
         was, self._connected = self._connected, False
         if was:
             with self._lock:

@@ -1,4 +1,4 @@
-"""What speaks against the queue's moving the arm now. Pure."""
+"""Decides whether the queue may move the arm now, and if not, says what is missing. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from server.owner.messages import ArmReport
 
 @dataclass(frozen=True)
 class Circumstances:
-    """All that counts. `attended`: an operator says to be there, or nobody has to be."""
+    """Everything that the decision depends on. `attended`: an operator has confirmed presence, or none is needed."""
 
     identity: RobotIdentity | None
     arm: ArmReport | None
@@ -21,22 +21,22 @@ class Circumstances:
 
 @dataclass(frozen=True)
 class Missing:
-    """What is missing, in one line. `pause`: why the queue is paused until a person has looked; empty where waiting is
-    enough."""
+    """What is missing, in one line. `pause`: why the queue must be paused until a person has looked; empty if waiting
+    is enough."""
 
     line: str
     pause: str = ""
 
 
 def why_held(arm: ArmReport) -> str:
-    """Why the queue waits for a person after a stop or a fault of the arm; empty in every other state."""
+    """Returns why the queue must wait for a person after a stop or a fault of the arm; empty in every other state."""
     if arm.arm not in ("stopped", "fault"):
         return ""
     return f"the arm is {arm.arm} ({arm.cause}): look at it, reset it, then resume the queue"
 
 
 def what_is_missing(now: Circumstances) -> Missing | None:
-    """The first thing that is missing; None when an experiment may begin."""
+    """Returns the first thing that is missing; None if an experiment may begin."""
     if now.identity is None or now.arm is None:
         return Missing(f"the robot is not connected. {now.connection_problem}".strip())
     state, held = now.arm.arm, why_held(now.arm)
@@ -46,7 +46,7 @@ def what_is_missing(now: Circumstances) -> Missing | None:
         (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
         (
             not now.identity.simulated and not now.consent,
-            Missing("an operator has to allow the queue to move this arm: pause it, then resume it (moves_real_arm)"),
+            Missing("an operator must allow the queue to move this arm: pause it, then resume it (moves_real_arm)"),
         ),
         (
             not now.attended,

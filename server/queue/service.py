@@ -1,4 +1,4 @@
-"""The queue of one robot: takes experiments in, lets them run one at a time, and waits for a person where it must."""
+"""The queue of one robot: it takes experiments, runs them one at a time, and pauses when a person must look first."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from server.queue.readiness import Circumstances, what_is_missing, why_held
 from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
-"""s between two looks for what has become due: the wall clock may be set meanwhile."""
+"""Time (s) between two checks for due experiments, since the wall clock may be set meanwhile."""
 log = logging.getLogger("server.queue")
 
 
@@ -41,7 +41,7 @@ class Running:
 
 @dataclass(frozen=True)
 class Ended:
-    """An experiment whose end is to be written."""
+    """An experiment whose end must be written to the database."""
 
     id: str
     ending: Ending
@@ -57,23 +57,23 @@ class QueueService:
         self._changed = threading.Event()
         self._closing = False
         self._consented: int | None = None
-        """The connection, as `Seen` counts them, that a person's word to move a real arm was given for."""
+        """The connection, by its number in `Seen`, for which a person consented to moving a real arm."""
         self._attendance = Attendance(context.clock)
         self._running: Running | None = None
         self._waiting_for = ""
         self.notices = Notices()
         """Reasons to pause the queue that no operator has acknowledged yet. Call `wake` after adding one."""
         self._written = True
-        """Whether the database knows the state."""
+        """Whether the state is in the database."""
         self._ended: Ended | None = None
-        """What ran last, where the database could not be told of its end: nothing else begins until it is."""
+        """The last experiment, if its end could not be written yet: no other begins until it is."""
         self._runs = DueRuns(context)
         self._state = self._state_at_start()
         self._runs.leave_out_missed()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
 
     def start(self) -> None:
-        """Begins to take experiments."""
+        """Starts the worker thread, which runs experiments."""
         self._worker.start()
 
     @property
@@ -82,7 +82,8 @@ class QueueService:
         return self._running
 
     def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
-        """Queues an experiment; False if the same key did so before. Raises a 409 for a key of another request."""
+        """Queues an experiment, and returns it with True; or returns the one that the key made before, with False.
+        Raises a 409 if the key was used for another request."""
         experiment, new = self._context.experiments.submit(
             self._context.robot.name, request, self._context.clock.utc(), by, key
         )
@@ -133,7 +134,7 @@ class QueueService:
 
     def attend(self) -> None:
         """Confirms that an operator is present for the next 60 s. Takes no lock, since the event loop calls this."""
-        self._notice_absence()  # one who comes back too late does not make up for it
+        self._notice_absence()  # a late confirmation does not undo the absence before it
         self._attendance.say()
         self.wake()
 
@@ -169,7 +170,7 @@ class QueueService:
 
     def wake(self) -> None:
         """Wakes the worker thread, since something has changed that may let the next experiment begin."""
-        self._changed.set()  # and nothing else: whoever calls must not wait for a disk
+        self._changed.set()  # and nothing else: callers must not wait for a disk
 
     def progressed(self, fraction: float, text: str) -> None:
         """Records the progress of the running experiment."""
@@ -178,16 +179,16 @@ class QueueService:
             running.progress, running.text = fraction, text
 
     def with_progress(self, experiment: Experiment) -> Experiment:
-        """`experiment` with its progress, if it is running."""
+        """Returns `experiment` with its progress, if it is running."""
         running = self._running
         if running is None or running.id != experiment.id or experiment.state != "running":
             return experiment
         return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
 
     def status(self) -> QueueStatus:
-        """Now. Waits for nothing, neither for a disk nor for whoever holds the queue: the event loop asks this."""
+        """Returns the status now. It waits neither for a disk nor for the lock, since the event loop calls this."""
         running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
-        if not state.paused and (held := self.notices.reason):  # it is held from this moment on, and written down soon
+        if not state.paused and (held := self.notices.reason):  # the queue counts as paused from now on
             state = QueueState(True, held, self._context.clock.utc())
         attended = self._context.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
         return QueueStatus(
@@ -201,13 +202,13 @@ class QueueService:
         )
 
     def take_no_more(self) -> None:
-        """Lets nothing begin any more. What is heard of from now on is the service's own end, and holds nothing."""
+        """Lets no further experiment begin. Later notices come from the service's own end, and pause nothing."""
         with self._lock:
             self._closing = True
         self._changed.set()
 
     def close(self, patience: float) -> None:
-        """Lets nothing begin any more, and waits for what the robot's owner says about what ran."""
+        """Lets no further experiment begin, and waits until the end of the running one is written."""
         self.take_no_more()
         if self._worker.is_alive():
             self._worker.join(patience)
@@ -231,13 +232,14 @@ class QueueService:
         return state
 
     def _hold(self, reason: str, *, anew: bool = False) -> bool:
-        """Pauses, under the lock; False where it is paused already, and keeps its first reason unless it is `anew`."""
+        """Pauses the queue, under the lock. Unless `anew`, a queue that is paused already keeps its reason, and this
+        returns False."""
         if self._state.paused and not anew:
             return False
         self._state, self._written = QueueState(True, reason, self._context.clock.utc()), False
         try:
             self._write_state()
-        except Exception:  # it is paused, whatever the disk says, and is written as soon as that is possible
+        except Exception:  # it is paused nevertheless, and this is written as soon as possible
             log.exception("queue: paused: %s: not written yet", reason)
         return True
 
@@ -270,13 +272,13 @@ class QueueService:
                     self._carry_out(experiment)
                     continue
             except Exception:
-                # A disk that is full, a database that is locked: the queue must not end with it, nor go on blindly.
+                # The disk may be full, or the database locked: the queue must neither end nor go on blindly.
                 log.exception("queue")
-                self._waiting_for = "the queue met an error of this program: see the log"
+                self._waiting_for = "an error occurred in the queue: see the log"
             self._changed.wait(LOOK_EVERY)
 
     def _settle(self) -> None:
-        """What was noticed holds the queue, and what could not be written is written before anything begins."""
+        """Pauses the queue for any notice, and writes what could not be written before, before anything begins."""
         self._notice_absence()
         with self._lock:
             if not self._closing and (reason := self.notices.take()):
@@ -285,7 +287,7 @@ class QueueService:
             self._write_end()
 
     def _take(self) -> Experiment | None:
-        """The next experiment, with the control of the robot; None when none may begin now."""
+        """Takes control of the robot for the next experiment, and returns that; None if none may begin now."""
         context = self._context
         with self._lock:
             now = context.clock.utc()
@@ -299,24 +301,24 @@ class QueueService:
             if not context.control.take_for_queue(following.id):
                 self._waiting_for = "somebody has control of the robot"
                 return None
-            if self.notices.reason:  # a control that has just ended, say: the queue is held first
+            if self.notices.reason:  # for example, a client's control has just ended: the queue must pause first
                 context.control.give_back_for_queue()
                 self.wake()
                 return None
-            self._running = Running(following.id)  # before it leaves those that wait: the queue never looks empty
+            self._running = Running(following.id)  # before it stops waiting, so that the queue never looks empty
             try:
                 return context.experiments.begin(context.robot.name, following.id, context.clock.utc())
             except BaseException as error:
                 self._running = None
                 context.control.give_back_for_queue()
-                if isinstance(error, IllegalEventError):  # cancelled in this moment
+                if isinstance(error, IllegalEventError):  # it has just been cancelled
                     return None
                 raise
 
     def _what_is_missing(self) -> str:
         robot = self._context.robot
         if robot.arm is not None:
-            self.notices.arm_reported(robot.arm)  # what this decision is made from has been noticed before it
+            self.notices.arm_reported(robot.arm)  # so that the state behind this decision has been noted
         attended = self._attendance.left > 0 or not self._needs_attendance()
         missing = what_is_missing(
             Circumstances(robot.identity, robot.arm, robot.problem, self._has_consent(), attended)
@@ -326,12 +328,13 @@ class QueueService:
         return "" if missing is None else missing.line
 
     def _notice_absence(self) -> None:
-        """An operator who had said to be there, and says so no more, holds the queue: also while nothing waits."""
+        """Pauses the queue once an operator's confirmed presence has expired, even while nothing waits."""
         if self._attendance.has_lapsed() and self._needs_attendance():
             self.notices.operator_left()
 
     def _carry_out(self, experiment: Experiment) -> None:
-        """From its begin to its end, whatever fails meanwhile: then a person looks before the next one."""
+        """Runs an experiment to its end. If anything fails, the queue pauses, so that a person looks before the next
+        one."""
         context = self._context
         try:
             context.robot.experiment = experiment.id
@@ -348,7 +351,7 @@ class QueueService:
             ending = self._as_wished(ending, self._running)
             state = advance("running", ending.event)
             why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
-            held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
+            held = ending.holds_queue and self._hold(why)  # first, so that clients told of the end find it paused
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()
@@ -361,7 +364,7 @@ class QueueService:
             context.record_event("queue", f"paused: {why}")
 
     def _write_end(self) -> None:
-        """Of what ran last, under the lock. Raises what the database does; the end is kept then."""
+        """Writes the end of the last experiment, under the lock. If the database raises an error, the end is kept."""
         ended, context = self._ended, self._context
         if ended is None:
             return
@@ -369,15 +372,15 @@ class QueueService:
         try:
             context.experiments.end(context.robot.name, ended.id, ending.event, ended.at, ending.reason, ending.outcome)
         except (IllegalEventError, ProblemError):
-            log.exception("experiment %s", ended.id)  # it has an end, or is gone: nothing is left to be written
+            log.exception("experiment %s", ended.id)  # it has an end already, or was deleted: nothing to write
         self._ended = None
         what = "completed" if ending.event is Event.COMPLETED else state
         context.record_event("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
         if ending.untaken:
-            context.unfinished()  # the database can be written again, and finds the trace in its folder
+            context.unfinished()  # the database can be written to again, so the trace can be added from its folder
 
     def _run(self, experiment: Experiment) -> Ending:
-        """How it ended. Raises whatever keeps it from being begun, or loses it."""
+        """Runs an experiment, and returns how it ended. Raises any error that prevents or loses it."""
         context = self._context
         with self._lock:
             running = self._running
@@ -405,7 +408,7 @@ class QueueService:
         return ending
 
     def _await(self, answer: Future[Answer]) -> Answer:
-        """The answer; on a real arm that must be attended, an operator's absence ends the run with a stop."""
+        """Waits for the answer. On a real arm that must be attended, an operator's absence ends the run by a stop."""
         while True:
             try:
                 return answer.result(LOOK_EVERY)
@@ -417,7 +420,7 @@ class QueueService:
                         self._context.robot.tell(HaltRun())
 
     def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
-        """The ending with the reason of a stop: who cancelled the run, or the end of the service."""
+        """Returns the ending with the reason of a stop: who cancelled the run, or the end of the service."""
         if ending.event is not Event.STOPPED:
             return ending
         if self._closing:
@@ -428,6 +431,6 @@ class QueueService:
 
 
 def _ended_as(experiment: Experiment, state: ExperimentState) -> str:
-    """`ramp failed`: people know an experiment by its name, not by its number."""
+    """Returns a line such as `ramp failed`, since people know an experiment by its name, not by its number."""
     name = experiment.spec.name or experiment.spec.trajectory.kind.replace("_", " ")
     return f"{name} {state}" if state == "failed" else f"{name} was {state}"

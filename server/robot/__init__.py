@@ -1,1 +1,1 @@
-"""One robot as the service holds it: its owner's process, its state, who may move it, and its stop."""
+"""One robot in the service: the process that owns its port, its state, who may move it, and its stop."""

@@ -1,5 +1,4 @@
-"""Who may move the robot: one client with a lease that it renews, or the queue while an experiment runs. Pure rules,
-and a desk that keeps them under a lock."""
+"""Who may move the robot: one client with a lease that it renews, or the queue while an experiment runs."""
 
 from __future__ import annotations
 
@@ -15,18 +14,18 @@ from server.clock import Clock
 from server.problems import ProblemError, conflict
 
 LEASE_TIME = 10.0
-"""s that a lease holds without a heartbeat: an assumption, longer than a page takes to load again."""
+"""Time (s) for which a lease holds without a heartbeat: an assumption, longer than a page takes to reload."""
 LOOK_EVERY = 1.0
-"""s between two looks at a lease: a wait stands still while the computer sleeps, the lease does not."""
+"""Time (s) between two checks of a lease. A longer wait would not end while the computer sleeps, but the lease does."""
 HEARTBEAT_EVERY = 3.0
-"""s between heartbeats that clients are asked for: two may be lost."""
+"""Time (s) between the heartbeats that clients should send: two may be lost."""
 log = logging.getLogger("server.robot")
 
 
 @dataclass(frozen=True)
 class Lease:
-    """The control of a client. `expires` is on the clock that goes on while the computer sleeps (s): a wall
-    clock that is set back lengthens nothing, nor does sleep."""
+    """A client's control. `expires` (s) is on the clock that goes on during sleep, so that neither sleep nor a wall
+    clock that is set back lengthens the lease."""
 
     secret: str
     name: str
@@ -34,17 +33,16 @@ class Lease:
     moves_real_arm: bool
 
     def holds(self, now: float) -> bool:
-        """Whether it has not lapsed."""
+        """Whether the lease has not lapsed."""
         return now < self.expires
 
 
 class ControlService:
-    """Gives the control of one robot out.
+    """Grants control of one robot.
 
-    lapsed:     called with the holder's name when a lease ends by silence, on a thread of the desk's own or of the next
-                client
-    given_back: called with it when the holder gives the control back
-    The queue gets the control only after these have returned.
+    lapsed:     called with the holder's name when a lease lapses, on a thread of its own or of the next client
+    given_back: called with the holder's name when they give control back
+    The queue gets control only after these have returned.
     """
 
     def __init__(
@@ -54,7 +52,7 @@ class ControlService:
         self._lapsed = lapsed
         self._given_back = given_back
         self._endings = 0
-        """Leases that have ended, and whose end is still being told."""
+        """Number of ended leases whose listeners are still being called."""
         self._changed = threading.Condition()
         self._lease: Lease | None = None
         self._queue: str | None = None
@@ -63,7 +61,7 @@ class ControlService:
         self._watch.start()
 
     def take(self, name: str, *, moves_real_arm: bool) -> ControlLease:
-        """The control, for one client. Raises a 409 when somebody else has it."""
+        """Gives control to a client. Raises a 409 if somebody else has it."""
         with self._changed:
             now = self._clock.elapsed()
             if self._queue is not None:
@@ -79,12 +77,12 @@ class ControlService:
             self._endings += silent is not None
             self._changed.notify_all()
             told = self._told(self._lease, now)
-        if silent is not None:  # it lapsed in this very moment, and nobody has said so yet
+        if silent is not None:  # it has just lapsed, and this has not been reported yet
             self._tell_end(self._lapsed, silent.name)
         return told
 
     def renew(self, secret: str) -> ControlLease:
-        """The heartbeat. Raises a 409 when the lease has lapsed, or is another's."""
+        """Renews the lease at a heartbeat. Raises a 409 if the lease has lapsed, or is another's."""
         with self._changed:
             now = self._clock.elapsed()
             lease = replace(self._require(secret, now), expires=now + LEASE_TIME)
@@ -93,7 +91,7 @@ class ControlService:
             return self._told(lease, now)
 
     def give_back(self, secret: str) -> None:
-        """Ends the lease. Raises a 409 when it is not this client's."""
+        """Ends the lease. Raises a 409 if it is not this client's."""
         with self._changed:
             name = self._require(secret, self._clock.elapsed()).name
             self._lease = None
@@ -102,12 +100,12 @@ class ControlService:
         self._tell_end(self._given_back, name)
 
     def require(self, secret: str | None) -> Lease:
-        """The lease that allows a motion now. Raises a 409 when there is none, or it is another's."""
+        """Returns the lease that allows a motion now. Raises a 409 if there is none, or it is another's."""
         with self._changed:
             return self._require(secret, self._clock.elapsed())
 
     def require_free_of_others(self, secret: str | None) -> None:
-        """Raises a 409 when somebody else has the control: for what changes the robot without moving it."""
+        """Raises a 409 if somebody else has control. For requests that change the robot without moving it."""
         with self._changed:
             now = self._clock.elapsed()
             held = self._lease is not None and self._lease.holds(now)
@@ -119,8 +117,8 @@ class ControlService:
                 )
 
     def take_for_queue(self, experiment: str) -> bool:
-        """The queue's own control, for one experiment; False while a client has it, or its end is still being told:
-        what it was moving is told to hold first."""
+        """Gives control to the queue for one experiment. Returns False while a client has it, or while the end of a
+        lease is still being reported, since what that client was moving must hold first."""
         with self._changed:
             if self._lease is not None or self._endings:
                 self._changed.notify_all()
@@ -129,12 +127,12 @@ class ControlService:
             return True
 
     def give_back_for_queue(self) -> None:
-        """The experiment has ended."""
+        """Takes control from the queue when its experiment has ended."""
         with self._changed:
             self._queue = None
 
     def status(self) -> Control:
-        """Who has control, without the lease's secret."""
+        """Returns who has control, without the lease's secret."""
         with self._changed:
             now = self._clock.elapsed()
             if self._queue is not None:
@@ -155,7 +153,7 @@ class ControlService:
     def _require(self, secret: str | None, now: float) -> Lease:
         if secret is None:
             advice = "take control with POST …/control, and send its lease in the header Control-Lease"
-            raise ProblemError(409, "control-needed", "only who has control of the robot can move it", advice)
+            raise ProblemError(409, "control-needed", "only the client that has control can move the robot", advice)
         if self._lease is None or not _same(self._lease.secret, secret):
             raise conflict("control-lost", "you no longer have control of the robot", "take control again")
         if not self._lease.holds(now):
@@ -188,11 +186,11 @@ class ControlService:
             self._tell_end(self._lapsed, lease.name)
 
     def _tell_end(self, listener: Callable[[str], None], name: str) -> None:
-        """Whoever hears of it may fail; the control goes on, and the next end is told too."""
+        """Calls a listener. Its errors are logged, so that later ends are reported, too."""
         try:
             listener(name)
         except Exception:
-            log.exception("the end of the control of %s", name)
+            log.exception("the end of %s's control", name)
         finally:
             with self._changed:
                 self._endings -= 1

@@ -1,4 +1,4 @@
-"""Keeps a robot connected for as long as somebody wants it to be: tries again, with doubling delays."""
+"""Keeps a robot connected while somebody wants it to be; it retries with doubling delays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from daq.transport import ReconnectDelay
 from server.robot.robot import Robot
 
 PATIENCE = 20.0
-"""s for a process to freeze the arm, close its trace and end, on a busy computer."""
+"""Time (s) for a process to freeze the arm, close its trace and end, on a busy computer."""
 DELAYS = ReconnectDelay(first_s=1.0, longest_s=30.0)
 log = logging.getLogger("server.robot")
 
@@ -18,8 +18,9 @@ log = logging.getLogger("server.robot")
 class Keeper:
     """A thread that keeps a robot connected. Connecting moves nothing and resumes nothing that was interrupted."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, delays: ReconnectDelay = DELAYS) -> None:
         self._robot = robot
+        self._delays = delays
         self._changed = threading.Condition()
         self._wanted = False
         self._closing = False
@@ -32,14 +33,14 @@ class Keeper:
         self._thread.start()
 
     def connect(self) -> None:
-        """Connects, and keeps the robot connected. Raises ReachError when it cannot be reached; the thread retries."""
+        """Connects, and keeps the robot connected. Raises ReachError if it cannot be reached; the thread retries."""
         with self._changed:
             self._wanted = True
         self._robot.connect(anew=True, wanted=self._is_wanted)
         self._wake()
 
     def disconnect(self) -> bool:
-        """Disconnects, and stops running work first. True when the port is free."""
+        """Disconnects, after a stop of running work. Returns whether the port is free."""
         with self._changed:
             self._wanted = False
             self._changed.notify_all()
@@ -63,14 +64,14 @@ class Keeper:
             self._changed.notify_all()
 
     def _keep(self) -> None:
-        delays = DELAYS.delays()
+        delays = self._delays.delays()
         while True:
             with self._changed:
                 if self._closing:
                     return
                 missing = self._wanted and self._robot.connection == "disconnected"
                 if not missing:
-                    delays = DELAYS.delays()
+                    delays = self._delays.delays()
                     self._changed.wait()
                     continue
                 if self._changed.wait_for(lambda: self._closing or not self._wanted, next(delays)):
@@ -79,5 +80,5 @@ class Keeper:
                 self._robot.connect(wanted=self._is_wanted)
             except DaqError as error:
                 log.warning("robot %s: %s", self._robot.name, error)
-            except Exception:  # whatever it is, it is tried again: nobody else would
+            except Exception:  # retry after any error, since nothing else would
                 log.exception("robot %s", self._robot.name)

@@ -1,4 +1,4 @@
-"""Quick orders: carried out by the robot's owner between two samples, while nobody else needs them all."""
+"""Sends quick orders, which the robot's owner carries out between two samples."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from server.robot.robot import ANSWER_WITHIN, Robot
 
 
 def answer_of(robot: Robot, order: Callable[..., Any], **fields: object) -> Answer:
-    """The owner's answer. Raises a 409 at once while an experiment, a program or a lead goes on, a 429 when too many
-    wait already, the problem that the answer tells of, or ReachError when none comes in time."""
+    """Sends an order, and returns the owner's answer. Raises a 409 at once during an experiment, a program or leading
+    by hand, a 429 if too many orders wait, the problem in the answer, or ReachError if none comes in time."""
     activity = "experiment" if robot.experiment is not None else robot.arm.activity if robot.arm else "none"
     if activity not in ("none", "jog"):
         raise conflict("arm-busy", f"the arm is busy: {activity}", "wait for its end, or stop it")

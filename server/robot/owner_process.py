@@ -1,4 +1,4 @@
-"""The service's side of a robot's owner: starts the process, sends orders, hears reports."""
+"""The service's side of a robot's owner: starts the process, sends orders, receives reports."""
 
 from __future__ import annotations
 
@@ -8,31 +8,38 @@ import logging
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from server.owner.messages import REPORT, Answer, Close, Open, Order, Report
 
 GRACE = 4.0
-"""s that the process has to freeze the arm and close its trace when the service ends; it goes on alone after that,
-as the unit in deploy/ lets it."""
+"""Time (s) for the process to freeze the arm and close its trace when the service ends. If it needs longer it finishes
+alone, as the unit in deploy/ allows."""
 log = logging.getLogger("server.robot")
 
 
 class OwnerGoneError(DaqError):
-    """The process that owned the port has ended before it answered."""
+    """The process that owned the port ended before it answered."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class OwnerProcess:
-    """A running owner. `report` and `ended` are called on a thread of its own; `ended` once, last."""
+    """A running owner. `report` and `ended` are called on a thread of its own; `ended` is called once, last."""
 
-    def __init__(self, opening: Open, report: Callable[[Report], None], ended: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        opening: Open,
+        report: Callable[[Report], None],
+        ended: Callable[[str], None],
+        program: Sequence[str] = (sys.executable, "-m", "server.owner"),
+    ) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "server.owner"],
+            program,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C in the terminal is the service's to handle
@@ -49,11 +56,11 @@ class OwnerProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process, and in the name of its stop socket."""
+        """The process number, which is also in the name of its stop socket."""
         return self._process.pid
 
     def send(self, order: Order) -> None:
-        """Writes an order. One that finds nobody is lost: `ended` tells so."""
+        """Writes an order. It is lost if the process has ended, which `ended` reports."""
         assert self._process.stdin is not None
         with self._writing, contextlib.suppress(OSError, ValueError):
             self._process.stdin.write(order.model_dump_json().encode() + b"\n")
@@ -73,7 +80,7 @@ class OwnerProcess:
         return future
 
     def close(self, patience: float = GRACE) -> bool:
-        """Gives the port back; True when the process has ended within `patience` s."""
+        """Frees the port. Returns whether the process has ended within `patience` s."""
         self.send(Close())
         assert self._process.stdin is not None
         with contextlib.suppress(OSError):
@@ -87,7 +94,7 @@ class OwnerProcess:
         for line in self._process.stdout:
             try:
                 self._hear(REPORT.validate_json(line))
-            except Exception:  # half a line of a process that was killed, or a listener's fault; its end is told below
+            except Exception:  # half a line of a killed process, or a listener's fault; the end is reported below
                 log.exception("owner process %s: %.200r", self.pid, line)
         code = self._process.wait()
         self._process.stdout.close()

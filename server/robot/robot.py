@@ -39,11 +39,11 @@ from server.robot.owner_process import OwnerProcess
 from server.stopping.arm import Reach
 
 OPEN_WITHIN = 60.0
-"""s for a process to start, and a mock with its physics engine, on a busy computer."""
+"""Time (s) for a process to start, and a mock with its physics engine, on a busy computer."""
 ANSWER_WITHIN = 5.0
-"""s for an order that moves nothing."""
+"""Time (s) to wait for the answer to an order that moves nothing."""
 ORDERS_AT_ONCE = 8
-"""Quick orders that may wait for their answers: a robot that is silent holds up no more of the service's threads."""
+"""Number of quick orders that may wait for answers, so that a silent robot blocks no more of the service's threads."""
 log = logging.getLogger("server.robot")
 T = TypeVar("T")
 
@@ -70,16 +70,19 @@ class Seen:
 class Robot:
     """A robot, and the process that owns its port while it is connected.
 
-    listeners are called with every report of that process, on its thread; they must not wait.
+    listeners are called with every report of that process, on its thread; they must not wait. start_owner: starts it
     """
 
-    def __init__(self, place: RobotPlace, clock: Clock) -> None:
+    def __init__(
+        self, place: RobotPlace, clock: Clock, start_owner: Callable[..., OwnerProcess] = OwnerProcess
+    ) -> None:
         self.place = place
         self.clock = clock
+        self._start_owner = start_owner
         self.listeners: list[Callable[[Report], None]] = []
         self.disconnected: list[Callable[[str], None]] = []
         self.reached: list[Callable[[Reach], None]] = []
-        """Called whenever it is reached in another way than before; they must not wait."""
+        """Called whenever the way to reach the robot changes; they must not block."""
         self.experiment: str | None = None
         """The experiment of the queue that runs now."""
         self.room_for_orders = threading.BoundedSemaphore(ORDERS_AT_ONCE)
@@ -91,11 +94,11 @@ class Robot:
         self._arm: Seen | None = None
         self._sample: Seen | None = None
         self._terminal: Terminal | None = None
-        """The pseudo-terminal that it was reached at, where it is a mock's."""
+        """The pseudo-terminal at which it was reached, if it is a mock's."""
 
     @property
     def name(self) -> str:
-        """As in addresses, rows and files."""
+        """The robot's name, as in addresses, rows and files."""
         return self.place.name
 
     @property
@@ -120,7 +123,7 @@ class Robot:
 
     @property
     def arm_seen(self) -> Seen | None:
-        """The same, with its time."""
+        """The newest report of the arm's state, with its time."""
         return self._arm
 
     @property
@@ -138,16 +141,16 @@ class Robot:
 
     @property
     def owner_pid(self) -> int | None:
-        """Of the process that owns the port; None when there is none."""
+        """The number of the process that owns the port; None if there is none."""
         owner = self._owner
         return None if owner is None else owner.pid
 
     def connect(self, *, anew: bool = False, wanted: Callable[[], bool] = lambda: True) -> RobotIdentity:
         """Connects, or waits for a connection that is being made. Moves nothing. Raises ReachError, SpecError.
 
-        Unless it is wanted `anew`, by somebody who knows what is at its port, it is what was there before or nothing.
-        `wanted` is asked once more where nothing can come between it and the beginning: a `disconnect` either comes
-        before, and it is not wanted any more, or after, and ends what has begun.
+        Only with `anew`, for a person who knows what is at the port, may it reach another terminal than before.
+        `wanted` is called once more under the lock: a `disconnect` either comes before, and the connection is no longer
+        wanted, or after, and ends the connection.
         """
         with self._lock:
             if self._owner is None:
@@ -165,11 +168,11 @@ class Robot:
             raise ReachError(f"{self.place.url}: no greeting within {OPEN_WITHIN:g} s") from None
 
     def reach(self) -> Reach:
-        """How the robot can be stopped now."""
+        """Returns how the robot can be reached for a stop."""
         return Reach(self.name, self.place.url, self.owner_pid, self._terminal)
 
     def require_same_place(self) -> None:
-        """Raises ReachError where its port has become another program's: nothing may be sent there."""
+        """Raises ReachError if another program has got the port's number meanwhile: nothing may be sent there."""
         port = parse_port_url(self.place.url)
         if isinstance(port, SerialPort):
             try:
@@ -179,26 +182,26 @@ class Robot:
                 raise ReachError(self._problem) from error
 
     def disconnect(self, patience: float = 4.0) -> bool:
-        """Gives the port back; what runs is stopped first. True when that is done within `patience` s."""
+        """Frees the port, after a stop of running work. Returns whether this is done within `patience` s."""
         with self._lock:  # an attempt may just be starting its process
             owner = self._owner
         return True if owner is None else owner.close(patience)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
-        """Sends an order to the robot's owner. Raises ReachError when it is not connected."""
+        """Sends an order to the robot's owner. Raises ReachError if the robot is not connected."""
         with self._lock:
             if self._owner is None or self._identity is None:
                 raise ReachError(f"robot {self.name} is not connected")
             return self._owner.ask(kind, **fields)
 
     def tell(self, order: Order) -> None:
-        """Sends an order that has no answer; nobody is told when it is not connected."""
+        """Sends an order that has no answer. It is dropped if the robot is not connected."""
         owner = self._owner
         if owner is not None:
             owner.send(order)
 
     def note_stop(self) -> None:
-        """The board has confirmed a stop: the arm is stopped, whenever its owner's report of that comes. No waiting."""
+        """Notes a stop that the board has confirmed, before the owner reports it. Does not block."""
         arm = self.arm
         if arm is not None and arm.arm not in ("stopped", "fault"):
             stopped = arm.model_copy(update={"arm": "stopped", "cause": "a stop that the board has confirmed"})
@@ -217,9 +220,9 @@ class Robot:
             memory_map=place.memory_map,
         )
         try:
-            self._owner = OwnerProcess(opening, self._on_report, self._on_end)
+            self._owner = self._start_owner(opening, self._on_report, self._on_end)
             _notify_each(self.reached, self.reach())
-        except OSError as error:  # no memory, or no file is left for another process
+        except OSError as error:  # no memory or no file descriptor is left for another process
             self._problem = f"the robot's process cannot be started: {error.strerror or error}"
             raise ReachError(self._problem) from error
 

@@ -11,7 +11,7 @@ from server.robot.robot import Robot, Seen
 
 
 def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus:
-    """The status of `robot` now, with who has its control and the state of its queue."""
+    """Returns the status of `robot` now, with who has control and the state of its queue."""
     arm, seen = robot.arm, robot.arm_seen
     now, utc = robot.clock.monotonic(), robot.clock.utc()
     connected = robot.identity is not None
@@ -39,7 +39,7 @@ def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus
 
 
 def sample_of(seen: Seen | None, now: float, utc: float) -> Sample | None:
-    """A sample as clients get it. `now` (monotonic) and `utc` (wall clock) are the same moment (s)."""
+    """Converts a sample to what clients get. `now` (monotonic) and `utc` (wall clock) are the same time (s)."""
     if seen is None:
         return None
     sample = seen.report

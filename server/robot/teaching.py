@@ -1,4 +1,4 @@
-"""Teaching of one robot: jogging that begins with its first command, steps, programs, leading by hand."""
+"""Teaching of one robot: jogging, which begins with its first command, steps, programs, leading by hand."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from server.robot.robot import ANSWER_WITHIN, Robot
 LINES = 50
 """Number of lines for the operator that are kept."""
 LEAD_ENDS_WITHIN = PATIENCE + ANSWER_WITHIN
-"""s: the arm may take PATIENCE to come to rest before its gains are given back."""
+"""Time (s) for leading to end: the arm may take PATIENCE to come to rest before its gains are restored."""
 IF_A_LEAD_GOES_ON = (
     "HOLD THE ARM: led joints have no drive, and a stop does not hold them; reset it here, then set gains"
 )
@@ -41,8 +41,8 @@ IF_A_LEAD_GOES_ON = (
 
 @dataclass(frozen=True)
 class Word:
-    """A client's, that the arm is to move. `said`: when it arrived here (s, monotonic). `require_control` is called in
-    the last moment before the arm is asked, and raises where the client may not move it any more."""
+    """A client's request to move the arm. `said`: when it arrived (s, monotonic). `require_control` is called just
+    before the order is sent, and raises if the client may no longer move the arm."""
 
     said: float
     require_control: Callable[[], object] = lambda: None
@@ -51,12 +51,22 @@ class Word:
 class TeachingService:
     """Teaching by a client that has control. Safe to use from any thread.
 
-    notify: called with one line when a teaching has ended
+    notify:          called with one line when a teaching has ended
+    ends_within:     s that what was told to finish may take
+    lead_ends_within: s that a lead may take
     """
 
-    def __init__(self, robot: Robot, notify: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        notify: Callable[[str], None],
+        ends_within: float = ANSWER_WITHIN,
+        lead_ends_within: float = LEAD_ENDS_WITHIN,
+    ) -> None:
         self._robot = robot
         self._notify = notify
+        self._ends_within = ends_within
+        self._lead_ends_within = lead_ends_within
         self._changed = threading.Condition(threading.RLock())
         self._numbers = itertools.count(1)
         self._lines: deque[TeachingLine] = deque(maxlen=LINES)
@@ -67,9 +77,9 @@ class TeachingService:
         robot.listeners.append(self._on_report)
 
     def jog(self, velocities: dict[int, float], said: float) -> None:
-        """The newest command of whoever holds the key, and when it arrived here (s, monotonic). One that was held up
-        on its way for longer than it may drive the arm begins nothing. Raises a 409 when the arm will not, SpecError
-        for a joint that is not there or too fast."""
+        """Drives joints for a moment, by a command that arrived at the time `said` (s, monotonic). A command delayed by
+        longer than it may drive the arm is ignored. Raises a 409 if the arm cannot move now, SpecError for a joint that
+        does not exist or is too fast."""
         self._require_possible(velocities)
         self._require_not_stopped()
         with self._changed:
@@ -80,38 +90,39 @@ class TeachingService:
             self._robot.tell(JogDrive(velocities=velocities, said=said))
 
     def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:
-        """Begins a taught program. Raises a 409 while something else is taught, or without the control."""
+        """Begins a taught program. Raises a 409 while something else is taught, or without control."""
         with self._changed:
             self._begin(word, activity, RunProgram, program=program, activity=activity)
 
     def lead(self, word: Word, joints: tuple[int, ...]) -> None:
-        """Begins leading by hand. Raises a 409 while something else is taught, or without the control."""
+        """Begins leading by hand. Raises a 409 while something else is taught, or without control."""
         with self._changed:
             self._begin(word, "lead", LeadBegin, joints=joints)
 
     def finish(self) -> None:
-        """Ends jogging or leading in good order, and waits for the end. A program goes on to its own. Raises a 503 when
-        the end does not come."""
+        """Ends jogging or leading in good order, and waits for the end. A program goes on to its own end. Raises a 503
+        if the end does not come."""
         with self._changed:
             under_way = self._under_way
             if under_way is None or under_way[0] not in ("jog", "lead"):
                 return
             self._robot.tell(Finish())
             leading = under_way[0] == "lead"
-            within = LEAD_ENDS_WITHIN if leading else ANSWER_WITHIN
+            within = self._lead_ends_within if leading else self._ends_within
             if not self._changed.wait_for(lambda: self._under_way is not under_way, within):
                 line = f"{under_way[0]} did not end within {within:g} s"
                 raise ProblemError(503, "not-reached", line, IF_A_LEAD_GOES_ON if leading else "stop the robot")
 
     def hold(self) -> None:
-        """Ends teaching as control is gone: jogging and leading in good order, a program by a stop. Never blocks."""
+        """Ends teaching after control has ended: jogging and leading in good order, a program by a stop. Never
+        blocks."""
         with self._changed:
             under_way = self._under_way
         if under_way is not None:
             self._robot.tell(Finish() if under_way[0] in ("jog", "lead") else HaltRun())
 
     def status(self) -> TeachingStatus:
-        """Now."""
+        """Returns the status of teaching now."""
         with self._changed:
             return TeachingStatus(
                 activity="none" if self._under_way is None else self._under_way[0],
@@ -128,7 +139,7 @@ class TeachingService:
             line = f"the arm is busy: {self._under_way[0]}"
             raise conflict("arm-busy", line, "wait for its end, or stop it")
         self._require_not_stopped()
-        word.require_control()  # it may have lapsed while a jog came to its end
+        word.require_control()  # control may have lapsed while a jog came to its end
         asked = self._robot.ask(order, asked=word.said, **fields)
         self._result = self._problem = ""
         self._path = None

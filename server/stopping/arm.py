@@ -1,4 +1,4 @@
-"""A stop carried out: through the process that owns the robot's port, or through the port where no process does."""
+"""Carries out a stop: through the process that owns the robot's port, or at the port itself if no process owns it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, 
 
 @dataclass(frozen=True)
 class Reach:
-    """Where a robot is. `owner`: the process that owns its port, None where there is none; `terminal`: the
-    pseudo-terminal that it was reached at, where it is a mock's."""
+    """How to reach a robot. `owner`: the process that owns its port, None if there is none; `terminal`: the
+    pseudo-terminal at which it was reached, if it is a mock's."""
 
     robot: str
     url: str
@@ -23,29 +23,30 @@ class Reach:
 
 
 def stop_arm(reach: Reach) -> StopResult:
-    """Freezes the arm. Never raises: the result says what is known."""
+    """Freezes the arm. Never raises: the result says what happened."""
     begun = time.monotonic()
     answer = _ask(reach)
     if answer.confirmed:
-        text = f"stopped, confirmed by the board: set points frozen at tick {answer.tick}. {answer.text}".strip()
-    elif answer.delivered:
-        text = f"stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
+        head = "stopped, confirmed by the board"
+        detail = f"set points frozen at tick {answer.tick}. {answer.text}".strip()
     else:
-        text = f"stop NOT DELIVERED: {answer.text}. Use the emergency stop."
+        head = "stop sent, NOT CONFIRMED by the board" if answer.delivered else "stop NOT DELIVERED"
+        detail = f"{answer.text}. Use the emergency stop."
     return StopResult(
         delivered=answer.delivered,
         confirmed=answer.confirmed,
         tick=answer.tick,
         seconds=time.monotonic() - begun,
         note=answer.text,
-        text=text,
+        detail=detail,
+        text=f"{head}: {detail}",
     )
 
 
 def _ask(reach: Reach) -> StopAnswer:
     try:
         attempts = request_stop(reach.robot, reach.owner)
-    except OSError as error:  # no file is left for a socket, say
+    except OSError as error:  # for example, too many files are open for another socket
         return _undelivered(reach, f"the process that owns the port cannot be asked: {error.strerror or error}")
     if attempts:
         silent = _undelivered(reach, "the process that owns the port did not answer")

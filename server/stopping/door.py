@@ -1,4 +1,4 @@
-"""The service's side of the stop listener: starts its process, tells it who owns each port, hears of stops."""
+"""The service's side of the stop listener: starts its process, tells it who owns each port, and receives its stops."""
 
 from __future__ import annotations
 
@@ -10,38 +10,40 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
 from server.stopping.messages import NEWS, Begin, Known, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
-"""s for the process to start, on a busy computer."""
+"""Time (s) for the process to start on a busy computer."""
 BEGIN_AGAIN_AFTER, BEGIN_AGAIN_AT_MOST = 0.5, 8.0
-"""s before a process that has ended by itself is started again: the first time, and at most. Twice as long whenever one
-ends before it listens."""
+"""Shortest and longest time (s) before a process that has ended by itself is started again. The time doubles whenever
+a process ends before it listens."""
 END_WITHIN = 3.0
-"""s for requests under way when the service ends."""
+"""Time (s) to answer requests under way when the service ends."""
 log = logging.getLogger("server.stop")
 
 
 class StopDoorError(DaqError):
-    """The stop listener cannot be had: a service that only seems to have one does not start."""
+    """The stop listener does not start. The service does not start without it."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class StopDoor:
     """The listener's process, started again when it ends.
 
-    listener: bound, and kept open here: whoever connects while the process is started again waits for it
+    listener: a bound socket, kept open here, so that clients that connect while the process is restarted wait for it
     stopped:  called with every stop, on a thread of its own
     """
 
-    def __init__(self, listener: socket.socket, begin: Begin) -> None:
+    def __init__(self, listener: socket.socket, begin: Begin, begin_again_after: float = BEGIN_AGAIN_AFTER) -> None:
         self.stopped: Callable[[Stopped], None] = lambda _news: None
         self._listener = listener
         self._begin = begin
+        self._begin_again_after = begin_again_after
         self._lock = threading.Lock()
         self._owned: dict[str, Owned] = {}
         self._ready = threading.Event()
@@ -52,11 +54,11 @@ class StopDoor:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """The process number."""
         return self._process.pid
 
     def wait_ready(self) -> None:
-        """Until it listens. Raises StopDoorError."""
+        """Waits until the process listens. Raises StopDoorError."""
         if not self._ready.wait(READY_WITHIN):
             raise StopDoorError(f"stop listener: its process did not listen within {READY_WITHIN:g} s")
 
@@ -76,7 +78,7 @@ class StopDoor:
             self._send(Known(tokens=tokens))
 
     def close(self) -> None:
-        """No more requests; those under way are answered."""
+        """Ends the process, after it has answered the requests under way."""
         self._closing.set()
         with self._lock:
             self._end_input()
@@ -114,11 +116,11 @@ class StopDoor:
             self._process.stdin.close()
 
     def _listen(self) -> None:
-        after = BEGIN_AGAIN_AFTER
+        after = self._begin_again_after
         while True:
             self._hear_all()
             code = self._process.wait()
-            after = BEGIN_AGAIN_AFTER if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
+            after = self._begin_again_after if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
             self._ready.clear()
             with self._lock:
                 self._end_input()
@@ -132,7 +134,7 @@ class StopDoor:
                 return
 
     def _start_again(self) -> bool:
-        """False where the operating system has no process to give: it may have one later."""
+        """Starts the process; returns False if the operating system cannot start one now. It may later."""
         with self._lock:
             if self._closing.is_set():
                 return True

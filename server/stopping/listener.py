@@ -1,5 +1,5 @@
-"""A second door for the stop alone: just enough HTTP for `POST /api/v1/robots/{robot}/stop`, every request on a thread
-of its own, with the same names, tokens, origins and answers as at the service itself.
+"""An HTTP server for the stop alone: `POST /api/v1/robots/{robot}/stop`, every request on a thread of its own, with the
+same names, tokens, origins and answers as the service's.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from server.stopping.tokens import TokensCannotBeReadError
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
 READ_WITHIN = 2.0
-"""s in which a client must have asked: nobody keeps a place by sending now and then."""
+"""Time (s) in which a client must send its whole request, so that nobody occupies a connection by sending slowly."""
 MOST_AT_ONCE = 32
-"""Connections; one more is closed at once, and the service's own door is still there."""
+"""Number of connections at once. A further one is closed at once; the service itself still takes stops."""
 LARGEST_REQUEST = 96 << 10
-"""Bytes that are read of a connection; more than 100 headers are a 431, an address of more than 64 kB a 414."""
+"""Number of bytes that are read of a connection. More than 100 headers are a 431, an address of over 64 kB a 414."""
 LONGEST_BODY = 4096
-"""Bytes of a body that are read, so that the answer is not lost with it; nothing in it is looked at."""
+"""Number of bytes of a body that are read and ignored. A connection closed with unread bytes would lose the answer."""
 ANSWERED_WITHIN = 2.0
-"""s for what is under way when the listener ends: a stop is answered within 1.1 s."""
+"""Time (s) to answer requests under way when the listener ends; a stop is answered within 1.1 s."""
 log = logging.getLogger("server.stop")
 
 Stop = Callable[[], StopResult]
@@ -40,7 +40,7 @@ OnStop = Callable[[str, StopResult, Caller], None]
 
 
 class StopListener:
-    """Listens until closed. `stops` by robot; `on_stop` is given the robot, what became of its stop, and who asked."""
+    """Listens until closed. `stops`: by robot; `on_stop`: called with the robot, the stop's result, and who asked."""
 
     def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> None:
         self._server = _Server(listener, _handler(gate, stops, on_stop))
@@ -48,7 +48,7 @@ class StopListener:
         self._thread.start()
 
     def close(self) -> None:
-        """No more requests; those under way are answered."""
+        """Takes no more requests, and waits until those under way are answered."""
         self._server.shutdown()
         self._thread.join()
         self._server.server_close()
@@ -64,11 +64,11 @@ class _Server(ThreadingHTTPServer):
         self.socket = listener
         self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
         self._since: dict[socket.socket, float] = {}
-        """When each connection was made (s, monotonic). Entries are made and taken away by one operation each."""
+        """When each connection was made (s, monotonic). Adding and removing an entry are one atomic operation each."""
         self.server_activate()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """On a thread of its own, as long as there are not too many."""
+        """Handles a connection on a thread of its own, or closes it if there are too many."""
         if self._room.acquire(blocking=False):
             self._since[request] = time.monotonic()
             super().process_request(request, client_address)
@@ -76,7 +76,7 @@ class _Server(ThreadingHTTPServer):
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """As the base's; makes room at its end."""
+        """Handles a connection as the base class does, and then frees its place."""
         try:
             super().process_request_thread(request, client_address)
         finally:
@@ -84,46 +84,46 @@ class _Server(ThreadingHTTPServer):
             self._room.release()
 
     def service_actions(self) -> None:
-        """Twice a second: whoever has not asked in time has asked for nothing. An answer under way is still sent."""
+        """Stops reading, twice a second, from clients that have not sent a request in time. Answers are still sent."""
         latest = time.monotonic() - READ_WITHIN
         for request, begun in self._since.copy().items():
             if begun < latest:
-                with suppress(OSError):  # closed by now
+                with suppress(OSError):  # it has been closed meanwhile
                     request.shutdown(socket.SHUT_RD)
 
     def wait_for_answers(self, within: float) -> None:
-        """Until nobody has a place any more, or `within` s are over."""
+        """Waits until no connection is left, or `within` s are over."""
         until = time.monotonic() + within
         for _ in range(MOST_AT_ONCE):
             if not self._room.acquire(timeout=max(0.0, until - time.monotonic())):
                 return
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that goes away is no fault; anything else is in the log."""
+        """Logs the error of a request."""
         del request
         log.warning("stop listener: request of %s", client_address, exc_info=True)
 
 
 class _Bounded(io.RawIOBase):
-    """A stream that seems to end after so many bytes."""
+    """A stream that seems to end after `most` bytes."""
 
     def __init__(self, stream: io.BufferedIOBase, most: int) -> None:
         self._stream = stream
         self._left = most
 
     def readable(self) -> bool:
-        """It is."""
+        """Always True."""
         return True
 
     def readinto(self, buffer: Any) -> int:
-        """As many bytes as have come."""
+        """Reads the bytes that have arrived."""
         data = self._stream.read1(min(len(buffer), self._left))
         buffer[: len(data)] = data
         self._left -= len(data)
         return len(data)
 
     def close(self) -> None:
-        """Itself and the stream."""
+        """Closes this and the stream."""
         self._stream.close()
         super().close()
 
@@ -136,12 +136,12 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> type
         timeout = READ_WITHIN
 
         def setup(self) -> None:
-            """As the base's; no more is read than a request may have."""
+            """Sets up as the base class does, but limits what is read to the size of a request."""
             super().setup()
             self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))
 
         def do_POST(self) -> None:
-            """The stop."""
+            """Carries out the stop."""
             self._read_body()
             try:
                 robot, caller = self._admitted()
@@ -153,30 +153,30 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> type
                 self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
                 return
             result = stops[robot]()
-            on_stop(robot, result, caller)  # first: whoever asked may be gone, and the stop has been made
+            on_stop(robot, result, caller)  # before the answer: the client may be gone, and the stop has been made
             self._answer(200, result, "application/json")
 
         def do_OPTIONS(self) -> None:
-            """Whether the service's page may ask, which is at another port and so of another origin."""
+            """Answers whether the service's page may ask. It is at another port, and so of another origin."""
             headers = {"Access-Control-Allow-Methods": "POST", "Access-Control-Allow-Headers": "authorization"}
             self._answer(204, None, "", headers if gate.is_from_here(self._headers()) else {})
 
         def do_GET(self) -> None:
-            """Nothing else is here."""
+            """Refuses every other method."""
             problem = ProblemError(405, "no-such-method", f"{self.command} {self.path[:100]}: a stop is a POST")
             self._answer(problem.status, details_of(problem), MEDIA_TYPE)
 
         do_PUT = do_PATCH = do_DELETE = do_HEAD = do_GET
 
         def log_message(self, format: str, *args: object) -> None:
-            """With the other logs."""
+            """Writes to the service's log."""
             log.debug(format, *args)
 
         def _admitted(self) -> tuple[str, Caller]:
             found = ADDRESS.fullmatch(self.path)
             caller = gate.admit(self._headers())
             if found is None or found[1] not in stops:
-                raise not_found(f"address {self.path[:100]}", "here is POST /api/v1/robots/{robot}/stop alone")
+                raise not_found(f"address {self.path[:100]}", "this port takes POST /api/v1/robots/{robot}/stop alone")
             return found[1], caller
 
         def _headers(self) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What the stop listener is told, and what it tells: one JSON object a line, on its standard input and output."""
+"""Messages to and from the stop listener: one JSON object a line, on its standard input and output."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-# ---- what it is told
+# ---- to the listener
 
 
 class Begin(_Message):
@@ -28,9 +28,9 @@ class Begin(_Message):
     urls: dict[str, str]
     database_url: str
     sqlite: Path | None
-    """The database's file, where it is one of SQLite's."""
+    """The database's file, if it is a SQLite database."""
     tokens: dict[str, tuple[str, Role]] | None = None
-    """Name and role of each token that opens something, by its digest; None while the service has not read them."""
+    """Name and role of each valid token, by its digest; None while the service has not read them."""
 
 
 class Known(_Message):
@@ -41,8 +41,8 @@ class Known(_Message):
 
 
 class Owned(_Message):
-    """Which process owns a robot's port now; None when none does. `terminal`: the pseudo-terminal that the robot was
-    reached at, by number, time of creation and holder, as `daq.transport` knows it."""
+    """Which process owns a robot's port now; None if none does. `terminal`: the pseudo-terminal at which the robot was
+    reached, by number, time of creation and holder, as `daq.transport` knows it."""
 
     kind: Literal["owned"] = "owned"
     robot: str
@@ -50,17 +50,17 @@ class Owned(_Message):
     terminal: tuple[int, int, tuple[int, int] | None] | None = None
 
 
-# ---- what it tells
+# ---- from the listener
 
 
 class Ready(_Message):
-    """It listens."""
+    """The listener takes requests now."""
 
     kind: Literal["ready"] = "ready"
 
 
 class Stopped(_Message):
-    """A stop that was asked for there, what became of it in one line, and who asked."""
+    """A stop that was requested, its result in one line, and who requested it."""
 
     kind: Literal["stopped"] = "stopped"
     robot: str

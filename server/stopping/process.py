@@ -1,4 +1,4 @@
-"""The stop listener's process from its first line of input to the end of it."""
+"""The main program of the stop listener's process."""
 
 from __future__ import annotations
 
@@ -22,31 +22,32 @@ from server.stopping.messages import ORDER, Begin, Known, Owned, Ready, Stopped
 from server.stopping.tokens import Callers, StopTokens, reader_of
 
 FIRST_READ_WITHIN = 1.0
-"""s for the database to be read before the service is told that stops are heard. It may not be there yet."""
+"""Time (s) to wait for the first read of the tokens before the service is told that the listener is ready. The
+database may not exist yet."""
 
 
 class Robots:
-    """Where each robot is, as far as the service has told."""
+    """How to reach each robot, as the service has reported."""
 
     def __init__(self, urls: dict[str, str]) -> None:
         self._reach = {name: Reach(name, url) for name, url in urls.items()}
 
     def set_owner(self, told: Owned) -> None:
-        """Another process has the port now, or none."""
+        """Notes that another process owns the port now, or none."""
         terminal = None if told.terminal is None else Terminal(*told.terminal)
         self._reach[told.robot] = replace(self._reach[told.robot], owner=told.process, terminal=terminal)
 
     def names(self) -> tuple[str, ...]:
-        """Of all of them."""
+        """Returns the names of all robots."""
         return tuple(self._reach)
 
     def stop(self, name: str) -> StopResult:
-        """At once, from any thread."""
+        """Stops a robot at once. May be called from any thread."""
         return stop_arm(self._reach[name])
 
 
 def main() -> int:
-    """Listens until the input ends: the service is leaving, or gone. Returns the exit code."""
+    """Listens until the input ends, because the service ends or has died. Returns the exit code."""
     logs.begin()
     lines = sys.stdin.buffer
     first = lines.readline()
@@ -84,7 +85,7 @@ def _callers(tokens: dict[str, tuple[str, Role]] | None) -> Callers | None:
 
 
 def _tell(news: Ready | Stopped) -> None:
-    """A line that fits into a pipe is written whole or not at all: a service that does not read delays no stop, and
-    finds what the pipe holds when it reads again."""
+    """Writes a line without blocking, so that a service that does not read delays no stop. A line that fits into the
+    pipe is written completely or not at all; the service finds what the pipe holds when it reads again."""
     with suppress(OSError):
         os.write(sys.stdout.fileno(), news.model_dump_json().encode() + b"\n")

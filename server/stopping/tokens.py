@@ -15,32 +15,32 @@ from server.access.caller import Caller
 from server.access.digest import digest_of
 
 READ_AGAIN_AFTER = 2.0
-"""s between two reads: a revoked token is refused after this time."""
+"""Time (s) between two reads, after which a revoked token is refused."""
 UNKNOWN_FOR = 0.2
-"""s after which the database is asked again about a token that opens nothing. Limits guessing to five database reads
-per second, and lets a new token open soon."""
+"""Time (s) after which the database is read again for an unknown token. It limits guessing to five reads per second,
+and lets a new token be used soon."""
 UNKNOWN_WITHIN = 0.5
-"""s that a token which is not known waits for the database. One that is known never waits."""
+"""Time (s) for which a request with an unknown token waits for the database. One with a known token never waits."""
 BUSY_WITHIN = 0.4
-"""s that a read may wait for a lock of SQLite's."""
+"""Time (s) for which a read may wait for a lock of SQLite's."""
 ANSWERED_WITHIN = 2
-"""s for a database with a server of its own, to connect and for each statement."""
+"""Time (s) for a database server to accept a connection, and to answer each statement."""
 log = logging.getLogger("server.stop")
 
 Callers = dict[str, Caller]
-"""Who each token is, by its digest; those that were revoked are not in it."""
+"""The caller of each token, by the token's digest, without revoked tokens."""
 
 
 class TokensCannotBeReadError(Exception):
-    """The database does not say who may stop the robot."""
+    """The database has not been read, so it is not known who may stop the robot."""
 
 
 class StopTokens:
-    """Tokens as the database had them lately; where it cannot be read, as it had them last: whoever could stop the
-    robot still can. A thread of its own reads, and no stop with a known token waits for it. Safe to use from any
-    thread.
+    """The tokens as last read from the database. If it cannot be read, the tokens read before stay valid, so that
+    nobody loses the ability to stop the robot. A thread of its own reads, and no stop with a known token waits for it.
+    Safe to use from any thread.
 
-    known: as whoever begins this knows them; None where the database alone does
+    known: the tokens that the service has read; None if it has not
     """
 
     def __init__(
@@ -51,9 +51,9 @@ class StopTokens:
         self._callers = known
         self._changed = threading.Condition()
         self._wanted = 1
-        """Number of the read that somebody waits for."""
+        """The number of the last read that somebody waits for."""
         self._begun = self._ended = 0
-        """Reads; an end counts whether or not the database could be read."""
+        """The numbers of reads begun and ended; failed reads count as ended."""
         self._read_at = -math.inf
         self._problem = "it has not answered yet"
         self._closing = False
@@ -61,28 +61,29 @@ class StopTokens:
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread, unless the database keeps it."""
+        """Ends the thread, unless it is waiting for the database."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
         self._thread.join(UNKNOWN_WITHIN)
 
     def wait_read(self, within: float) -> None:
-        """Until the first read has ended, whatever became of it; `within` s at most."""
+        """Waits until the first read has ended, even if it failed, for `within` s at most."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended > 0, within)
 
     def update(self, callers: Callers) -> None:
-        """As the service knows them; what was read from the database before is newer or the same."""
+        """Takes the service's tokens if none have been read yet; tokens read from the database are as new or newer."""
         with self._changed:
             self._callers = self._callers or callers
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
-        """Whether it is known without a read whose it is; and whose."""
+        """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
         return self._remembered(digest_of(token))
 
     def look_up(self, token: str) -> Caller | None:
-        """Whose it is, within UNKNOWN_WITHIN s. Raises TokensCannotBeReadError where the database has never said."""
+        """Returns a token's caller, within UNKNOWN_WITHIN s. Raises TokensCannotBeReadError if the database has never
+        been read."""
         digest = digest_of(token)
         with self._changed:
             known, caller = self._remembered(digest)  # a read may have ended meanwhile
@@ -116,7 +117,7 @@ class StopTokens:
                 log.debug("tokens", exc_info=True)
             with self._changed:
                 if problem and problem != self._problem and self._callers is not None:
-                    log.warning("tokens cannot be read, those that were read last count: %s", problem)
+                    log.warning("tokens cannot be read; those read last stay valid: %s", problem)
                 self._problem = problem
                 self._callers = self._callers if callers is None else callers
                 self._ended, self._read_at = self._begun, self._clock()
@@ -124,12 +125,14 @@ class StopTokens:
 
 
 def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
-    """Reads all tokens: of a SQLite file by the standard library, of another database as the service does."""
+    """Returns a function that reads all tokens: from a SQLite file with the standard library, from another database as
+    the service does."""
     return (lambda: _of_file(sqlite)) if sqlite is not None else _of_database(database_url)
 
 
 def _of_file(file: Path) -> Callers:
-    """One short connection a read: a frozen service that holds the writer's lock keeps no reader out (WAL)."""
+    """Reads the tokens over a new connection. A suspended service that holds the write lock does not block readers
+    (WAL)."""
     uri = f"{file.absolute().as_uri()}?mode=ro"
     with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_WITHIN)) as connection:
         rows = connection.execute("SELECT digest, name, role FROM tokens WHERE revoked IS NULL").fetchall()

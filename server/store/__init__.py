@@ -1,1 +1,1 @@
-"""The database: queue and catalogue survive a restart. Its URL is the seam for another one than SQLite."""
+"""The database, in which queue and catalogue survive a restart. Its URL may name another database than SQLite."""

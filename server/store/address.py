@@ -1,4 +1,4 @@
-"""The address of a database as the configuration gives it, looked at before anything is opened."""
+"""The address of a database in the configuration, checked before anything is opened."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ from sqlalchemy import Engine, create_engine
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
+from daq.contracts import exit_codes
 from daq.contracts.documents import shown
 from daq.contracts.errors import DaqError
 
 EXAMPLES = "sqlite:////srv/arm/service.sqlite or postgresql+psycopg://daq@localhost/daq"
 PACKAGES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
-"""Package of a driver's module, where it has another name."""
+"""The package of a driver's module, for modules whose package has another name."""
 
 
 class StoreError(DaqError):
     """The database cannot be opened or brought up to date."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 def parse_address(url: str) -> URL:
-    """The parts of a database's address. Raises StoreError for what is none, and for a kind that nobody knows.
+    """Parses a database's address. Raises StoreError if it is not valid, or of an unknown kind of database.
 
     No error repeats a password.
     """
@@ -30,21 +31,21 @@ def parse_address(url: str) -> URL:
         parsed.get_dialect()
     except (ArgumentError, NoSuchModuleError, ValueError) as error:
         known = shown(url.rpartition("@")[2])
-        raise StoreError(f"server.database {known}: is no address of a database; write {EXAMPLES}") from error
+        raise StoreError(f"server.database {known}: is not the address of a database; write {EXAMPLES}") from error
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error
     return parsed
 
 
 def masked(url: URL) -> str:
-    """An address as it may be told: its password is left out, also where it is given as a parameter."""
+    """Returns an address without its password, also if that is given as a parameter, for messages."""
     query = {name: "hidden" if "pass" in name.lower() else value for name, value in url.query.items()}
     return url.set(query=query).render_as_string()
 
 
 def open_engine(url: str) -> Engine:
-    """The engine of a database; it connects when it is first used. Raises StoreError, also where a driver is missing:
-    it says which package to install."""
+    """Makes the engine of a database, which connects when it is first used. Raises StoreError; if a driver is missing,
+    the error says which package to install."""
     parsed = parse_address(url)
     try:
         return create_engine(parsed)

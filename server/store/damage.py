@@ -1,4 +1,4 @@
-"""A database that is not as this program left it: told in one line that names the table, at the start and later on."""
+"""Checks whether the database is as this program writes it. The error is one line that names the table."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from server.store.tables import ExperimentRow, JobRow, Table
 
 
 def require_sound(engine: Engine, place: str) -> None:
-    """Raises DamagedError for a file that is damaged, a table or column that is gone, a state that nobody knows.
-    `place`: the database's address as it may be told."""
+    """Raises DamagedError if the file is damaged, a table or column is missing, or a row has an unknown state.
+    `place`: the database's address without its password."""
     try:
         with engine.connect() as connection:
             if engine.dialect.name == "sqlite":

@@ -1,4 +1,4 @@
-"""Opening the database, and bringing it to this version's tables."""
+"""Opens the database, and migrates it to this version's tables."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
 
 BUSY_TIMEOUT_MS = 5000
-"""Another process (`daq token`, a backup) may hold the write lock for a moment."""
+"""Time to wait for a lock: another process (`daq token`, a backup) may hold the write lock for a moment."""
 MAPPED = 256 << 20
-"""Bytes of the file that are read in place: a search through 100 000 traces takes a fifth less."""
+"""Number of bytes of the file that are memory-mapped: a search through 100 000 traces takes a fifth less time."""
 
 
 __all__ = ["Store", "StoreError", "migrations"]
 
 
 class Store:
-    """One database. Sessions may be had from any thread; one writes at a time."""
+    """One database. Any thread may open sessions; one session writes at a time."""
 
     def __init__(self, url: str) -> None:
         parsed = parse_address(url)
@@ -42,12 +42,12 @@ class Store:
                 Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise StoreError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
-            with suppress(OSError):  # SQLite says it better
-                # For nobody else to read, and what SQLite puts beside it likewise: the hashes of tokens are in it.
+            with suppress(OSError):  # SQLite's own error, later, says more
+                # Other users must not read hashes of tokens. SQLite gives its files beside this one the same mode.
                 os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))
         self.url = url
         self.place = masked(parsed)
-        """Its address as it may be told: without the password."""
+        """The address without the password, for messages."""
         self.engine: Engine = open_engine(url)
         if parsed.get_backend_name() == "sqlite":
             event.listen(self.engine, "connect", _safe_and_shared)
@@ -56,13 +56,13 @@ class Store:
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
         self._last = threading.local()
-        """Of this thread: the statement that it sent last."""
+        """The last statement that each thread has sent."""
         event.listen(self.engine, "before_cursor_execute", self._note_statement)
         self.changes = 0
-        """Transactions written so far: what was read before the last one may be out of date."""
+        """Number of transactions written so far: what was read before the last one may be out of date."""
 
     def migrate(self) -> None:
-        """Brings the tables up to this version's. Raises StoreError, also for a database of a newer version."""
+        """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version."""
         try:
             with self.engine.connect() as connection:
                 config = migrations()
@@ -81,14 +81,14 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """A session that changes nothing. Raises DamagedError for rows that nobody can have written."""
+        """A session that changes nothing. Raises DamagedError for rows that this program cannot have written."""
         with self._told_of_damage(), self._readers() as session:
             yield session
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A session whose changes are on the disk when it is left; all of them or none. Raises DamagedError for rows
-        that nobody can have written; an error of what is done within is no damage."""
+        """A session whose changes are on the disk when it ends, all of them or none. Raises DamagedError for rows that
+        this program cannot have written; errors of the code within the block pass unchanged."""
         with self._writing:
             with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
                 yield session
@@ -96,7 +96,8 @@ class Store:
 
     @contextmanager
     def _told_of_damage(self, is_damage: Callable[[Exception], bool] = lambda _error: True) -> Iterator[None]:
-        """Within, what cannot be made of a row is told with its table: JSON, moments, states, numbers."""
+        """Turns the error of a row that cannot be converted (JSON, times, states, numbers) into a DamagedError that
+        names the table."""
         self._last.statement = ""
         try:
             yield
@@ -110,11 +111,11 @@ class Store:
         self._last.statement = told[2]
 
     def require_sound(self) -> None:
-        """Raises DamagedError where tables, columns or states are not those that this program writes."""
+        """Raises DamagedError if tables, columns or states differ from those that this program writes."""
         require_sound(self.engine, self.place)
 
     def require_writable(self) -> None:
-        """Raises OperationalError where nothing could be written: the writer's lock is taken, and given back."""
+        """Raises OperationalError if the database cannot be written to: takes the write lock, and releases it."""
         with self._writing, self._writers() as session:
             session.execute(text("SELECT 1"))
 
@@ -124,14 +125,14 @@ class Store:
 
 
 def migrations() -> Config:
-    """Alembic's configuration: the migrations that ship."""
+    """Returns Alembic's configuration for the migrations of this package."""
     config = Config()
     config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
     return config
 
 
 def _is_of_a_row(error: Exception) -> bool:
-    """Whether this came of what a row holds: SQLAlchemy made its values of it, or a model was made of them."""
+    """Whether a row's content caused an error: in SQLAlchemy's conversion of its values, or in a model made of them."""
     if isinstance(error, ValidationError):
         return True
     names = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
@@ -139,8 +140,8 @@ def _is_of_a_row(error: Exception) -> bool:
 
 
 def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
-    """Readers beside a writer; what is committed is on the disk, also after a power cut."""
-    connection.isolation_level = None  # SQLAlchemy begins transactions below: the driver would do so too late
+    """Sets up a connection so that others can read while one writes, and commits survive a power cut."""
+    connection.isolation_level = None  # SQLAlchemy begins transactions (`_begin`): the driver would do so too late
     for pragma in (
         "journal_mode=WAL",
         "synchronous=FULL",
@@ -152,6 +153,6 @@ def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
 
 
 def _begin(connection: Any) -> None:
-    """A transaction that will write takes the lock at once: one that began as a reader might never get it."""
+    """Begins a transaction. One that will write takes the lock at once: one begun as a reader might never get it."""
     writing = connection.get_execution_options().get("writing", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")

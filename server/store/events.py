@@ -1,4 +1,4 @@
-"""What happened, and by whom: kept, so that it can be asked for later."""
+"""The record of what happened, and who caused it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class EventStore:
     def add(
         self, robot: str, kind: str, text: str, at: datetime, actor: str | None = None, experiment: str | None = None
     ) -> ServiceEvent:
-        """A new one."""
+        """Records an event."""
         row = EventRow(robot=robot, at=at, kind=kind, text=text, actor=actor, experiment=experiment)
         with self._store.writing() as session:
             session.add(row)
@@ -30,7 +30,7 @@ class EventStore:
             return _event(row)
 
     def page(self, robot: str, experiment: str | None, cursor: str | None, limit: int) -> Page[ServiceEvent]:
-        """The newest first."""
+        """Returns a part of the list, newest first."""
         query = select(EventRow).where(EventRow.robot == robot)
         if experiment is not None:
             query = query.where(EventRow.experiment == experiment)

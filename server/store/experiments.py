@@ -1,4 +1,4 @@
-"""Experiments in the database. Every change of state goes through the state machine, where it is written."""
+"""Experiments in the database. The state machine decides every change of state, in the transaction that writes it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from server.experiments.order import Waiting
 from server.experiments.states import Event, IllegalEventError, advance, after_restart
 from server.problems import conflict, not_found
 from server.store.engine import Store
+from server.store.labels import experiment_label
 from server.store.pages import Cursor, newest_first, page_of
 from server.store.remembered import Remembered
 from server.store.submitted import digest_of, made_before, new_columns
@@ -36,7 +37,7 @@ class ExperimentStore:
 
     @contextmanager
     def _changing(self, robot: str) -> Iterator[Session]:
-        """A session that may change what waits; how much that is, is known without the database afterwards."""
+        """A session that may change the number of waiting experiments, which is remembered afterwards."""
         with self._counting:
             with self._store.writing() as session:
                 yield session
@@ -45,7 +46,7 @@ class ExperimentStore:
             self._waiting[robot] = waiting
 
     def made_before(self, robot: str, request: ExperimentRequest, key: str | None) -> Experiment | None:
-        """What the same key made. Raises a 409 when it was used for something else."""
+        """Returns the experiment that this key made before. Raises a 409 if the key was used for another request."""
         with self._store.reading() as session:
             found = made_before(session, ExperimentRow, robot, key, digest_of(request))
             return None if found is None else as_experiment(found)
@@ -60,10 +61,10 @@ class ExperimentStore:
         schedule: str | None = None,
         also: Callable[[Session], None] = lambda _session: None,
     ) -> tuple[Experiment, bool]:
-        """A new experiment, queued, and True; or the one that the same key made before, and False.
+        """Queues a new experiment, and returns it with True; or returns the one that the key made before, with False.
 
-        `also` is done in the transaction that makes the experiment: both, or neither. Raises a 409 when the key was
-        used for something else.
+        `also` is called in the transaction that makes the experiment, so that both are written or neither. Raises a 409
+        if the key was used for another request.
         """
         digest = digest_of(request)
         with self._changing(robot) as session:
@@ -83,7 +84,7 @@ class ExperimentStore:
             return as_experiment(row), True
 
     def get(self, robot: str, identity: str) -> Experiment:
-        """One of them. Raises a 404."""
+        """Returns an experiment. Raises a 404."""
         with self._store.reading() as session:
             return as_experiment(_row(session, robot, identity))
 
@@ -96,7 +97,8 @@ class ExperimentStore:
         limit: int,
         order: ExperimentOrder = "submitted",
     ) -> Page[Experiment]:
-        """Those submitted last first; by `ended` those that have ended, the last one first."""
+        """Returns a part of the list, the last submitted first; with the order `ended` only experiments that have
+        ended, the last one first."""
         query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))
@@ -113,7 +115,7 @@ class ExperimentStore:
             return page_of(list(session.scalars(query)), limit, as_experiment, _place_by_end)
 
     def due(self, robot: str, now: datetime) -> list[Waiting]:
-        """The first of those that are queued and due: of 100 000 that wait one is read, and not all."""
+        """Returns the first experiment that is queued and due, if any. It reads one row, even if 100 000 wait."""
         columns = (ExperimentRow.id, ExperimentRow.sequence, ExperimentRow.priority, ExperimentRow.at)
         query = select(*columns).filter_by(robot=robot, state="queued")
         query = query.where(or_(ExperimentRow.at.is_(None), ExperimentRow.at <= now))
@@ -122,27 +124,27 @@ class ExperimentStore:
             return [Waiting(*row) for row in session.execute(query)]
 
     def in_order(self, robot: str) -> list[Experiment]:
-        """All that are queued, in the order in which they will be run."""
+        """Returns the queued experiments in the order in which they will run."""
         query = select(ExperimentRow).filter_by(robot=robot, state="queued")
         query = query.order_by(ExperimentRow.priority.desc(), ExperimentRow.sequence)
         with self._store.reading() as session:
             return [as_experiment(row) for row in session.scalars(query.limit(500))]
 
     def count_by_state(self, robot: str) -> dict[str, int]:
-        """How many experiments there are in each state that any is in."""
+        """Returns the number of experiments in each state; states without any are left out."""
         query = select(ExperimentRow.state, func.count()).filter_by(robot=robot).group_by(ExperimentRow.state)
         with self._store.reading() as session:
             return dict(session.execute(query).tuples().all())
 
     def count_waiting(self, robot: str) -> int:
-        """How many are queued. Asks the database the first time only."""
+        """Returns the number of queued experiments. It reads the database the first time only."""
         if robot not in self._waiting:
             with self._changing(robot):
                 pass
         return self._waiting[robot]
 
     def begin(self, robot: str, identity: str, now: datetime) -> Experiment:
-        """The worker takes it. Raises IllegalEventError when it was cancelled meanwhile."""
+        """Marks an experiment as running. Raises IllegalEventError if it was cancelled meanwhile."""
         with self._changing(robot) as session:
             row = _row(session, robot, identity)
             row.state = advance(_state(row), Event.TAKEN)
@@ -153,17 +155,17 @@ class ExperimentStore:
     def end(
         self, robot: str, identity: str, event: Event, now: datetime, reason: str, outcome: Outcome | None = None
     ) -> Experiment:
-        """What became of it. Raises IllegalEventError."""
+        """Marks an experiment as ended by `event`. Raises IllegalEventError."""
         with self._changing(robot) as session:
             row = _row(session, robot, identity)
             row.state = advance(_state(row), event)
             row.ended, row.reason = now, reason
-            row.outcome = outcome or row.outcome  # its trace may have been found before its end was told
+            row.outcome = outcome or row.outcome  # its trace may have been found before its end was reported
             session.flush()
             return as_experiment(row)
 
     def cancel_waiting(self, robot: str, identity: str, now: datetime, by: str) -> Experiment:
-        """Takes one back that has not begun. Raises a 409 when it is not queued any more."""
+        """Cancels an experiment that has not begun. Raises a 409 if it is no longer queued."""
         try:
             return self.end(robot, identity, Event.CANCELLED, now, f"cancelled by {by}")
         except IllegalEventError as error:
@@ -172,19 +174,18 @@ class ExperimentStore:
             ) from error
 
     def set_priority(self, robot: str, identity: str, priority: int) -> Experiment:
-        """Of one that is queued. Raises a 409 for any other."""
+        """Changes the priority of a queued experiment. Raises a 409 for any other."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             if row.state != "queued":
-                raise conflict(
-                    "experiment-state", f"experiment {identity} is {row.state}", "only what waits has an order"
-                )
+                line = f"{experiment_label(row)} is {row.state}"
+                raise conflict("experiment-state", line, "only an experiment that is queued has a priority")
             row.priority = priority
             session.flush()
             return as_experiment(row)
 
     def settle_after_restart(self, robot: str, now: datetime) -> list[Experiment]:
-        """What ran when the service ended is interrupted. Returns those."""
+        """Marks experiments that ran when the service ended as interrupted, and returns them."""
         with self._changing(robot) as session:
             rows = list(session.scalars(select(ExperimentRow).filter_by(robot=robot, state="running")))
             for row in rows:
@@ -195,17 +196,17 @@ class ExperimentStore:
             return [as_experiment(row) for row in rows]
 
     def trace_number(self, identity: str) -> str:
-        """The number that its trace has, or will have."""
+        """Returns the number that the experiment's trace has, or will have."""
         with self._store.reading() as session:
             return session.scalars(select(ExperimentRow.trace).filter_by(id=identity)).one()
 
     def of_trace(self, trace: str) -> str | None:
-        """The experiment whose trace has this number."""
+        """Returns the experiment whose trace has this number; None if there is none."""
         with self._store.reading() as session:
             return session.scalar(select(ExperimentRow.id).filter_by(trace=trace))
 
     def traced(self, trace: str, outcome: Outcome | None) -> None:
-        """A trace was found for an experiment whose end nobody saw."""
+        """Notes the outcome in a trace that was found for an experiment whose end was not recorded."""
         with self._store.writing() as session:
             row = session.scalar(select(ExperimentRow).filter_by(trace=trace))
             if row is not None and row.outcome is None:
@@ -213,7 +214,7 @@ class ExperimentStore:
 
 
 def as_experiment(row: ExperimentRow) -> Experiment:
-    """A row as clients see it. The trace's number is told once there may be one."""
+    """Converts a row to what clients see. The trace's number is included once there may be a trace."""
     has_trace = row.outcome is not None or row.state == "running"
     return Experiment(
         id=row.id,

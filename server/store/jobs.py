@@ -1,4 +1,4 @@
-"""Jobs and models in the database, and which traces they refer to."""
+"""Jobs in the database, and which traces they use."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from daq.contracts.service.jobs import (
 from server.experiments.states import Event, IllegalEventError, advance
 from server.problems import conflict, not_found
 from server.store.engine import Store
+from server.store.labels import job_label
 from server.store.pages import newest_first
 from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import JobRow, TraceRow, TraceUseRow
@@ -37,12 +38,12 @@ _REQUEST: TypeAdapter[FitRequest | ValidateRequest | CompareRequest | DiagnoseRe
 
 
 def traces_of(request: JobRequest) -> tuple[str, ...]:
-    """All traces that a request names."""
+    """Returns all traces that a request names."""
     return (*request.traces, *(request.held_out if isinstance(request, FitRequest | DiagnoseRequest) else ()))
 
 
 def models_of(request: JobRequest) -> tuple[str, ...]:
-    """All models that a request names."""
+    """Returns all models that a request names."""
     return request.models if isinstance(request, CompareRequest) else (request.model,)
 
 
@@ -53,7 +54,7 @@ class JobStore:
         self._store = store
 
     def made_before(self, robot: str, request: JobRequest, key: str | None) -> Job | None:
-        """What the same key made. Raises a 409 when it was used for something else."""
+        """Returns the job that this key made before. Raises a 409 if the key was used for another request."""
         with self._store.reading() as session:
             found = made_before(session, JobRow, robot, key, digest_of(request))
             return None if found is None else as_job(found)
@@ -67,10 +68,10 @@ class JobStore:
         key: str | None,
         prepare: Callable[[str], None] = lambda _identity: None,
     ) -> tuple[Job, bool]:
-        """A new job, queued, and True; or the one that the same key made before, and False.
+        """Queues a new job, and returns it with True; or returns the one that the key made before, with False.
 
-        `prepare` lays out, for the number that the job will have, what its worker needs: when it raises there is no
-        job. Raises a 409, and a 404 for a trace that is not there any more.
+        `prepare` is given the number that the job will have, and writes what its worker needs; if it raises, no job is
+        made. Raises a 409 if the key was used for another request, and a 404 if a trace no longer exists.
         """
         digest = digest_of(request)
         with self._store.writing() as session:
@@ -92,7 +93,7 @@ class JobStore:
             return as_job(row), True
 
     def get(self, robot: str, identity: str) -> Job:
-        """One of them. Raises a 404."""
+        """Returns a job. Raises a 404."""
         with self._store.reading() as session:
             return as_job(_row(session, robot, identity))
 
@@ -105,7 +106,7 @@ class JobStore:
         limit: int,
         model: str | None = None,
     ) -> Page[Job]:
-        """The newest first; of a model, those that were given it and the one that made it."""
+        """Returns a part of the list, newest first. `model` keeps only jobs that used this model or made it."""
         query = select(JobRow).where(JobRow.robot == robot)
         if states:
             query = query.where(JobRow.state.in_(states))
@@ -116,13 +117,13 @@ class JobStore:
         return newest_first(self._store, query, JobRow.sequence, cursor, limit, as_job)
 
     def waiting(self, robot: str) -> list[Job]:
-        """Those queued, the first submitted first."""
+        """Returns the queued jobs, the first submitted first."""
         query = select(JobRow).filter_by(robot=robot, state="queued").order_by(JobRow.sequence)
         with self._store.reading() as session:
             return [as_job(row) for row in session.scalars(query)]
 
     def requests(self, robot: str, state: JobState) -> list[JobRequest]:
-        """What the jobs in a state are to compute."""
+        """Returns the requests of all jobs in a state."""
         query = select(JobRow.request).filter_by(robot=robot, state=state)
         with self._store.reading() as session:
             return [_REQUEST.validate_python(request) for request in session.scalars(query)]
@@ -137,7 +138,7 @@ class JobStore:
         model: str | None = None,
         headline: str = "",
     ) -> Job:
-        """What happened to it. Raises a 409 when its state does not allow that."""
+        """Changes a job's state by an event. Raises a 409 if its state does not allow the event."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             try:
@@ -154,25 +155,26 @@ class JobStore:
             return as_job(row)
 
     def settle_after_restart(self, robot: str, now: datetime) -> None:
-        """What ran when the service ended is interrupted."""
+        """Marks jobs that ran when the service ended as interrupted."""
         with self._store.writing() as session:
             for row in session.scalars(select(JobRow).filter_by(robot=robot, state="running")):
                 row.state, row.ended, row.failure = "interrupted", now, "lost"
                 row.reason = "the service ended while this ran; it does not run again by itself"
 
     def remove(self, robot: str, identity: str) -> None:
-        """Takes an ended job away, and with it what it says about traces. Raises a 404, 409."""
+        """Deletes an ended job, so that it no longer uses its traces. Raises a 404, 409."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             if row.state in ("queued", "running"):
-                raise conflict("job-state", f"job {identity} is {row.state}", "cancel it first")
+                line = f"{job_label(row.kind, row.submitted)} is {row.state}"
+                raise conflict("job-state", line, "cancel it first")
             for use in session.scalars(select(TraceUseRow).filter_by(used_by=f"job {identity}")):
                 session.delete(use)
             session.delete(row)
 
 
 def as_job(row: JobRow) -> Job:
-    """A row as clients see it."""
+    """Converts a row to what clients see."""
     return Job(
         id=row.id,
         robot=row.robot,
@@ -191,7 +193,7 @@ def as_job(row: JobRow) -> Job:
 
 
 def _concerns(model: str) -> ColumnElement[bool]:
-    """Jobs that were given a model, alone or among others, or that made it."""
+    """Selects jobs that used a model, alone or among others, or that made it."""
     return or_(
         JobRow.model == model,
         JobRow.request["model"].as_string() == model,

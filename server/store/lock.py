@@ -1,4 +1,4 @@
-"""One service a database: a lock of the operating system's, which ends with the process that holds it."""
+"""Ensures that one service at a time uses a database, by a file lock, which ends with the process that holds it."""
 
 from __future__ import annotations
 
@@ -7,27 +7,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from server.store.address import parse_address
 
 
 class InUseError(DaqError):
-    """A service uses this database now."""
+    """A service is using this database."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 def sqlite_file(url: str) -> Path | None:
-    """The file of a SQLite database; None for any other, and for one in memory. Raises StoreError."""
+    """Returns the file of a SQLite database; None for any other, and for one in memory. Raises StoreError."""
     parsed = parse_address(url)
     return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
 
 
 @contextmanager
 def sole_use(url: str) -> Iterator[None]:
-    """No other service, and no restore, uses this database within. Raises InUseError.
+    """Keeps other services and restores from using this database within the block. Raises InUseError.
 
-    A database that is no file has a server of its own; nothing is locked then.
+    A database that is not a file has a server of its own; nothing is locked then.
     """
     file = sqlite_file(url)
     if file is None:

@@ -1,4 +1,4 @@
-"""Models in the database, with the traces that they were made from."""
+"""Models in the database, with the traces from which they were made."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_ANCESTORS = 100
 
 @dataclass(frozen=True)
 class NewModel:
-    """A row to be, and the traces that the model was made from."""
+    """The columns of a new row, and the traces from which the model was made."""
 
     id: str
     robot: str
@@ -40,7 +40,7 @@ class ModelStore:
         self._store = store
 
     def insert(self, new: NewModel) -> bool:
-        """False when the same model is there already: equal models have equal numbers."""
+        """Adds a model; returns False if it exists already. Equal models have equal numbers."""
         with self._store.writing() as session:
             if session.get(ModelRow, new.id) is not None:
                 return False
@@ -51,17 +51,17 @@ class ModelStore:
             return True
 
     def get(self, robot: str, identity: str) -> ModelEntry:
-        """One of them. Raises a 404."""
+        """Returns a model's entry. Raises a 404."""
         with self._store.reading() as session:
             return _entry(session, _row(session, robot, identity))
 
     def file_of(self, robot: str, identity: str) -> str:
-        """Raises a 404."""
+        """Returns the name of a model's file. Raises a 404."""
         with self._store.reading() as session:
             return _row(session, robot, identity).file
 
     def ancestors(self, robot: str, identity: str) -> tuple[ModelEntry, ...]:
-        """The models that it comes from, the nearest first, as far as they are here."""
+        """Returns the models from which it was made, the nearest first, as far as they are in the database."""
         found: list[ModelEntry] = []
         with self._store.reading() as session:
             row: ModelRow | None = _row(session, robot, identity)
@@ -72,13 +72,13 @@ class ModelStore:
         return tuple(found)
 
     def newest(self, robot: str, most: int) -> tuple[ModelEntry, ...]:
-        """So many models, the newest first."""
+        """Returns up to `most` models, newest first."""
         query = select(ModelRow).filter_by(robot=robot).order_by(ModelRow.created.desc(), ModelRow.id.desc())
         with self._store.reading() as session:
             return tuple(_entry(session, row) for row in session.scalars(query.limit(most)))
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[ModelEntry]:
-        """The newest first."""
+        """Returns a part of the list, newest first."""
         query = select(ModelRow).where(ModelRow.robot == robot)
         if cursor is not None:
             place = Cursor.parse(cursor)
@@ -92,7 +92,7 @@ class ModelStore:
             )
 
     def change(self, robot: str, identity: str, change: ModelChange) -> ModelEntry:
-        """A new name or notes. Raises a 404."""
+        """Changes the name or the notes. Raises a 404."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             row.name = row.name if change.name is None else change.name
@@ -101,7 +101,7 @@ class ModelStore:
             return _entry(session, row)
 
     def remove(self, robot: str, identity: str) -> str:
-        """Takes it away; returns the name of its file. Raises a 404, and a 409 when another model comes from it."""
+        """Deletes a model, and returns its file's name. Raises a 404, and a 409 if another model was made from it."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             child = session.scalar(select(ModelRow.name).filter_by(parent=identity))

@@ -1,5 +1,5 @@
-"""Lists in parts: a cursor is where the next part begins, in the order of the list, so nothing is left out or doubled
-when rows come and go meanwhile."""
+"""Lists in parts. A cursor says where the next part begins in the order of the list, so no row is skipped or repeated
+when rows are added or deleted meanwhile."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Cursor:
-    """The last row of a part: its number, or moment, and where rows have no number their identity."""
+    """The last row of a part: its number; or its time, with its identity, if rows have no number."""
 
     number: float
     identity: str = ""
@@ -34,7 +34,7 @@ class Cursor:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Raises a 422 for anything that no list gave out."""
+        """Parses a cursor. Raises a 422 for a text that no list has returned."""
         try:
             number, identity = json.loads(base64.urlsafe_b64decode(text.encode()))
             if isinstance(number, int | float) and isinstance(identity, str) and abs(number) < 2**62:
@@ -45,14 +45,15 @@ class Cursor:
 
     @property
     def moment(self) -> datetime:
-        """The number of a list by time; the routes take no cursor whose number is none (`CursorOf`)."""
+        """The number as a time, for a list ordered by time. Routes refuse cursors whose number is no time
+        (`CursorOf`)."""
         return datetime.fromtimestamp(self.number, UTC)
 
 
 def page_of(
     rows: Sequence[Row], limit: int, convert: Callable[[Row], Item], place: Callable[[Row], Cursor]
 ) -> Page[Item]:
-    """A part made of up to `limit` rows; one row more than that says that there is another part."""
+    """Makes a part from up to `limit` rows. One row more than `limit` means that another part follows."""
     shown = rows[:limit]
     following = str(place(shown[-1])) if len(rows) > limit and shown else None
     return Page(items=tuple(convert(row) for row in shown), next=following)
@@ -66,7 +67,8 @@ def newest_first(
     limit: int,
     convert: Callable[[Row], Item],
 ) -> Page[Item]:
-    """A part of what `query` finds, by falling `number`: one that grows with every row, whatever clocks do."""
+    """Returns a part of the rows that `query` finds, in descending order of `number`, which grows with every row even
+    if clocks are set back."""
     query = query.order_by(number.desc())
     if cursor is not None:
         query = query.where(number < Cursor.parse(cursor).number)

@@ -1,4 +1,4 @@
-"""Taught programs in the database: kept until somebody deletes them, whoever taught them and from whichever page."""
+"""Taught programs in the database. They are kept until somebody deletes them, and everybody sees them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from server.store.engine import Store
 from server.store.tables import ProgramRow
 
 MOST_PROGRAMS = 1000
-"""Of one robot. They are listed in one piece."""
+"""Largest number of programs of one robot. They are listed in one part."""
 
 
 class StoredProgram(Wire):
-    """A program with what is known about it."""
+    """A program with its entry in the list."""
 
     entry: ProgramEntry
     program: Program
@@ -28,18 +28,19 @@ class StoredProgram(Wire):
 class ProgramStore:
     """Programs of all robots."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, most: int = MOST_PROGRAMS) -> None:
         self._store = store
+        self._most = most
 
     def all(self, robot: str) -> tuple[ProgramEntry, ...]:
-        """Those of a robot, the one changed last first."""
+        """Returns the programs of a robot, the last changed first."""
         query = select(ProgramRow).options(defer(ProgramRow.program)).filter_by(robot=robot)
         query = query.order_by(ProgramRow.changed.desc(), ProgramRow.name)
         with self._store.reading() as session:
             return tuple(_entry(row) for row in session.scalars(query))
 
     def get(self, robot: str, name: str) -> StoredProgram:
-        """One of them. Raises a 404."""
+        """Returns a program. Raises a 404."""
         with self._store.reading() as session:
             row = _row(session, robot, name)
             return StoredProgram(entry=_entry(row), program=Program.model_validate(row.program))
@@ -47,11 +48,12 @@ class ProgramStore:
     def put(
         self, robot: str, name: str, program: Program, revision: int | None, now: datetime, by: str
     ) -> ProgramEntry:
-        """Keeps a program under its own name; where that is another than `name`, the program `name` is renamed.
+        """Saves a program under its own name; if that differs from `name`, the program `name` is renamed.
 
-        `revision` is that which was changed, None for a new program. Raises a 409 when somebody else has changed it
-        meanwhile, when its new name is taken, or when there are MOST_PROGRAMS; a 404 when what was changed is gone.
-        What is kept already in this very form is no change: an answer that was lost may be asked for again.
+        `revision` is the one that was edited, None for a new program. Raises a 409 if somebody else has changed the
+        program meanwhile, if its new name is taken, or if there are as many as allowed already; raises a 404 if the
+        edited program is gone. Saving an identical program again changes nothing, so a client that has lost the answer
+        may repeat its request.
         """
         content = program.model_dump(mode="json")
         with self._store.writing() as session:
@@ -62,7 +64,7 @@ class ProgramStore:
                 if there is not None:
                     raise _taken(program.name)
                 count = session.scalar(select(func.count()).select_from(ProgramRow).filter_by(robot=robot)) or 0
-                if count >= MOST_PROGRAMS:
+                if count >= self._most:
                     raise conflict("too-many-programs", f"there are {count} programs", "delete some of them first")
                 row = ProgramRow(robot=robot, revision=0)
                 session.add(row)
@@ -80,7 +82,7 @@ class ProgramStore:
             return _entry(row)
 
     def remove(self, robot: str, name: str) -> None:
-        """For good. Raises a 404."""
+        """Deletes a program for good. Raises a 404."""
         with self._store.writing() as session:
             session.delete(_row(session, robot, name))
 

@@ -1,4 +1,4 @@
-"""Whether a robot's queue is paused: remembered over a restart."""
+"""Whether a robot's queue is paused. This survives a restart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from server.store.tables import QueueRow
 
 @dataclass(frozen=True)
 class QueueState:
-    """Paused or not, why, since when."""
+    """Whether a queue is paused, why, and since when."""
 
     paused: bool
     reason: str
@@ -25,12 +25,12 @@ class QueueStore:
         self._store = store
 
     def get(self, robot: str) -> QueueState | None:
-        """None for a robot that this database has never seen."""
+        """Returns the state of a robot's queue; None for a robot that is not in this database."""
         with self._store.reading() as session:
             row = session.get(QueueRow, robot)
             return None if row is None else QueueState(row.paused, row.reason, row.since)
 
     def set(self, robot: str, state: QueueState) -> None:
-        """Written to the disk when this returns."""
+        """Writes the state; it is on the disk when this returns."""
         with self._store.writing() as session:
             session.merge(QueueRow(robot=robot, paused=state.paused, reason=state.reason, since=state.since))

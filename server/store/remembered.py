@@ -1,4 +1,4 @@
-"""Parts of lists that were read lately: many pages that are open ask for the same ones again and again."""
+"""Parts of lists that were read lately, kept because many open pages ask for the same ones again and again."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from daq.contracts.service.base import Page
 from server.store.engine import Store
 
 MOST_REMEMBERED = 32
-"""Parts."""
+"""Number of parts that are kept."""
 P = ParamSpec("P")
 Item = TypeVar("Item")
 
 
 class Remembered(Generic[P, Item]):
-    """What `read` found, until anything is written. Its arguments are hashable. May be called from any thread."""
+    """Keeps what `read` returned until anything is written to the database. Its arguments are hashable. May be called
+    from any thread."""
 
     def __init__(self, store: Store, read: Callable[P, Page[Item]]) -> None:
         self._store = store
@@ -25,7 +26,7 @@ class Remembered(Generic[P, Item]):
         self._parts: dict[Hashable, tuple[int, Page[Item]]] = {}
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> Page[Item]:
-        """The part, read where it is not remembered."""
+        """Returns the part, and reads it only if it is not remembered."""
         question = (args, tuple(kwargs.items()))
         found = self._known(question)
         if found is None:
@@ -37,7 +38,7 @@ class Remembered(Generic[P, Item]):
         return found
 
     async def fetch(self, *args: P.args, **kwargs: P.kwargs) -> Page[Item]:
-        """The same from the event loop: only what has to be read takes a thread."""
+        """Does the same from the event loop. It uses a thread only if the part must be read."""
         found = self._known((args, tuple(kwargs.items())))
         return await run_in_threadpool(self, *args, **kwargs) if found is None else found
 

@@ -25,7 +25,7 @@ class ScheduleStore:
         self._store = store
 
     def create(self, robot: str, request: ScheduleRequest, now: datetime, by: str) -> Schedule:
-        """A new one, active."""
+        """Creates an active schedule."""
         starts = request.starts or now
         row = ScheduleRow(
             id=secrets.token_hex(6),
@@ -47,17 +47,17 @@ class ScheduleStore:
             return _schedule(row)
 
     def get(self, robot: str, identity: str) -> Schedule:
-        """One of them. Raises a 404."""
+        """Returns a schedule. Raises a 404."""
         with self._store.reading() as session:
             return _schedule(_row(session, robot, identity))
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[Schedule]:
-        """The newest first."""
+        """Returns a part of the list, newest first."""
         query = select(ScheduleRow).where(ScheduleRow.robot == robot)
         return newest_first(self._store, query, ScheduleRow.sequence, cursor, limit, _schedule)
 
     def switch(self, robot: str, identity: str, *, active: bool, now: datetime) -> Schedule:
-        """On or off; a run that was due while it was off is left out. Raises a 404."""
+        """Switches a schedule on or off. Runs that were due while it was off are left out. Raises a 404."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             if active and not row.active:
@@ -67,29 +67,29 @@ class ScheduleStore:
             return _schedule(row)
 
     def remove(self, robot: str, identity: str) -> None:
-        """Takes it away; what it submitted stays. Raises a 404."""
+        """Deletes a schedule; the experiments that it submitted stay. Raises a 404."""
         with self._store.writing() as session:
             session.delete(_row(session, robot, identity))
 
     def due(self, robot: str, now: datetime) -> list[str]:
-        """Those whose run is due now."""
+        """Returns the schedules that have a run due now."""
         with self._store.reading() as session:
             rows = session.execute(select(ScheduleRow.id, ScheduleRow.next).filter_by(robot=robot, active=True))
             return [identity for identity, moment in rows if is_due(moment, now)]
 
     def leave_out_missed(self, robot: str, now: datetime) -> list[str]:
-        """Runs that were due up to now are not made up for, and do not count as made. Those schedules."""
+        """Leaves out all runs that were due up to now, without counting them. Returns the schedules concerned."""
         with self._store.writing() as session:
             rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
             return [row.id for row in rows if _leave_out_missed(row, now)]
 
     def leave_out(self, robot: str, identity: str, now: datetime) -> None:
-        """The run that is due counts as made, though it is not. Raises a 404."""
+        """Leaves out the run that is due, and counts it as made. Raises a 404."""
         with self._store.writing() as session:
             self.count_run(session, robot, identity, now)
 
     def count_run(self, session: Session, robot: str, identity: str, now: datetime) -> None:
-        """The run that is due counts as made, in the transaction that makes it; the next one is set. Raises a 404."""
+        """Counts the run that is due, in the transaction that makes it, and sets the next one. Raises a 404."""
         row = _row(session, robot, identity)
         assert row.next is not None
         row.submitted_runs += 1
@@ -97,7 +97,7 @@ class ScheduleStore:
 
 
 def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
-    """Moves a run that is due on to the first after `now`; False where none is due."""
+    """Moves a run that is due to the first after `now`; returns False if none is due."""
     if row.next is None or not is_due(row.next, now):
         return False
     row.next = following(Plan(row.starts, row.every, row.count), row.submitted_runs, row.next, now)

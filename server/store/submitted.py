@@ -1,4 +1,4 @@
-"""What experiments and jobs have in common: submitted once a key, whoever sends the same request how often."""
+"""What experiments and jobs have in common: a request with the same key is submitted once, however often it is sent."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Row = TypeVar("Row", ExperimentRow, JobRow)
 
 
 def digest_of(request: BaseModel) -> str:
-    """Tells whether two requests under one key are the same."""
+    """Returns a digest that tells whether two requests with one key are the same."""
     return hashlib.sha256(request.model_dump_json().encode()).hexdigest()
 
 
 def made_before(session: Session, table: type[Row], robot: str, key: str | None, digest: str) -> Row | None:
-    """What the same key made; None where it made nothing. Raises a 409 when it was used for something else."""
+    """Returns what this key made before, or None. Raises a 409 if the key was used for another request."""
     if key is None:
         return None
     found = session.scalar(select(table).filter_by(robot=robot, idempotency_key=key))
@@ -34,7 +34,7 @@ def made_before(session: Session, table: type[Row], robot: str, key: str | None,
 
 
 def new_columns(robot: str, key: str | None, digest: str, now: datetime, by: str) -> dict[str, Any]:
-    """Of something that is queued now."""
+    """Returns the columns that a new experiment and a new job have in common."""
     return {
         "id": secrets.token_hex(6),
         "robot": robot,

@@ -1,4 +1,4 @@
-"""The tables. A change here needs a migration beside it (docs/service.md); a test compares the two."""
+"""The tables. A change here needs a migration (docs/service.md); a test compares the two."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 
 class Utc(TypeDecorator[datetime]):
-    """A moment with its time zone, kept as UTC; SQLite knows no time zones."""
+    """A time with its time zone, stored as UTC, because SQLite has no time zones."""
 
     impl = DateTime
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """On its way in."""
+        """Converts a value for the database."""
         del dialect
         if value is None:
             return None
@@ -25,7 +25,7 @@ class Utc(TypeDecorator[datetime]):
         return value.astimezone(UTC).replace(tzinfo=None)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """On its way out."""
+        """Converts a value from the database."""
         del dialect
         return None if value is None else value.replace(tzinfo=UTC)
 
@@ -37,8 +37,8 @@ class Table(DeclarativeBase):
 
 
 class Submitted:
-    """What an experiment and a job have in common: columns. `sequence` orders those submitted: clocks may be set
-    back."""
+    """The columns that an experiment and a job have in common. `sequence` is the order of submission, since clocks may
+    be set back."""
 
     sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
     id: Mapped[str] = mapped_column(String(12), unique=True)
@@ -68,11 +68,11 @@ class ExperimentRow(Submitted, Table):
     schedule: Mapped[str | None] = mapped_column(String(12))
     outcome: Mapped[str | None] = mapped_column(String(16))
     trace: Mapped[str] = mapped_column(String(12), unique=True)
-    """Number of its trace, chosen before it runs: after a crash the trace is found by it."""
+    """The number of its trace, chosen before it runs, so that the trace is found after a crash."""
 
 
 class ScheduleRow(Table):
-    """An experiment that is submitted every so often."""
+    """An experiment that is submitted at regular intervals."""
 
     __tablename__ = "schedules"
 
@@ -92,7 +92,7 @@ class ScheduleRow(Table):
 
 
 class ProgramRow(Table):
-    """A taught program. `revision` grows with every change of it."""
+    """A taught program. `revision` grows with every change."""
 
     __tablename__ = "programs"
 
@@ -100,7 +100,7 @@ class ProgramRow(Table):
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
     program: Mapped[dict[str, Any]]
     instructions: Mapped[int]
-    """How many `program` has, so that a list reads no programs."""
+    """The number of the program's instructions, so that a list need not read the programs."""
     revision: Mapped[int]
     changed: Mapped[datetime]
     changed_by: Mapped[str]
@@ -118,9 +118,9 @@ class QueueRow(Table):
 
 
 class TraceRow(Table):
-    """One trace of the folder. `searched` holds what a search looks into, in small letters.
+    """One trace of the folder. `searched` holds the text for searches, in lower case.
 
-    The index has the order of the list and all that a search looks at: what is not found is not read from the table.
+    The index has the order of the list and all columns that a search needs, so the table is read for matches only.
     """
 
     __tablename__ = "traces"
@@ -166,15 +166,15 @@ class JobRow(Submitted, Table):
     kind: Mapped[str] = mapped_column(String(32))
     request: Mapped[dict[str, Any]]
     headline: Mapped[str] = mapped_column(Text, default="", server_default="")
-    """What it found."""
+    """The job's result in one line."""
     model: Mapped[str | None] = mapped_column(String(64))
-    """The model that it made."""
+    """The model that the job made."""
     failure: Mapped[str | None] = mapped_column(String(32))
-    """Why it failed, for programs."""
+    """Why the job failed, for programs."""
 
 
 class ModelRow(Table):
-    """A model in the folder of models, and where it comes from."""
+    """A model in the folder of models, and how it was made."""
 
     __tablename__ = "models"
 
@@ -190,7 +190,7 @@ class ModelRow(Table):
 
 
 class TraceUseRow(Table):
-    """A job or a model that refers to a trace, which is not deleted then."""
+    """A job or a model that uses a trace, which therefore cannot be deleted."""
 
     __tablename__ = "trace_uses"
 
@@ -200,7 +200,7 @@ class TraceUseRow(Table):
 
 
 class EventRow(Table):
-    """Something that happened, for whoever asks later who did what."""
+    """Something that happened, and who caused it."""
 
     __tablename__ = "events"
 
@@ -214,7 +214,7 @@ class EventRow(Table):
 
 
 class TokenRow(Table):
-    """A token by its hash; the token itself is shown once, when it is made."""
+    """A token's hash; the token itself is shown only once, when it is made."""
 
     __tablename__ = "tokens"
 

@@ -1,4 +1,4 @@
-"""The catalogue's table: search, tags, notes, and which traces something refers to."""
+"""The catalogue's table: search, tags, notes, and which jobs and models use a trace."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from daq.contracts.service.traces import CatalogueEntry, Source, TraceChange
 from daq.contracts.trace import Outcome
 from server.problems import conflict, not_found
 from server.store.engine import Store
+from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, page_of
 from server.store.remembered import Remembered
 from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
@@ -21,7 +22,7 @@ from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
 
 @dataclass(frozen=True)
 class NewTrace:
-    """A row to be."""
+    """The columns of a new row."""
 
     id: str
     robot: str
@@ -39,11 +40,16 @@ class NewTrace:
     experiment: str | None
     notes: str
 
+    @property
+    def label(self) -> str:
+        """How messages name the trace."""
+        return trace_label(self.name, self.kind, self.file, self.created)
+
 
 @dataclass(frozen=True)
 class TraceSearch:
-    """What a list is narrowed to; None and empty leave it as it is. `text` is looked for in number, file, name, kind,
-    operator, notes and tags, whatever its case."""
+    """The filters of a list; None and empty do not filter. `text` is searched in number, file, name, kind, operator,
+    notes and tags, ignoring case."""
 
     text: str | None = None
     tag: str | None = None
@@ -62,8 +68,8 @@ class TraceStore:
         self.page = Remembered(store, self._page)
 
     def insert(self, new: NewTrace, is_there: Callable[[str], bool] = lambda _file: True) -> None:
-        """A new trace, or the file of one that has none any more, which keeps its tags and notes. Raises a 409 when
-        another file with this number `is_there`."""
+        """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
+        notes. Raises a 409 if the row has another file that `is_there`."""
         columns = {**new.__dict__, "joints": list(new.joints), "missing": False}
         with self._store.writing() as session:
             row = session.get(TraceRow, new.id)
@@ -75,18 +81,18 @@ class TraceStore:
                 for name in columns.keys() - {"notes", "experiment"}:
                     setattr(row, name, columns[name])
             else:
-                line = f"trace {new.id} is in the catalogue already, as {row.file}"
+                line = f"{new.label} is in the catalogue already, as {row.file}"
                 raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
             row.searched = _searched(row, tags)
             session.add(row)
 
     def files(self) -> set[str]:
-        """Names of all files in the table."""
+        """Returns the names of all files in the table."""
         with self._store.reading() as session:
             return set(session.scalars(select(TraceRow.file)))
 
     def mark_missing(self, files: Iterable[str], *, missing: bool) -> None:
-        """Files that have gone, or are there again."""
+        """Marks files as missing, or as existing again."""
         names = list(files)
         with self._store.writing() as session:
             for first in range(0, len(names), 500):
@@ -95,18 +101,18 @@ class TraceStore:
                 session.execute(query.values(missing=missing))
 
     def file_of(self, robot: str, identity: str) -> str:
-        """Raises a 404."""
+        """Returns the name of a trace's file. Raises a 404."""
         with self._store.reading() as session:
             return _row(session, robot, identity).file
 
     def get(self, robot: str, identity: str) -> CatalogueEntry:
-        """One of them. Raises a 404."""
+        """Returns a trace's entry. Raises a 404."""
         with self._store.reading() as session:
             row = _row(session, robot, identity)
             return _entry(row, _tags(session, [row.id]).get(row.id, ()))
 
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
-        """The newest first."""
+        """Returns a part of the list, newest first."""
         query = select(TraceRow).where(TraceRow.robot == robot)
         for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
             if wanted is not None:
@@ -134,7 +140,7 @@ class TraceStore:
         )
 
     def change(self, robot: str, identity: str, change: TraceChange) -> CatalogueEntry:
-        """New tags or notes. Raises a 404."""
+        """Changes tags or notes. Raises a 404."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             if change.notes is not None:
@@ -149,16 +155,16 @@ class TraceStore:
             return _entry(row, tags)
 
     def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
-        """Takes the row away. Raises a 404, and a 409 when a model or a job refers to it.
+        """Deletes the row. Raises a 404, and a 409 if a model or a job uses the trace.
 
-        `also` is done last before that is on the disk: where it raises, the row stays. A row without a file can be
-        taken away again; a file without a row would come back without its tags.
+        `also`, which deletes the file, is called last before the transaction is written: if it raises, the row stays.
+        A row without a file can be deleted later; a file without a row would be added again without its tags.
         """
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
             if users:
-                line = f"trace {identity} is used by {', '.join(users)}"
+                line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
                 raise conflict("trace-in-use", line, "delete those first")
             session.delete(row)
             session.flush()

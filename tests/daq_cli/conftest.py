@@ -31,9 +31,9 @@ def nobodys_desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 
 
 @pytest.fixture
-def daq(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> CommandLine:
+def daq(capsys: pytest.CaptureFixture[str]) -> CommandLine:
     """The command."""
-    return CommandLine(capsys, monkeypatch)
+    return CommandLine(capsys)
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 
 import pytest
@@ -32,15 +31,13 @@ class Said:
 class CommandLine:
     """`daq(...)` runs a command."""
 
-    def __init__(self, capture: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, capture: pytest.CaptureFixture[str]) -> None:
         self._capture = capture
-        self._monkeypatch = monkeypatch
 
     def __call__(self, *words: object) -> Said:
-        self._monkeypatch.setattr(sys, "argv", ["daq", *map(str, words)])
         self._capture.readouterr()
         with pytest.raises(SystemExit) as ended:
-            main()
+            main([str(word) for word in words])
         said = self._capture.readouterr()
         code = ended.value.code
         assert isinstance(code, int)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import httpx
@@ -16,8 +15,10 @@ import pytest
 from daq.client import Client, ServiceError, ServiceNotReachedError
 from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.experiments import Experiment, ExperimentState
 from daq.contracts.service.problems import ProblemDetails
-from daq.contracts.service.robot import StopResult
+from daq.contracts.service.queue import QueueStatus
+from daq.contracts.service.robot import RobotIdentity, RobotStatus, RobotSummary, StopResult
 from daq.contracts.service.teaching import TaughtPath, TeachingStatus
 from daq.teaching import RecordedPath
 from daq.teaching.program import Program, Wait
@@ -37,18 +38,46 @@ def refused(status: int, kind: str = "no") -> ServiceError:
     return ServiceError(ProblemDetails(type=f"#{kind}", title="No", status=status, detail=kind))
 
 
-class Robot:
-    """Of a service. `cancel` does what a test says; stops are counted."""
+class Experiments:
+    """Those of a robot: a cancel does what a test says."""
 
-    def __init__(self, cancel: Callable[[], object] | None = None) -> None:
+    def __init__(self, does: Callable[[], object] | None, patience: list[float | None]) -> None:
+        self._does = does
+        self._patience = patience
+
+    def cancel(self, _experiment: str, *, within: float | None = None) -> object:
+        self._patience.append(within)
+        assert self._does is not None
+        return self._does()
+
+
+class Queue:
+    """That of a robot: what is asked of it is kept."""
+
+    def __init__(self, patience: list[float | None]) -> None:
+        self.attended = threading.Event()
+        self.resumed: list[dict[str, bool]] = []
+        self._patience = patience
+
+    def attend(self, *, within: float | None = None) -> None:
+        self._patience.append(within)
+        self.attended.set()
+
+    def resume(self, **word: bool) -> None:
+        self.resumed.append(word)
+
+
+class Robot:
+    """Of a service. A cancel does what a test says; stops are counted; `states` are told one after the other."""
+
+    def __init__(self, cancel: Callable[[], object] | None = None, states: Sequence[RobotStatus] = ()) -> None:
         self.name = "arm"
         self.stops = 0
         self.patience: list[float | None] = []
-        self.attended = threading.Event()
+        self.states = list(states)
         self.status_of_teaching = TeachingStatus(activity="none", result="done: 1 instructions")
-        self.experiments = SimpleNamespace(cancel=self._cancel)
-        self.queue = SimpleNamespace(attend=self._attend)
-        self._does = cancel
+        self.experiments = Experiments(cancel, self.patience)
+        self.queue = Queue(self.patience)
 
     def stop(self) -> StopResult:
         self.stops += 1
@@ -57,14 +86,8 @@ class Robot:
     def teaching(self) -> TeachingStatus:
         return self.status_of_teaching
 
-    def _cancel(self, _experiment: str, *, within: float | None = None) -> object:
-        self.patience.append(within)
-        assert self._does is not None
-        return self._does()
-
-    def _attend(self, *, within: float | None = None) -> None:
-        self.patience.append(within)
-        self.attended.set()
+    def status(self) -> RobotStatus:
+        return self.states.pop(0)
 
 
 def raising(error: Exception) -> Callable[[], object]:
@@ -74,8 +97,8 @@ def raising(error: Exception) -> Callable[[], object]:
     return fail
 
 
-def state(name: str) -> Callable[[], object]:
-    return lambda: SimpleNamespace(state=name)
+def state(name: ExperimentState) -> Callable[[], object]:
+    return lambda: Experiment.model_construct(state=name)
 
 
 # ---- an experiment in the queue
@@ -144,7 +167,7 @@ def test_the_third_key_leaves_and_the_stop_is_sent_all_the_same() -> None:
 def test_confirming_that_an_operator_is_present_delays_no_stop() -> None:
     robot: Any = Robot()
     with Companion(robot, "1234", attends=True, attend_every=0.0):
-        assert robot.attended.wait(60)
+        assert robot.queue.attended.wait(60)
     assert robot.patience[0] == companion.ANSWER_WITHIN
 
 
@@ -156,20 +179,16 @@ class Agreeing(Consent):
 
 
 def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused() -> None:
-    def status(paused: bool) -> SimpleNamespace:
-        queue = SimpleNamespace(paused=paused, reason="paused by bert: a guest is at the arm")
-        identity = SimpleNamespace(simulated=False)
-        return SimpleNamespace(robot="arm", port="serial:///dev/x", identity=identity, queue=queue)
+    identity = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=1)
 
-    answers = [status(False), status(True)]
-    resumed: list[dict[str, bool]] = []
-    robot: Any = SimpleNamespace(
-        status=lambda: answers.pop(0), queue=SimpleNamespace(resume=lambda **word: resumed.append(word))
-    )
+    def status(paused: bool) -> RobotStatus:
+        queue = QueueStatus.model_construct(paused=paused, reason="by bert: a guest is at the arm")
+        return RobotStatus.model_construct(robot="arm", port="serial:///dev/x", identity=identity, queue=queue)
 
+    robot: Any = Robot(states=[status(False), status(True)])
     with pytest.raises(SafetyError, match="a guest is at the arm"):
         acquire_remotely(robot, "http://arm.lab:8300", ExperimentSpec(), Path("traces"), Agreeing(given=False))
-    assert resumed == []
+    assert robot.queue.resumed == []
 
 
 # ---- teaching
@@ -256,9 +275,9 @@ def asked_for_names(monkeypatch: pytest.MonkeyPatch) -> list[float | None]:
     """How long was to be waited for the names of the service's robots, each time."""
     waited: list[float | None] = []
 
-    def robots(_: Client, *, within: float | None = None) -> list[SimpleNamespace]:
+    def robots(_: Client, *, within: float | None = None) -> list[RobotSummary]:
         waited.append(within)
-        return [SimpleNamespace(robot="other")]
+        return [RobotSummary(robot="other", machine="ma2000", connection="connected", arm="idle")]
 
     monkeypatch.setattr(Client, "robots", robots)
     return waited

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import AGAINST_THE_CLOCK, DETERMINISTIC
+from tests.conftest import DETERMINISTIC
+from tests.order import AGAINST_THE_CLOCK
 
 ROOT = Path(__file__).parents[2]
 

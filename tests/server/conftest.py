@@ -11,7 +11,7 @@ from tests.server.queue.bench import Bench
 from tests.server.service import Service, running_service
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service on a mock behind a pseudo-terminal, connected."""
     with running_service(tmp_path_factory.mktemp("service")) as service:
@@ -19,7 +19,7 @@ def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service
         yield service
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def service_of_jobs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service of the tests of jobs: its arm is as its machine file says, and none of the others moves it."""
     with running_service(tmp_path_factory.mktemp("jobs")) as service:

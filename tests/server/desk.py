@@ -31,5 +31,5 @@ def anothers_desk(
     monkeypatch.setenv("COLUMNS", "500")
     monkeypatch.chdir(folder)
     console.cache_clear()
-    yield CommandLine(capture, monkeypatch)
+    yield CommandLine(capture)
     console.cache_clear()

@@ -1,1 +1,1 @@
-"""What travels between the service and its clients: one model a resource, the same for server, client and page."""
+"""Messages between the service and its clients: one model for each resource, the same for server, client and page."""

@@ -23,13 +23,13 @@ def _has_utc(moment: datetime) -> datetime:
 
 
 Moment = Annotated[AwareDatetime, AfterValidator(_has_utc)]
-"""A moment that a client names, with its time zone: moments are compared and kept in UTC."""
+"""A time from a client, with its time zone. Times are compared and stored in UTC."""
 T = TypeVar("T")
 PageLimit = Annotated[int, Field(ge=1, le=500)]
 
 
 class Page(Wire, Generic[T]):
-    """A part of a list. `next` is the cursor of the part that follows; None at the end."""
+    """A part of a list. `next` is the cursor of the following part; None at the end."""
 
     items: tuple[T, ...]
     next: str | None = None

@@ -1,4 +1,4 @@
-"""What happened to the robot and its queue, and who asked for it."""
+"""Events: what happened to the robot and its queue, and who caused it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from daq.contracts.service.base import Wire
 
 
 class ServiceEvent(Wire):
-    """One thing that happened. `number` grows with every event, whatever the clock does."""
+    """Something that happened. `number` grows with every event, even if the clock is set back."""
 
     number: int
     at: AwareDatetime

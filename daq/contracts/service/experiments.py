@@ -1,4 +1,4 @@
-"""Experiments of the queue, and schedules that put them there."""
+"""Experiments in the queue, and schedules that submit them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from daq.contracts.service.base import Moment, Wire
 from daq.contracts.trace import EventKind, Outcome
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
-"""`done`: the plan was carried out to its end. `failed`: refused, or ended by a guard. `cancelled`: taken back, or
-stopped by somebody. `interrupted`: the link, a process or the power was lost; it never runs again by itself."""
+"""`done`: the plan was carried out completely. `failed`: refused, or ended by a safety check. `cancelled`: by somebody,
+before it began or by a stop. `interrupted`: the link, a process or the power failed; it never runs again by itself."""
 
 ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "interrupted"})
-"""States that nothing leaves; those of jobs too."""
+"""End states, of experiments and of jobs."""
 
 ExperimentOrder = Literal["submitted", "ended"]
-"""Of a list: submitted last first, or, of those that have ended, ended last first."""
+"""Order of a list: the last submitted first; or only experiments that have ended, the last ended first."""
 
 Priority = Annotated[int, Field(ge=-100, le=100)]
-"""Higher goes first; among equals the one submitted first."""
+"""Priority: the higher runs first; among equal ones, the one submitted first."""
 Interval = Annotated[float, Field(ge=10, le=366 * 86400)]
-"""s between two runs of a schedule."""
+"""Time (s) between two runs of a schedule."""
 
 
 class ExperimentRequest(Wire):
-    """What is to be run. `at`: not before this moment (with its time zone); None for as soon as possible."""
+    """An experiment to run, not before the time `at` (with its time zone); None for as soon as possible."""
 
     spec: ExperimentSpec = ExperimentSpec()
     at: Moment | None = None
@@ -35,7 +35,7 @@ class ExperimentRequest(Wire):
 
 
 class ExperimentPreset(Wire):
-    """An experiment that has a name, and one line that says what it is for."""
+    """A named experiment with one line about its purpose."""
 
     name: str
     description: str
@@ -43,13 +43,13 @@ class ExperimentPreset(Wire):
 
 
 class ExperimentChange(Wire):
-    """A new priority of an experiment that still waits."""
+    """A new priority for a waiting experiment."""
 
     priority: Priority
 
 
 class Experiment(Wire):
-    """One experiment and what became of it. `progress` is a fraction from 0 to 1, only while it runs."""
+    """One experiment with its state and outcome. `progress` is a fraction from 0 to 1, only while it runs."""
 
     id: str
     robot: str
@@ -73,15 +73,15 @@ class Experiment(Wire):
 
 
 class ScheduleRequest(Wire):
-    """An experiment to be run every so often: studies of wear and drift."""
+    """An experiment to run at regular intervals, for studies of wear and drift."""
 
     spec: ExperimentSpec = ExperimentSpec()
     every: Interval
-    """s from one run to the next."""
+    """Time (s) from one run to the next."""
     starts: Moment | None = None
-    """The first run; None for at once."""
+    """Time of the first run; None for now."""
     count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """How many runs; None for no end."""
+    """Number of runs; None for no end."""
     priority: Priority = 0
 
 
@@ -92,8 +92,8 @@ class ScheduleChange(Wire):
 
 
 class Schedule(Wire):
-    """A schedule and how far it is. Runs that were due while the service was off, or while the run before still waited,
-    are left out, not made up for."""
+    """A schedule and its progress. Runs that were due while the service was off, or while the previous run still
+    waited, are skipped."""
 
     id: str
     robot: str
@@ -105,14 +105,14 @@ class Schedule(Wire):
     active: bool
     submitted_runs: int
     next: AwareDatetime | None
-    """When the next run is due; None when there is none."""
+    """When the next run is due; None if there is none."""
     created: AwareDatetime
     created_by: str
 
 
 class MotionPreview(Wire):
-    """The motion of an experiment, worked out and checked without a robot. Columns of `set_points` are the machine's
-    joints, in rad; `violations` is what speaks against it, empty when it may run."""
+    """The motion of an experiment, computed and checked without a robot. Columns of `set_points` are the machine's
+    joints, in rad; `violations` lists the limits that it violates, and is empty if it may run."""
 
     time: tuple[float, ...]
     set_points: tuple[tuple[float, ...], ...]
@@ -123,8 +123,8 @@ class MotionPreview(Wire):
 
 
 class MotionViolation(Wire):
-    """One limit that a motion breaks: the worst place of one rule and joint (or link, for `floor` and `reach`). `time`
-    in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units."""
+    """One limit that a motion violates: the worst place of one rule and joint (or link, for `floor` and `reach`).
+    `time` in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units."""
 
     rule: Literal["finite", "posture", "range", "speed", "step", "floor", "reach"]
     joint: int

@@ -14,10 +14,10 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrup
 """The same states as those of experiments; an interrupted job is not run again by itself either."""
 
 JobFailure = Literal["refused", "program-fault", "lost"]
-"""Why a job has no result: something spoke against it; a fault of the program; the process or the service ended."""
+"""Why a job has no result: it was refused; the program has a fault; its process or the service ended."""
 
 MACHINE = "machine"
-"""In place of a model's number: the model that the robot's machine file describes."""
+"""Used instead of a model's number for the model that the robot's machine file describes."""
 TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200)]
 ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
@@ -28,7 +28,7 @@ Bound = FiniteFloat | None
 
 
 class EffectChoice(Wire):
-    """An effect to be in the model; on all joints where none are named."""
+    """An effect of the model; on all joints if none are named."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")]
     joints: tuple[JointNumber, ...] = ()
@@ -46,7 +46,7 @@ class FitRequest(Wire):
     effects: tuple[EffectChoice, ...] = ()
     """Effects to add to the model before fitting."""
     parameters: tuple[Pattern, ...] | None = None
-    """Parameters to estimate; None for all that are uncertain."""
+    """Parameters to estimate; None for all uncertain ones."""
     held: tuple[Pattern, ...] = ()
     bounds: dict[Pattern, tuple[Bound, Bound]] = Field(default_factory=dict)
     use_priors: StrictBool = True
@@ -71,7 +71,7 @@ class ValidateRequest(Wire):
 
 
 class CompareRequest(Wire):
-    """Simulates the same traces with one model or several, beside what was measured."""
+    """Compares one model or several with the same traces, by simulation."""
 
     kind: Literal["compare"] = "compare"
     traces: TraceNumbers
@@ -79,7 +79,8 @@ class CompareRequest(Wire):
 
 
 class DiagnoseRequest(Wire):
-    """Where a model and traces disagree, which effect is missing, what adding it brings; as `daq diagnose`."""
+    """Finds where a model and traces disagree, which effect is missing, and what adding it improves, as `daq diagnose`
+    does."""
 
     kind: Literal["diagnose"] = "diagnose"
     traces: TraceNumbers
@@ -96,7 +97,7 @@ JobRequest = Annotated[FitRequest | ValidateRequest | CompareRequest | DiagnoseR
 
 
 class KnownEffect(Wire):
-    """An effect of the library: what a fit may add and a diagnosis looks for."""
+    """An effect of the library, which a fit may add and a diagnosis considers."""
 
     name: str
     family: str
@@ -105,24 +106,24 @@ class KnownEffect(Wire):
     physics: str
     """The equation, in the symbols of its parameters."""
     joints: tuple[int, ...]
-    """On which joints it may act; empty for any."""
+    """The joints on which it may act; empty for any."""
     whole_machine: bool
-    """It belongs to the machine, not to a joint."""
+    """Whether it belongs to the machine, not to a joint."""
 
 
 class WaitsBehind(Wire):
-    """What a queued job waits for: the first of the jobs of its lane that come before it."""
+    """The job that a queued job waits for: the first of those before it in its lane."""
 
     job: str
     request: JobRequest
     started: AwareDatetime | None
-    """When that job began; None while it waits too."""
+    """When that job began; None if it is waiting, too."""
     others: int
-    """Number of further jobs that come before."""
+    """Number of further jobs before this one."""
 
 
 class Job(Wire):
-    """One computation and what became of it. `progress` is a fraction from 0 to 1."""
+    """One computation with its state and result. `progress` is a fraction from 0 to 1."""
 
     id: str
     robot: str
@@ -137,19 +138,19 @@ class Job(Wire):
     reason: str = ""
     """Why it is not done, in one line."""
     failure: JobFailure | None = None
-    """The same for programs; None where it was cancelled, or nothing failed."""
+    """The same for programs; None if it was cancelled, or nothing failed."""
     headline: str = ""
     """The result in one line."""
     model: str | None = None
     """The model that it made."""
     has_report: bool = False
     waits_behind: WaitsBehind | None = None
-    """While it is queued and others come before it. Short jobs (comparisons and validations of few traces) have a
-    worker of their own, and wait behind no fit and no diagnosis."""
+    """What it waits for while it is queued behind others. Short jobs (comparisons and validations of few traces) have a
+    worker of their own, and never wait for a fit or a diagnosis."""
 
 
 class ModelEntry(Wire):
-    """A model of the service, and where it comes from."""
+    """A model of the service, and how it was made."""
 
     id: str
     robot: str
@@ -157,19 +158,32 @@ class ModelEntry(Wire):
     created: AwareDatetime
     created_by: str
     parent: str | None
-    """The model that it was made from."""
+    """The model from which it was made."""
     job: str | None
     """The job that made it."""
     traces: tuple[str, ...] = ()
-    """The traces that it was made from."""
+    """The traces from which it was made."""
     notes: str = ""
 
 
+class ParameterWords(Wire):
+    """A parameter as people write it. `joint`: the one that it, or its link, belongs to; None where it is not one."""
+
+    joint: int | None
+    group: str
+    """Whose it is: joint 2, link 1, load."""
+    short: str
+    """What it is, beneath its group: motor back-EMF constant."""
+    label: str
+    """Both: J2 motor back-EMF constant."""
+
+
 class ModelParameter(Wire):
-    """A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
-    nothing is claimed."""
+    """A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None if
+    none is stated."""
 
     name: str
+    words: ParameterWords
     unit: str
     value: float
     low: float | None
@@ -178,7 +192,7 @@ class ModelParameter(Wire):
 
 
 class ModelDetails(Wire):
-    """A model: its effects, its parameters, and the models that it comes from, the nearest first."""
+    """A model: its effects, its parameters, and the models from which it was made, the nearest first."""
 
     entry: ModelEntry
     effects: tuple[EffectChoice, ...]
@@ -187,17 +201,17 @@ class ModelDetails(Wire):
 
 
 class ModelChange(Wire):
-    """A new name or notes; what is None stays."""
+    """A new name or notes; a field that is None stays as it is."""
 
     name: ModelName | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None
 
 
 class ModelLineage(Wire):
-    """Where a robot's models come from, and what was made of them.
+    """The models of a robot, and the jobs that made or used them.
 
-    A model's parent is another of these models, the one that the machine file describes, or one that is not here any
-    more. A job leads from the models and traces of its request to the model that it made, if it made one.
+    A model's parent is another of these models, the one that the machine file describes, or one that has been
+    deleted. A job leads from the models and traces of its request to the model that it made, if it made one.
     """
 
     machine: str

@@ -1,4 +1,4 @@
-"""What the live WebSocket sends, and what it takes. Angles in rad, joints from 1.
+"""The messages of the live WebSocket in both directions. Angles in rad, joints from 1.
 
 Every frame says `now`, the monotonic clock of the service's computer (s), and `utc`, its wall clock (s since 1970). A
 value's age is `now − host_time` when the frame was sent, and grows from then on.
@@ -33,7 +33,7 @@ class SampleMessage(ControlPeriod):
 
 
 class HistoryMessage(Wire):
-    """The last minutes, thinned so that no peak is lost. A signal has one row a joint; None where there is none."""
+    """The last minutes, thinned so that no peak is lost. A signal has one row per joint; a missing value is None."""
 
     topic: Literal["history"] = "history"
     joints: tuple[int, ...]
@@ -47,7 +47,7 @@ class HistoryMessage(Wire):
 
 
 class RecordEventMessage(Wire):
-    """Something in the record of the experiment that runs: a ramp that begins, a limit, a retry."""
+    """An event in the record of the running experiment, such as the beginning of a ramp, a limit or a retry."""
 
     topic: Literal["record_event"] = "record_event"
     kind: EventKind
@@ -58,7 +58,7 @@ class RecordEventMessage(Wire):
     time: float
     """Time (s) from the start of the record."""
     experiment: str | None
-    """The experiment whose record it is in."""
+    """The experiment that is recorded."""
 
 
 class RobotMessage(Wire):
@@ -77,7 +77,7 @@ class RobotMessage(Wire):
 
 
 class LinkMessage(Wire):
-    """The link and its counters, once a second."""
+    """The link and its counters; sent once a second."""
 
     topic: Literal["link"] = "link"
     state: Literal["connected", "degraded", "lost", "none"]
@@ -123,14 +123,14 @@ class TeachingMessage(Wire):
 
 
 class ThinnedMessage(Wire):
-    """This client reads too slowly: so many samples were left out for it. It is dropped if that goes on."""
+    """This client reads too slowly, and samples were left out. It is disconnected if that goes on."""
 
     topic: Literal["thinned"] = "thinned"
     left_out: int
 
 
 class RefusedMessage(Wire):
-    """What the client sent cannot be carried out."""
+    """The client's message cannot be carried out."""
 
     topic: Literal["refused"] = "refused"
     detail: str
@@ -170,9 +170,9 @@ class JogCommand(Wire):
 
 
 class LiveRequest(Wire):
-    """What a client sends over the WebSocket; every field alone, or together.
+    """A client's message over the WebSocket. Its fields may be given alone or together.
 
-    `history` s of samples come at once, in about `points` points; `rate` is samples a second.
+    The last `history` s of samples are sent at once, in about `points` points; `rate` is in samples per second.
     """
 
     subscribe: tuple[Topic, ...] = ()
@@ -184,7 +184,7 @@ class LiveRequest(Wire):
 
 
 class Ticket(Wire):
-    """Good for one WebSocket, once, for `seconds`: browsers cannot send a token with it."""
+    """A ticket, valid once within `seconds` for a WebSocket, with which browsers cannot send a token."""
 
     ticket: str
     seconds: float

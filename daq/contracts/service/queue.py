@@ -14,13 +14,13 @@ Role = Literal["viewer", "operator"]
 class QueueStatus(Wire):
     """Whether experiments are taken from the queue, and if not, why.
 
-    `waiting_for` says in one line why nothing runs although the queue is not paused; empty when something runs or
-    nothing waits.
+    `waiting_for` says in one line why nothing runs although the queue is not paused; it is empty if an experiment runs
+    or none waits.
     """
 
     paused: bool
     reason: str
-    """Why it is paused; who resumed it, when it is not."""
+    """Why it is paused; if it is not, who resumed it."""
     since: AwareDatetime
     queued: int
     running: str | None = None
@@ -44,21 +44,21 @@ class Control(Wire):
     """Name of the client."""
     expires: AwareDatetime | None = None
     remaining: float | None = None
-    """s until it lapses without a heartbeat."""
+    """Time (s) until control lapses without a heartbeat."""
 
 
 class ControlRequest(Wire):
-    """Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`."""
+    """Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 
 
 class ControlLease(Wire):
-    """The control of the robot, for one client. `lease` is its secret: it goes with every motion and heartbeat in the
-    header `Control-Lease`."""
+    """Control of the robot for one client. `lease` is its secret, which the client sends with every motion and
+    heartbeat in the header `Control-Lease`."""
 
     lease: str
     expires: AwareDatetime
     remaining: float
     heartbeat_every: float
-    """s after which the client should renew it, at the latest."""
+    """Time (s) after which the client should renew it, at the latest."""

@@ -1,4 +1,4 @@
-"""The robot as the service sees it. Angles in rad, joints from 1; every value says how old it is."""
+"""The robot as the service sees it. Angles are in rad, joints are numbered from 1; every value has its age."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ControlPeriod(Wire):
 
 class Sample(ControlPeriod):
     """One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
-    since 1970) when it arrived, `age` the s that have passed since."""
+    since 1970) when it arrived, `age` the time (s) since then."""
 
     utc: float
     age: float
@@ -68,11 +68,11 @@ class RobotStatus(Wire):
     identity: RobotIdentity | None = None
     arm: ArmState
     cause: str = ""
-    """Why the arm is stopped, or at fault."""
+    """Why the arm is stopped or at fault, as it stands behind "stopped:" or "fault:"."""
     activity: Activity
     experiment: str | None = None
     limp: tuple[int, ...] = ()
-    """Joints without drive: their proportional gain is 0, nothing holds them."""
+    """Joints without drive: their proportional gain is 0, so nothing holds them."""
     sample: Sample | None = None
     link: LinkStatus
     control: Control
@@ -100,13 +100,15 @@ class StopResult(Wire):
     seconds: float
     """Time (s) from the request to this answer."""
     note: str = ""
-    """What else is known: joints without drive, or why it was not confirmed."""
+    """Further information: joints without drive, or why the stop was not confirmed."""
+    detail: str = ""
+    """What `text` says beyond whether the stop was delivered and confirmed, and what to do about it."""
     text: str
     """The whole result in one line."""
 
 
 class ResetRequest(Wire):
-    """`here`: first make the posture measured now the set points."""
+    """Ends a stop. `here`: first make the measured posture the set points."""
 
     here: StrictBool = False
 

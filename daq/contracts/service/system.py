@@ -14,7 +14,7 @@ def stop_port_after(port: int) -> int:
 
 
 class Health(Wire):
-    """Whether it answers, and whether it can take experiments. `checks`: one line each; empty where all is well."""
+    """Whether the service answers, and can take experiments. `checks`: one line each; empty if the check succeeded."""
 
     status: Literal["ok", "not ready"]
     version: str
@@ -29,20 +29,20 @@ class Me(Wire):
 
 
 class StorageStatus(Wire):
-    """Where things are kept, and how much room there is (bytes)."""
+    """Where data are stored, and how much space is free (bytes)."""
 
     traces_folder: str
     traces_free: int
     traces_reserve: int
-    """New experiments are refused when less than this is free."""
+    """New experiments are refused if less than this is free."""
     traces: int
-    """Traces in the catalogue."""
+    """Number of traces in the catalogue."""
     database: str
     database_size: int | None
 
 
 class SystemStatus(Wire):
-    """The service: version, since when it runs, storage, watchers."""
+    """The service: version, uptime, storage, clients."""
 
     version: str
     uptime: float

@@ -16,14 +16,14 @@ Angle = Annotated[float, Field(ge=-7, le=7)]
 
 class JogRequest(Wire):
     """Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
-    Empty: hold."""
+    No velocities: hold."""
 
     velocities: dict[JointNumber, Velocity]
 
 
 class StepRequest(Wire):
-    """One off-line step to absolute angles (`to`), or by relative ones (`by`), in rad; `speed` of the fastest joint in
-    rad/s. Give one of the two."""
+    """One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed` is
+    that of the fastest joint, in rad/s."""
 
     to: dict[JointNumber, Angle] | None = None
     by: dict[JointNumber, Angle] | None = None
@@ -37,8 +37,8 @@ class LeadRequest(Wire):
 
 
 class TaughtPath(Wire):
-    """Measured angles (rad), one row a control period, one column a joint; times (s) from the first row. As the `path`
-    of an experiment it is played back."""
+    """Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. An
+    experiment with this as its `path` plays it back."""
 
     joints: tuple[int, ...]
     times: tuple[float, ...]
@@ -46,7 +46,7 @@ class TaughtPath(Wire):
 
 
 class TeachingLine(Wire):
-    """A line for the operator who teaches: a joint that is refused, an instruction that begins."""
+    """A line for the operator who teaches, such as a refused joint, or the beginning of an instruction."""
 
     number: int
     at: AwareDatetime
@@ -54,17 +54,17 @@ class TeachingLine(Wire):
 
 
 class TeachingStatus(Wire):
-    """What is being taught now, and how the last one ended."""
+    """The teaching activity under way, and how the last one ended."""
 
     activity: Activity
     lines: tuple[TeachingLine, ...] = ()
-    """The newest ones, the oldest first."""
+    """The newest lines, the oldest of them first."""
     result: str = ""
     """How the last teaching ended; empty while one goes on, or before the first."""
     problem: str = ""
     """Why the last teaching ended early."""
     path: TaughtPath | None = None
-    """What was led by hand last."""
+    """The path that was last led by hand."""
 
 
 class ProgramEntry(Wire):
@@ -79,14 +79,14 @@ class ProgramEntry(Wire):
 
 
 class CalibrationRequest(Wire):
-    """Joints whose actual proportional gain is to be found, by small steps at several postures (section 6.5)."""
+    """Joints whose actual proportional gain is measured by small steps at several postures (section 6.5)."""
 
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
 
 
 class MeasuredGain(Wire):
     """The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-    the reason why the trace does not tell it. Gains between `lowest` and `highest` agree with every sample."""
+    the reason why the trace does not determine it. Gains between `lowest` and `highest` agree with every sample."""
 
     joint: int
     gain: float | None = None

@@ -23,7 +23,7 @@ class CatalogueEntry(Wire):
     created: AwareDatetime
     source: Source
     kind: str | None
-    """Kind of trajectory, where the trace is of an experiment."""
+    """Kind of trajectory, if the trace is of an experiment."""
     name: str | None
     joints: tuple[int, ...]
     outcome: Outcome | None
@@ -38,11 +38,11 @@ class CatalogueEntry(Wire):
     tags: tuple[str, ...] = ()
     notes: str = ""
     missing: bool = False
-    """The catalogue knows it, but its file is gone."""
+    """Whether its file is gone, though the catalogue has it."""
 
 
 class TraceDetails(Wire):
-    """One trace: what it says about itself, its figures and events."""
+    """One trace: its record, figures and events."""
 
     entry: CatalogueEntry
     record: TraceRecord
@@ -52,17 +52,17 @@ class TraceDetails(Wire):
 
 
 class TraceChange(Wire):
-    """New tags or notes; what is None stays."""
+    """New tags or notes; a field that is None stays as it is."""
 
     tags: Annotated[tuple[Tag, ...], Field(max_length=50)] | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None
 
 
 class TraceSignals(Wire):
-    """Signals of a trace for a plot, thinned so that no peak is lost: of every stretch the extremes are kept.
+    """Signals of a trace for a plot, thinned to the extremes of short stretches, so that no peak is lost.
 
-    `time` is in s; a signal has one row a joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
-    `drive_unit`. A signal that the trace has not is None.
+    `time` is in s; a signal has one row per joint, in the order of `joints`, in rad, or in m for a prismatic joint; the
+    drive is in `drive_unit`. A signal that the trace does not have is None.
     """
 
     id: str

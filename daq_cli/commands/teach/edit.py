@@ -1,4 +1,4 @@
-"""`daq teach edit`: a taught program changed off line. Nothing moves; a refused change leaves the file as it was."""
+"""`daq teach edit`: changes a taught program off line. Nothing moves; a refused change leaves the file as it was."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app.context import JsonOption, invocation, print_json, printable
 from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
+from firmware_protocol.invalid import first_invalid
 
 if TYPE_CHECKING:
     from daq.teaching.program import Instruction, Program
@@ -61,7 +62,7 @@ def insert(
     input_: Annotated[str | None, typer.Option("--input", help="A process input to wait for: 3=on or 3=off.")] = None,
     gripper: GripperOption = None,
 ) -> None:
-    """Put a new instruction at this number; those from there on move one back."""
+    """Insert an instruction at this number; the following ones move back by one."""
     from daq.teaching import editing
 
     made = _instruction(to=to, by=by, speed=speed, wait=wait, output=output, awaited=input_, gripper=gripper)
@@ -126,7 +127,7 @@ def _edit(context: typer.Context, file: Path, edited: Any) -> None:
     from daq.teaching.program import load_program, save_program
 
     if file.suffix == ".toml":
-        raise SpecError(f"program {file}: is TOML, with comments of yours that would be lost; edit it as text")
+        raise SpecError(f"program {file}: is TOML, and its comments would be lost; edit it as text")
     before = load_program(file)
     after: Program = edited(before)
     machine = load_settings(invocation(context).config_file)[0].machine()
@@ -147,7 +148,7 @@ def _instruction(
     awaited: str | None,
     gripper: str | None,
 ) -> Instruction:
-    """The one instruction that the options name. Raises SpecError for none, several, or wrong values."""
+    """Returns the instruction that the options name. Raises SpecError for none, several, or wrong values."""
     from pydantic import TypeAdapter, ValidationError
 
     from daq.teaching.program import Instruction
@@ -176,8 +177,8 @@ def _instruction(
     try:
         made: Instruction = TypeAdapter(Instruction).validate_python(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        raise SpecError(f"insert: {'.'.join(map(str, first['loc'][1:]))}: {first['msg']}") from error
+        first = first_invalid(error)
+        raise SpecError(f"insert: {'.'.join(map(str, first.place[1:]))}: {first.message}") from error
     return made
 
 

@@ -15,13 +15,14 @@ from daq_cli.app.context import JsonOption, YesOption
 from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
 from daq_cli.commands.teach import edit, programs
 from daq_cli.robot.access import robot_of
+from firmware_protocol.invalid import first_invalid
 
 LONGEST_LEAD = 3600.0
 """Longest lead in s, because somebody has to hold the arm."""
 
 app = typer.Typer(
     add_completion=False,
-    help="Jog the arm, lead it by the nose, make steps, and play back. Needs a configured robot, or --port.",
+    help="Jog the arm, lead it by hand, make steps, and play back. Needs a configured robot, or --port.",
     no_args_is_help=True,
 )
 app.add_typer(programs.app, name="programs")
@@ -33,7 +34,7 @@ def jog(
     context: typer.Context,
     speed: Annotated[str, typer.Option(help="Speed to begin with, up to 20 degrees/s.")] = "10",
     program: Annotated[
-        Path | None, typer.Option(help="File for the postures that are kept with `p` (a program, .json).")
+        Path | None, typer.Option(help="File for the postures that `p` saves (a program, .json).")
     ] = None,
     yes: YesOption = False,
 ) -> None:
@@ -85,9 +86,8 @@ def step(
     try:
         instruction: Instruction = kind(angles=angles, speed=parse_angle(speed, "speed"))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise SpecError(f"step: {where} = {first['input']:.5g} rad or rad/s: {first['msg']}") from error
+        first = first_invalid(error)
+        raise SpecError(f"step: {first.where()} = {first.value:.5g} rad or rad/s: {first.message}") from error
     program = Program(name="step", machine=robot.machine.name, instructions=(instruction,))
     print(robot.teaching(Consent(yes)).perform(program))
 
@@ -130,7 +130,7 @@ def lead(
     if seconds is None and not sys.stdin.isatty():
         raise SpecError("lead: give --seconds, or a terminal in which Enter ends it")
     if not output.name or output.is_dir():
-        raise SpecError(f"lead: {str(output)!r}: is no name for a file; nothing was begun")
+        raise SpecError(f"lead: {str(output)!r}: cannot be the name of a file; nothing was begun")
     if not output.absolute().parent.is_dir():
         raise SpecError(f"lead: {output}: its folder does not exist; nothing was begun")
     led = parse_joints(joints)
@@ -164,6 +164,6 @@ def play(
     try:
         path = RecordedPath.model_validate_json(read_text(file, f"path {file}"))
     except ValidationError as error:
-        raise SpecError(f"path {file}: {error.errors()[0]['msg']}") from error
+        raise SpecError(f"path {file}: {first_invalid(error).message}") from error
     spec = playback(path, rate, "playback")
     carry_out(robot_of(context), spec, RunOptions(folder, dry_run, yes, json))

@@ -1,4 +1,4 @@
-"""`daq teach programs`: taught programs that a service keeps, from its page or from here."""
+"""`daq teach programs`: lists, uploads, downloads and deletes the taught programs that a service keeps."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from daq_cli.robot.access import robot_of
 
 app = typer.Typer(
     add_completion=False,
-    help="Programs that a service keeps (`--server`): ls, keep, fetch, delete. `teach program NAME` carries one out.",
+    help="Programs that a service keeps (`--server`): ls, keep, fetch, delete. `teach program NAME` runs one.",
     no_args_is_help=True,
 )
 WHAT = "teach programs"
-"""How these commands are called where there is no service."""
+"""The name of these commands in the error for a missing service."""
 Name = Annotated[str, typer.Argument(help="Name of a kept program.")]
 
 
@@ -41,9 +41,9 @@ def list_kept(context: typer.Context, json: JsonOption = False) -> None:
 def keep(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="A taught program (.json or .toml).")],
-    replace: Annotated[bool, typer.Option("--replace", help="Overwrite the one of the same name.")] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite the program of the same name.")] = False,
 ) -> None:
-    """Have the service keep a program until it is deleted."""
+    """Upload a program to the service, which keeps it until it is deleted."""
     from daq.teaching.program import load_program
 
     access = robot_of(context)
@@ -60,7 +60,7 @@ def fetch(
     name: Name,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write (default: NAME.json).")] = None,
 ) -> None:
-    """Write a kept program into a file of this computer."""
+    """Download a kept program into a file."""
     from daq.teaching.program import require_program_file, save_program
     from daq_cli.robot.remote.robot import kept_program
 

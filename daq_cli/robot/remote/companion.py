@@ -1,4 +1,4 @@
-"""Beside an experiment that a person waits for: keys that stop, and confirmations that the person is present."""
+"""Runs beside an experiment for which a person waits: reacts to stop keys, and confirms that the person is present."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from daq_cli.app.context import console
 from daq_cli.app.stop_keys import StopThread
 
 ATTEND_EVERY = 20.0
-"""s between two confirmations that an operator is present; the service waits a minute for one."""
+"""Time (s) between two confirmations that an operator is present; the service waits a minute for one."""
 ANSWER_WITHIN = 1.0
-"""s for the service to answer a cancel or a confirmation: a late answer must not delay a stop."""
+"""Time (s) for the service to answer a cancel or a confirmation: a late answer must not delay a stop."""
 ENDS_WITHIN = 1.0
-"""s for an experiment to end after its cancel; then the arm is stopped, which changes nothing where it has stopped."""
+"""Time (s) for an experiment to end after its cancel; then the arm is stopped, which does no harm if it has stopped."""
 LEAVES_WITHIN = 5.0
-"""s within which a cancel and a stop are answered, if ever."""
+"""Time (s) within which a cancel and a stop are answered, if at all."""
 GONE = (404, 409)
 """HTTP status of an experiment that has ended by itself at this moment."""
 
 
 class Companion(StopThread):
-    """Within the block, on a thread of its own: `press` cancels the experiment, or stops the arm; and where `attends`,
-    for a real arm, the service is told at intervals that an operator is present."""
+    """Works within the block, on a thread of its own: `press` cancels the experiment, or stops the arm. With `attends`,
+    for a real arm, it regularly confirms to the service that an operator is present."""
 
     def __init__(
         self,
@@ -63,11 +63,11 @@ class Companion(StopThread):
                 self.pressed = False
                 self._stop()
             elif self._attends and not woken:
-                with suppress(ServiceError, ServiceNotReachedError):  # said again in time, or the service ends the run
+                with suppress(ServiceError, ServiceNotReachedError):  # sent again in time, or the service ends the run
                     self._robot.queue.attend(within=ANSWER_WITHIN)
 
     def _stop(self) -> None:
-        """Cancels the experiment; where its end is not known soon, stops the arm in every way there is."""
+        """Cancels the experiment; if its end is not known soon, stops the arm in every possible way."""
         try:
             if self._robot.experiments.cancel(self._experiment, within=ANSWER_WITHIN).state in ENDS:
                 return

@@ -1,4 +1,4 @@
-"""The connection to the service that the command line names, and the control of its robot."""
+"""The connection to the service that the command line names, and control of its robot."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def remote_robot(call: Invocation) -> Iterator[Robot]:
 
 
 def connected_status(robot: Robot) -> RobotStatus:
-    """The robot's status, after the service has connected to it. Raises ServiceError when it cannot."""
+    """Returns the robot's status, after the service has connected to it. Raises ServiceError if it cannot."""
     status = robot.status()
     return status if status.identity is not None else robot.connect()
 
 
 def require_consent(status: RobotStatus, consent: Consent) -> bool:
-    """Whether the robot is a real arm; the operator is asked about one. Raises SafetyError without their word."""
+    """Returns whether the robot is a real arm, for which it asks the operator. Raises SafetyError without consent."""
     real = status.identity is not None and not status.identity.simulated
     consent.require(f"{status.robot} at the server ({status.port})", simulated=not real)
     return real
@@ -42,7 +42,7 @@ def require_consent(status: RobotStatus, consent: Consent) -> bool:
 
 @contextmanager
 def controlled(call: Invocation, consent: Consent) -> Iterator[tuple[Robot, HeldControl]]:
-    """The robot and its control, given back afterwards. On a real arm the operator is asked.
+    """The robot, with control of it, which is given back afterwards. On a real arm the operator is asked.
 
     Raises ServiceError, SafetyError.
     """
@@ -55,7 +55,7 @@ def controlled(call: Invocation, consent: Consent) -> Iterator[tuple[Robot, Held
 
 
 def _say_if_paused(call: Invocation, robot: Robot, paused_before: bool) -> None:
-    """Waiting experiments do not begin when the control is given back: a person has to resume the queue."""
+    """Says that the queue is paused, since waiting experiments do not begin until a person resumes it."""
     queue = robot.queue.status()
     if queue.paused and not paused_before:
         console().print(f"the queue is paused: {queue.reason}: `daq --server {call.server} queue resume`")

@@ -46,7 +46,7 @@ class RemoteRobot:
             connected_status(robot)
 
     def view(self) -> RobotView:
-        """The state that the service knows; an old sample has its age with it."""
+        """Returns the state as the service knows it, with the age of the sample."""
         from daq.contracts.status import report_of
 
         with remote_robot(self.call) as robot:
@@ -60,7 +60,7 @@ class RemoteRobot:
             return robot.gains().gains
 
     def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
-        """The service refuses it for a joint off its set point."""
+        """Writes gains. The service refuses a joint off its set point."""
         from daq.contracts.limp import limp_line
 
         with controlled(self.call, consent) as (_, control):
@@ -86,7 +86,7 @@ class RemoteRobot:
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
         """Stops the robots of the service."""
-        del reached  # those are processes of this computer
+        del reached  # these are processes of this computer
         from daq_cli.robot.remote.stop import stop_at_server
 
         return stop_at_server(self.call)
@@ -113,7 +113,7 @@ class RemoteRobot:
             return [summary(entry) for entry in robot.traces.list()][::-1], self.server
 
     def find_trace(self, folder: Path, wanted: str) -> Path:
-        """A file of this computer, else a trace of the service, which is fetched. Raises TraceError."""
+        """Returns a local file, or else a trace of the service, which is downloaded. Raises TraceError."""
         if Path(wanted).is_file():
             from daq.traces.catalogue import find_trace
 
@@ -123,14 +123,14 @@ class RemoteRobot:
         return fetched_trace(self.call, folder, wanted)
 
     def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
-        """Sends the file to the service, which has a folder of its own."""
+        """Uploads the file to the service, which has a folder of its own."""
         del folder
         with remote_robot(self.call) as robot:
             entry = robot.traces.upload(file)
         return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}")
 
     def program(self, name: Path) -> Program:
-        """A program in a file of this computer, else one that the service keeps. Raises SpecError."""
+        """Returns a program from a local file, or else one that the service keeps. Raises SpecError."""
         from daq.teaching.program import load_program
 
         if name.exists():
@@ -139,7 +139,7 @@ class RemoteRobot:
             return kept_program(robot, str(name))
 
     def teaching(self, consent: Consent) -> Teaching:
-        """Teaching with the control of the service's robot."""
+        """Returns teaching with control of the service's robot."""
         from daq_cli.robot.remote.teach import RemoteTeaching
 
         return RemoteTeaching(controlled(self.call, consent))
@@ -155,11 +155,11 @@ class RemoteRobot:
 
 
 def kept_program(robot: Robot, name: str) -> Program:
-    """A program that the service keeps. Raises SpecError, and what the service refuses."""
+    """Returns a program that the service keeps. Raises SpecError, and ServiceError if the service refuses."""
     from daq.teaching.program import Program, is_program_name
 
     if not is_program_name(name):
-        raise SpecError(f"program {name!r}: there is no such file, and no program of a service is called so")
+        raise SpecError(f"program {name!r}: there is no such file, and the service has no program of this name")
     return robot.programs.get(Program, name)[0]
 
 

@@ -1,4 +1,4 @@
-"""An experiment through the service's queue, as the person who waits for it sees it."""
+"""An experiment through the service's queue, for a person who waits for its end."""
 
 from __future__ import annotations
 
@@ -31,21 +31,22 @@ EXIT_CODES = {
 }
 """Exit code by the state of an experiment that has left no trace."""
 POLL_EVERY = 2.0
-"""s without a message after which the experiment is polled."""
+"""Time (s) without a message after which the experiment is polled."""
 FAILED_POLLS = 5
-"""Failed polls after which the service counts as lost."""
+"""Number of failed polls after which the service counts as lost."""
 
 
 def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: Consent) -> Finished:
-    """Queues `spec`, follows it to its end, and fetches its trace into `folder`.
+    """Queues `spec`, follows it to its end, and downloads its trace into `folder`.
 
-    Ctrl-C takes it back, or stops the arm where it runs. Raises AcquisitionFailedError, and what the service refuses.
+    Ctrl-C cancels it, or stops the arm while it runs. Raises AcquisitionFailedError, and ServiceError if the service
+    refuses.
     """
     status = connected_status(robot)
     _require_open_queue(server, status)
     real = require_consent(status, consent)
     if real:
-        _require_open_queue(server, robot.status())  # the question may have stood there for minutes
+        _require_open_queue(server, robot.status())  # again: the question may have been open for minutes
         robot.queue.resume(moves_real_arm=True)
     with StopKeys() as keys, robot.live("events", "queue") as stream:
         experiment = robot.experiments.submit(spec)
@@ -86,7 +87,7 @@ class _Follower:
                 if any(news):
                     ended = self._look(0)
             while ended.outcome is not None and not self._record_ended:
-                # The end was asked for, and was quicker than what is still on its way.
+                # The state was polled, and the end came before messages that are still under way.
                 if (frame := stream.next_frame(POLL_EVERY)) is None:
                     break
                 for message in frame.messages:
@@ -103,7 +104,7 @@ class _Follower:
                         return ended
             except ServiceNotReachedError as error:
                 if attempt == FAILED_POLLS - 1:
-                    line = f"{error}; experiment {self._experiment} is the service's now, and so is its trace"
+                    line = f"{error}; experiment {self._experiment} and its trace stay at the service"
                     raise AcquisitionFailedError(line, error.exit_code) from error
         raise AssertionError("the last attempt returns or raises")
 

@@ -1,4 +1,4 @@
-"""A stop of a server's robot: asked for under its likely name, before anything else is asked."""
+"""A stop of a server's robot: it is requested under the robot's likely name, before any other request."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from daq_cli.robot.remote.connection import TOKEN_VARIABLE
 
 DEFAULT_ROBOT = "ma2000"
 NAMES_WITHIN = 1.0
-"""s for a service to name its robots: whoever stops must soon know what became of it."""
+"""Time (s) for a service to name its robots: a person who stops must soon know the result."""
 
 
 def stop_at_server(call: Invocation) -> list[StopAnswer]:
-    """Stops the robot that goes by the configured name; where there is none of that name, all that the service has.
+    """Stops the robot with the configured name; if the service has none of this name, stops all of its robots.
 
-    Never raises: what is not known is in the answers.
+    Never raises: the answers say what is not known.
     """
     assert call.server is not None
     name = _likely_name(call)
@@ -37,8 +37,8 @@ def stop_at_server(call: Invocation) -> list[StopAnswer]:
 
 
 def _likely_name(call: Invocation) -> str:
-    """The configured name; the default one where the configuration cannot be read, so that the stop is sent all the
-    same."""
+    """Returns the configured name; the default name if the configuration cannot be read, so that the stop is sent
+    nevertheless."""
     try:
         return call.settings.robot.name
     except DaqError:
@@ -46,8 +46,8 @@ def _likely_name(call: Invocation) -> str:
 
 
 def _others(client: Client, name: str, first: StopResult) -> list[str]:
-    """Names of the service's robots where it has none of this name; says so first."""
-    print(f"{first.note}: {client.url} is asked to stop the robots that it has", file=sys.stderr, flush=True)
+    """Says that the service has no robot of this name, and returns the names of its robots."""
+    print(f"{first.note}: {client.url} is asked to stop all of its robots", file=sys.stderr, flush=True)
     try:
         names = [one.robot for one in client.robots(within=NAMES_WITHIN)]
     except DaqError:

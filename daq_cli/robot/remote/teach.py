@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     Controlled = AbstractContextManager[tuple[Robot, HeldControl]]
 
 LOOK_EVERY = 0.1
-"""s between two looks at what has become of a program or a lead."""
+"""Time (s) between two checks of the state of a program or a lead."""
 KEYS_EVERY = 0.05
-"""s between two looks at the keyboard."""
+"""Time (s) between two reads of the keyboard."""
 
 
 class StoppedAtServerError(DaqError):
@@ -41,8 +41,8 @@ class StoppedAtServerError(DaqError):
 
 @contextmanager
 def taught(held: Controlled) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
-    """The robot, its control, and whether a key has stopped it: within the block Ctrl-C and its like do so, on a thread
-    that does nothing else."""
+    """The robot, control of it, and whether a key has stopped it. Within the block Ctrl-C, Ctrl-Z and SIGTERM stop it,
+    on a thread of their own."""
     with StopKeys() as keys, held as (robot, control), Stopped(robot) as stopped:
         keys.stops(stopped.press)
         try:
@@ -52,9 +52,9 @@ def taught(held: Controlled) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
 
 
 class Stopped(StopThread):
-    """Stops the robot when `press` is called; `result` then says what became of the stop.
+    """Stops the robot when `press` is called; `result` is then the result of the stop.
 
-    Leaving raises StoppedAtServerError after a press, whatever the work has ended with: a stop counts.
+    After a press, leaving the block raises StoppedAtServerError, however the work has ended.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -76,7 +76,7 @@ class Stopped(StopThread):
             self.result = self._robot.stop()
 
     def wait_for_answer(self) -> None:
-        """After a key has been pressed, waits until it is known what became of the stop."""
+        """After a key has been pressed, waits for the result of the stop."""
         if self.pressed:
             self._thread.join()
 
@@ -88,7 +88,7 @@ class Stopped(StopThread):
 
 @dataclass(frozen=True)
 class RemoteTeaching:
-    """`Teaching` with the control of a service's robot. Raises StoppedAtServerError after Ctrl-C."""
+    """`Teaching` with control of a service's robot. Raises StoppedAtServerError after Ctrl-C."""
 
     held: Controlled
 
@@ -101,7 +101,7 @@ class RemoteTeaching:
                 typed = keyboard.pressed()
                 now = time.monotonic()
                 command = pendant.command(typed, now)
-                if command is not None and command.time == now:  # said just now: an older one is not repeated
+                if command is not None and command.time == now:  # only a new command is sent, not an older one again
                     control.jog(command.velocities)
                 if pendant.gripper is not None:
                     control.set_gripper(closed=pendant.gripper)
@@ -168,7 +168,7 @@ def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) ->
             if status.problem:
                 raise SafetyError(status.problem)
             return status
-        _ = control.lease  # raises when it is lost: the arm holds then, and nothing ends as it should
+        _ = control.lease  # raises if control is lost: the arm holds then, and the program does not end as planned
         time.sleep(LOOK_EVERY)
 
 

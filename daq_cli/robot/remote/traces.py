@@ -12,7 +12,7 @@ from daq_cli.robot.remote.connection import remote_robot
 
 
 def fetched_trace(call: Invocation, folder: Path, wanted: str) -> Path:
-    """The file of a service's trace in `folder`, fetched unless it is there. Raises TraceError."""
+    """Returns the file of a service's trace in `folder`, downloaded unless it exists. Raises TraceError."""
     with remote_robot(call) as robot:
         entry = robot.traces.find(wanted)
         target = folder / Path(entry.file).name

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import Candidate, FoundValue
 from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, price_of, says_no_more
@@ -17,12 +17,10 @@ from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
 from model.machine_model.parameter import Parameter
 
-Floats = NDArray[np.float64]
-
 FEEDBACK_SHARE_FOR_INTERVALS = 0.9
-"""Feedback share for the question how far noise has shifted an estimate: half as far from the record as the fits."""
+"""Feedback share with which the shift of an estimate by noise is measured: half as far from the record as the fits."""
 MOST_STEPS = 8
-"""Steps of the search that answers it."""
+"""Most steps of the search that measures it."""
 
 
 def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | float = 0.0) -> dict[str, FoundValue]:
@@ -43,7 +41,7 @@ def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | fl
         known = np.isfinite(deviation) and point.tangents[k] @ point.tangents[k] > 0
         low = max(unknown.low, value - INTERVAL * deviation) if known else None
         high = min(unknown.high, value + INTERVAL * deviation) if known else None
-        values[p.name] = FoundValue(value=value, low=low, high=high, unit=p.unit)
+        values[p.name] = FoundValue.of(p, value, low, high)
     return values
 
 
@@ -53,8 +51,8 @@ def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
 
     Noise that passes a law with a corner or a limit does not average out: a dead zone looks narrower, friction near
     zero speed softer. As in the extrapolation of simulated noise (Cook and Stefanski 1994), the bias shows where there
-    is less noise. The remaining way to no noise is about as long again, and two deviations reach so far. All zero where
-    that fit does not stay finite.
+    is less noise. The distance that remains to no noise is about as long again, and two deviations cover it. All zero
+    where that fit does not stay finite.
     """
     nearer = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_INTERVALS)
     names = {p.name for p in parameters}
@@ -68,9 +66,9 @@ def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
 def standard_deviations(
     precision: Floats, whiteners: Sequence[Whitener], tangents: Sequence[Sequence[Floats]]
 ) -> Floats:
-    """(p,) of estimates by least squares that take a residual for white noise of unit size: what that gives, or, where
-    it is more, what the residual's own covariance Σ gives, H⁻¹ (J Σ Jᵀ + P) H⁻¹ with H = J Jᵀ + P (White 1980). Never
-    less, because a fit takes slow noise out of its residual.
+    """(p,) of estimates by least squares that treat the residual as white noise of unit size: their own standard
+    deviations or, where larger, those that follow from the residual's covariance Σ, H⁻¹ (J Σ Jᵀ + P) H⁻¹ with H = J Jᵀ
+    + P (White 1980). They are never smaller, because a fit takes slow noise out of its residual.
 
     Args:
         precision: P, (p,) of the priors. whiteners: of each joint's residual.
@@ -90,9 +88,7 @@ def standard_deviations(
 def listed(found: CandidateFit) -> Candidate:
     """A candidate for the answer's list: estimates without intervals, because its derivatives are not those at its
     end."""
-    values = {}
-    for p in found.hypothesis.free:
-        values[p.name] = FoundValue(value=found.fit.point.value(p.name), low=None, high=None, unit=p.unit)
+    values = {p.name: FoundValue.of(p, found.fit.point.value(p.name)) for p in found.hypothesis.free}
     return Candidate(
         effect=found.hypothesis.name,
         joints=found.hypothesis.joints,

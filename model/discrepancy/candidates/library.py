@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 from model import layout as at
 from model.effects.library import effect, library
@@ -70,7 +71,7 @@ class Hypothesis:
 def hypotheses(
     model: Model, effects: Sequence[str] | None = None, joints: Sequence[int] | None = None
 ) -> tuple[Hypothesis, ...]:
-    """Every effect that the model could get, except those that a spectrum finds.
+    """Every effect that the model could take, except those that a spectrum finds.
 
     Raises SpecError for unknown names, and for joints that are not modelled.
 
@@ -84,13 +85,13 @@ def hypotheses(
             continue
         places = ((),) if effect(name).whole_machine else tuple((j,) for j in joints or model.machine.modelled_joints)
         for place in places:
-            found.extend(_variants(model, name, place))
+            found.extend(_variants(_Place(model, name, place, name)))
     return tuple(found)
 
 
 def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Hypothesis | None:
     """A hypothesis with a frequency that a spectrum has proposed. values: by the part of the effect."""
-    return _hypothesis(model, name, name, (joint,), (dict(values),), proportional=False)
+    return _hypothesis(_Place(model, name, (joint,), name), (dict(values),))
 
 
 def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, float]) -> Hypothesis | None:
@@ -99,46 +100,67 @@ def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, fl
     first = alike[0]
     joints = tuple(sorted(j for c in alike for j in c.joints))
     bounds = {name: own for c in alike for name, own in c.bounds.items()}
-    law = first.free[0].effect or first.name
-    found = _hypothesis(model, first.name, law, joints, (dict(values),), proportional=False, bounds=bounds)
+    place = _Place(model, first.name, joints, first.free[0].effect or first.name)
+    found = _hypothesis(place, (dict(values),), bounds=bounds)
     return found if found is not None and {j for p in found.free for j in p.joints} >= set(joints) else None
 
 
-def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Hypothesis]:
+@dataclass(frozen=True)
+class _Place:
+    """An effect on joints of a model. law: the effect whose law is simulated, because a name may stand for two."""
+
+    model: Model
+    name: str
+    joints: tuple[int, ...]
+    law: str
+
+    def has_law(self, effect: str | None, joints: Sequence[int]) -> bool:
+        """Whether an effect on joints is this law, here."""
+        return effect == self.law and (not self.joints or bool(set(self.joints) & set(joints)))
+
+    @property
+    def has_room(self) -> bool:
+        """Whether the model can have the law here: a user's own effect acts only on the joints of its file, and a model
+        has limited room for such effects."""
+        kind = effect(self.law)
+        own = {use.name for use in self.model.effects if use.file is not None}
+        own |= {self.law} if kind.file is not None else set()
+        taken = sum(len(effect(name).parameters) for name in own)
+        return taken <= at.USER_COLUMNS and (not kind.joints or set(self.joints) <= set(kind.joints))
+
+
+def _variants(place: _Place) -> list[Hypothesis]:
     found: list[Hypothesis | None] = []
-    if name == "stribeck_friction":
+    if place.name == "stribeck_friction":
         shapes = tuple({"speed": s} for s in STRIBECK_SHAPES)
-        found.append(_sized(model, name, name, joints, shapes, {"speed": (STICTION_SPEED, 10.0)}))
-    elif name == "stiction":
-        shapes = ({"speed": STICTION_SHAPE},)
-        found.append(_sized(model, name, "stribeck_friction", joints, shapes, {"speed": (0.004, STICTION_SPEED)}))
-        found.append(_sized(model, name, name, joints, ({},), {}))
-    elif name == "resistance_drift":
-        found.append(_sized(model, name, name, joints, ({"time_constant": 10.0}, {"time_constant": 30.0}), {}))
-    elif name == "spring_torque":
-        rest = model.machine.rest_posture
-        found.append(_sized(model, name, name, joints, ({"rest": 0.0 if rest is None else rest[joints[0] - 1]},), {}))
+        found.append(_sized(place, shapes, {"speed": (STICTION_SPEED, 10.0)}))
+    elif place.name == "stiction":
+        stribeck = replace(place, law="stribeck_friction")
+        found.append(_sized(stribeck, ({"speed": STICTION_SHAPE},), {"speed": (0.004, STICTION_SPEED)}))
+        found.append(_sized(place))
+    elif place.name == "resistance_drift":
+        found.append(_sized(place, ({"time_constant": 10.0}, {"time_constant": 30.0})))
+    elif place.name == "spring_torque":
+        rest = place.model.machine.rest_posture
+        found.append(_sized(place, ({"rest": 0.0 if rest is None else rest[place.joints[0] - 1]},)))
     else:
-        found.append(_sized(model, name, name, joints, ({},), {}))
+        found.append(_sized(place))
     return [c for c in found if c is not None]
 
 
 def _sized(
-    model: Model,
-    name: str,
-    law: str,
-    joints: tuple[int, ...],
-    shapes: Sequence[dict[str, float]],
-    bounds: dict[str, tuple[float, float]],
+    place: _Place,
+    shapes: Sequence[dict[str, float]] = ({},),
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> Hypothesis | None:
     """A hypothesis with trials of every main parameter, in every direction that its bounds allow, for every shape."""
-    plain = _hypothesis(model, name, law, joints, ({},), proportional=law not in TRIALS, bounds=bounds)
+    plain = _hypothesis(place, ({},), proportional=place.law not in TRIALS, bounds=bounds)
     if plain is None:
         return None
     trials = []
     for p in plain.main:
         size = p.deviation or 1.0
-        steps = [(SMALL,)] if plain.proportional else [(m, -m) for m in TRIALS[law]]
+        steps = [(SMALL,)] if plain.proportional else [(m, -m) for m in TRIALS[place.law]]
         for step in (s for pair in steps for s in pair):
             value = (p.null if p.effect == "motor_inductance" and p.null is not None else p.value) + step * size
             if not p.low <= value <= p.high and plain.proportional:
@@ -149,40 +171,27 @@ def _sized(
 
 
 def _hypothesis(
-    model: Model,
-    name: str,
-    law: str,
-    joints: tuple[int, ...],
-    trials: tuple[dict[str, float], ...],
-    proportional: bool,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    place: _Place,
+    trials: Sequence[dict[str, float]],
+    *,
+    proportional: bool = False,
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> Hypothesis | None:
     """The model with the effect; where it has the effect already, with a prior, the prior is lifted."""
-    present = [u for u in model.effects if u.name == law and (not joints or set(joints) & set(u.joints))]
-    if present:
-        if law in TONES or law == "stribeck_friction":
+    wider = place.model
+    if any(place.has_law(use.name, use.joints) for use in wider.effects):
+        if place.law in TONES or place.law == "stribeck_friction":
             return None
-        wider = model
-        free = tuple(p for p in model.parameters if p.effect == law and (not joints or set(joints) & set(p.joints)))
-        free = tuple(p for p in free if p.null is not None)
+        free = tuple(p for p in wider.parameters if place.has_law(p.effect, p.joints) and p.null is not None)
     else:
-        if not _has_place(model, law, joints):
+        if not place.has_room:
             return None
-        wider = model.with_effect(law, joints)
-        free = tuple(p for p in wider.parameters if p.name not in model.by_name)
-    if law == "potentiometer_nonlinearity":
+        wider = wider.with_effect(place.law, place.joints)
+        free = tuple(p for p in wider.parameters if p.name not in place.model.by_name)
+    if place.law == "potentiometer_nonlinearity":
         free = tuple(p for p in free if p.part in FREED_BENDS)
     full = tuple(_full(free, trial) for trial in trials)
-    return Hypothesis(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
-
-
-def _has_place(model: Model, law: str, joints: tuple[int, ...]) -> bool:
-    """Whether the model can have the effect there: a user's own effect acts only on the joints of its file, and a model
-    has limited room for such effects."""
-    kind = effect(law)
-    own = {use.name for use in model.effects if use.file is not None} | ({law} if kind.file is not None else set())
-    taken = sum(len(effect(name).parameters) for name in own)
-    return taken <= at.USER_COLUMNS and (not kind.joints or set(joints) <= set(kind.joints))
+    return Hypothesis(place.name, place.joints, wider, free, full, proportional, _full_bounds(free, bounds))
 
 
 def _full(free: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Probes: what every hypothesis could take off the residual once the tolerance parameters have moved too.
+"""Probes: how much of the residual every hypothesis could remove, with the tolerance parameters free to follow.
 
 A hypothesis is simulated at a few sizes, not differentiated where the effect is absent: backlash, a dead zone or a
 limit has no useful derivative there. The difference it makes is compared with the residual, after what the tolerance
@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.candidates.library import SMALL, Hypothesis
 from model.discrepancy.output_error.observation import side_by_side, step_of_derivatives
 from model.discrepancy.output_error.search import Point
-
-Floats = NDArray[np.float64]
 
 LARGEST_STRETCH = 2.0
 """Largest factor by which a trial is scaled: beyond it, the response is no longer proportional."""
@@ -83,7 +82,7 @@ def probe(point: Point, tried: Sequence[Hypothesis]) -> list[Probe]:
     """Every hypothesis at its best trial, the most promising first; those without a response are left out."""
     clear = projection(point)
     step = step_of_derivatives(point.model)
-    coarse = point.observation.shown(point.model, point.unknowns, point.values, step)
+    coarse = point.observation.shown(point, step)
     fine = [r.measured - e for r, e in zip(point.observation.records, point.residuals, strict=True)]
 
     def best(hypothesis: Hypothesis) -> Probe | None:
@@ -162,18 +161,18 @@ def _simulated(
     They are simulated with the step of derivatives, because derivatives are projected out of them.
     """
     observation = point.observation
-    vector, initials = observation.state(hypothesis.model, point.unknowns, point.values)
-    vectors = np.tile(vector, (len(trials), 1))
-    for row, trial in zip(vectors, trials, strict=True):
+    model = hypothesis.model
+    states = [observation.state(point.of(model)) for _ in trials]
+    for (vector, _), trial in zip(states, trials, strict=True):
         for name, value in trial.items():
-            row[list(hypothesis.model.parameter(name).slots)] = value
-    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(hypothesis.model, vectors, starts, step_of_derivatives(hypothesis.model))
+            vector[list(model.parameter(name).slots)] = value
+    shown = observation.readings(model, states, step_of_derivatives(model))
     return observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
 
 
 def _from_here(point: Point, hypothesis: Hypothesis, trial: dict[str, float]) -> dict[str, float]:
-    """The trial; that of a parameter which the point has found already, with a prior, is as far from its value now."""
+    """The trial; where the point has already fitted a parameter under its prior, the trial is as far from that
+    value."""
     if not hypothesis.proportional:
         return trial
     held = {u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True)}

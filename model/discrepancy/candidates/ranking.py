@@ -1,4 +1,4 @@
-"""Every hypothesis probed, the promising ones fitted, all ranked by evidence."""
+"""Probes every hypothesis, fits the promising ones, and ranks all by evidence."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ALWAYS_FITTED, HOPELESS = 4, 0.2
 PROMISING = 0.6
 """Least gain of a probe that is fitted, as a share of the fall of the cost that would make its effect significant."""
 WORTH_POLISHING = 0.5
-"""Least evidence of a fit that is polished, as a share of the best: one with less stays behind either way."""
+"""Least evidence of a fit that is polished, as a share of the best: a fit with less cannot catch up."""
 REMEMBERED = 0.3
 """A hypothesis is probed again where its earlier response promises this share of an interesting gain."""
 
@@ -111,7 +111,7 @@ def _is_hopeful(current: Fit, probed: Probe, thresholds: Thresholds) -> bool:
 def _fit_all(
     current: Fit, chosen: Sequence[Probe], close: float, progress: Progress, cancel: Cancel
 ) -> list[CandidateFit]:
-    """Fits of the probed candidates, the most promising first, until there is no hope left."""
+    """Fits of the probed candidates, the most promising first, until those left are hopeless."""
     observation = current.point.observation
     fits: list[CandidateFit] = []
     for begin in range(0, len(chosen), AT_ONCE):
@@ -153,7 +153,7 @@ def _most_promising(fits: Sequence[CandidateFit], besides: Sequence[CandidateFit
 
 
 def _polish_best(current: Fit, answers: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """The answers, polished where that could make them the best."""
+    """The answers; those that polishing could make the best are polished."""
     least = WORTH_POLISHING * max((r.evidence for r in answers), default=0.0)
 
     def work(found: CandidateFit) -> CandidateFit:
@@ -163,8 +163,8 @@ def _polish_best(current: Fit, answers: Sequence[CandidateFit]) -> list[Candidat
 
 
 def _restart_unexplained(current: Fit, head: Sequence[CandidateFit], close: float) -> list[CandidateFit]:
-    """The best fits, those restarted that have not explained the record with likely numbers: all of them where none has
-    explained it, else those close to the best. Fits of several joints have been restarted already."""
+    """The best fits; those that have not explained the record with likely values are restarted: all of them if none has
+    explained it, otherwise those close to the best. Fits of several joints have been restarted already."""
     best = max(head, key=lambda r: r.evidence, default=None)
     least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - close
     goal = math.inf if best is None else best.fit.point.cost + close
@@ -177,7 +177,7 @@ def _restart_unexplained(current: Fit, head: Sequence[CandidateFit], close: floa
 
 
 def _finish_close(current: Fit, head: Sequence[CandidateFit], thresholds: Thresholds) -> list[CandidateFit]:
-    """The best fits, those of them that are close taken to their ends; a clear lead needs none of that."""
+    """The best fits; those close to the best are run to convergence, unless the lead is clear."""
     best = max((r.evidence for r in head), default=0.0)
     close = [r for r in head if r.evidence > best - thresholds.close]
     if best < thresholds.significant or len(close) < 2:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 
+from model.arrays import Floats
 from model.discrepancy.candidates.library import TONES, Hypothesis, tone
 from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
@@ -22,10 +23,8 @@ from model.fitting.records import Record, resolution
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
-Floats = NDArray[np.float64]
-
 RESPONSE = 1.5
-"""Length of the impulse response, s: a simulation that is given most of the record returns slowly."""
+"""Length of the impulse response, s: a simulation that is given most of the record decays slowly."""
 SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
 """The parameter of each effect that a spectrum finds."""
 TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}
@@ -122,20 +121,19 @@ def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
         raise ValueError(f"joint {joint} has every kind of tone already")
     for name in absent:
         model = model.with_effect(name, (joint,))
-    vector, initials = observation.state(model, point.unknowns, point.values)
-    vectors, sizes, waves = [vector], [], []
+    begun = point.of(model)
+    states, sizes, waves = [observation.state(begun)], [], []
     for name in absent:
         for value in TRIAL_RATES[name]:
-            row = vector.copy()
-            row[list(model.parameter(f"joint{joint}.{name}.{SHAPES[name]}").slots)] = value
+            state = observation.state(begun)
+            state[0][list(model.parameter(f"joint{joint}.{name}.{SHAPES[name]}").slots)] = value
             sine = model.parameter(f"joint{joint}.{name}.sine")
             size = DIFFERENCE * (sine.deviation or 1.0)
-            row[list(sine.slots)] += size
-            vectors.append(row)
+            state[0][list(sine.slots)] += size
+            states.append(state)
             sizes.append(size)
             waves.append(np.sin(_phase(point, name, column, np.array([value]), record)[0]))
-    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(model, np.array(vectors), starts)[record][..., column]
+    shown = observation.readings(model, states)[record][..., column]
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
     count = _samples(observation.records[record])
     rows = [_lagged(wave, count) for wave in waves]

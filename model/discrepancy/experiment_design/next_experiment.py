@@ -14,23 +14,22 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
 from model.discrepancy.experiment_design.signals import Imagined, Planner, Prediction, imagine
 from model.discrepancy.grounds import Note
-from model.discrepancy.localisation.phases import PHASES, phases_of
+from model.discrepancy.localisation.phases import PHASES, AskedMotion
 from model.discrepancy.output_error.candidate_fit import CandidateFit, judge, same_answer
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge
 from model.effects.names import effect_on
 
-Floats = NDArray[np.float64]
 Pair = tuple[int, int]
 
 LEAST = 3.0
@@ -39,11 +38,11 @@ name."""
 SURE = 20.0
 """Margin of evidence below which an experiment is asked for although one effect was named."""
 MOST_RIVALS = 4
-"""Rivals that an experiment is chosen for: each one costs its simulations on every experiment."""
+"""Most rivals among which an experiment is to decide: each of them is simulated on every experiment."""
 SETTLING = 5
-"""Steps of each search that takes a rival's fit to its end."""
+"""Steps of each search that runs a rival's fit to convergence."""
 ENOUGH = 10.0
-"""Separation beyond which more is of no use, in deviations: a shorter experiment is better."""
+"""Separation beyond which a shorter experiment is better than more separation, in deviations."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +99,8 @@ def rivals_of(ranking: Ranking, decision: Decision) -> tuple[CandidateFit, ...]:
 
 
 def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """Rivals with their fits taken to the end, from derivatives computed there: a difference that a fit would still
-    take away separates nothing. A rival on the verge of instability has no derivatives and is left out."""
+    """Rivals with their fits run to convergence and new derivatives: a difference that a fit would still remove
+    separates nothing. A rival on the verge of instability has no derivatives and is left out."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
         point = converge(rival.fit.point, SETTLING)
@@ -179,7 +178,7 @@ def _unhidden(
 
     Raises SpecError when the simulation does not stay finite.
     """
-    information, begun = predicted.known_so_far(), predicted.values
+    information, begun = predicted.known_so_far(), predicted.begun.values
     derivatives = predicted.tangents(known)
     delta = target - predicted.shown()
     moved = begun + np.linalg.solve(information + derivatives @ derivatives.T, derivatives @ delta)
@@ -213,7 +212,8 @@ def _information(
 
 
 def _worth(separation: float, duration: float) -> tuple[bool, float]:
-    """Experiments that tell come first; of them the one with the most separation, up to enough, a second."""
+    """The rank of an experiment: those that separate come first, then the most separation (up to `ENOUGH`) per
+    second."""
     return separation >= LEAST, min(separation, ENOUGH) ** 2 / duration
 
 
@@ -247,14 +247,15 @@ def _hopeless(
 
 def _differs_at(rival: CandidateFit, observation: Observation, left: Floats) -> DifferencePlace:
     """Joint and phase that hold most of the squared difference (N,) that a rival's parameters could not hide."""
-    model, joints = rival.fit.point.model, rival.hypothesis.joints
+    machine, joints = observation.machine, rival.hypothesis.joints
     record = observation.records[0]
-    phases = np.concatenate([phases_of(model, record)[run] for run in record.runs])
+    every = AskedMotion(machine, record).phases
+    phases = np.concatenate([every[run] for run in record.runs])
     energy = left.reshape(phases.shape) ** 2
     total = max(float(energy.sum()), 1e-300)
     sums = {
         (joint, phase): float(energy[phases[:, column] == number, column].sum())
-        for column, joint in enumerate(model.machine.modelled_joints)
+        for column, joint in enumerate(machine.modelled_joints)
         for number, phase in enumerate(PHASES)
     }
     (joint, phase), most = max(sums.items(), key=lambda item: item[1])

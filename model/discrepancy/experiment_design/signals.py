@@ -1,4 +1,4 @@
-"""What candidates would show on an experiment that has not been made, and what could hide the difference.
+"""Predicts what candidates would show on an experiment that has not been made, and what could hide the difference.
 
 The tolerance parameters are known as well as the traces and their priors say; on the new experiment they may move as
 far as that allows, and its initial posture is unknown anew.
@@ -11,17 +11,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import ExperimentSpec
+from model.arrays import Floats
 from model.design.information import imagined_trace
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
-Floats = NDArray[np.float64]
 Planner = Callable[[ExperimentSpec], Floats]
 """Plans an experiment: set points (k, joints of the machine) in rad, one row a control period. It raises a DaqError
 (one line) for an experiment that may not be carried out. Given by the caller: planning belongs to `daq`."""
@@ -34,7 +34,7 @@ LOOSE = 1e-9
 
 @dataclass(frozen=True)
 class Imagined:
-    """An experiment as a diagnosis would see it.
+    """An imagined experiment, prepared as a diagnosis prepares a trace.
 
     starts: the unknowns of its initial posture, known within a reading or so. noise: of the readings, counts.
     """
@@ -53,13 +53,13 @@ class Imagined:
 def imagine(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | None:
     """The experiment on the grid of control periods; None where the planner refuses it, or nothing would move."""
     try:
-        observation, _, unknowns = observe(model, [imagined_trace(model, spec, plan)])
+        observation, given = observe(model, [imagined_trace(model, spec, plan)])
     except DaqError:
         return None
     counts = observation.deviations / observation.unit
     drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.prepared[0].noise.shape)
-    own = observation.with_drive_as_input(False)  # nothing has been recorded yet
-    return Imagined(own, tuple(u for u in unknowns if u.trace is not None), (drawn * counts,))
+    observation = observation.with_drive_as_input(False)  # nothing has been recorded yet
+    return Imagined(observation, tuple(u for u in given.unknowns if u.trace is not None), (drawn * counts,))
 
 
 @dataclass(frozen=True)
@@ -70,38 +70,35 @@ class Prediction:
     point: Point
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """The point's unknowns that belong to no trace, because they keep their values on the next one; then the
-        starts."""
-        return (*(u for u in self.point.unknowns if u.trace is None), *self.there.starts)
-
-    @cached_property
-    def values(self) -> Floats:
-        """(p,) of the unknowns."""
-        kept = np.array([u.trace is None for u in self.point.unknowns])
-        return np.concatenate([self.point.values[kept], np.array([u.start for u in self.there.starts])])
+    def begun(self) -> Calibration:
+        """The point with those of its unknowns that belong to no trace, because they keep their values on the next one,
+        and with the starts."""
+        shared = self.point.only([k for k, u in enumerate(self.point.unknowns) if u.trace is None])
+        starts = self.there.starts
+        values = np.concatenate([shared.values, np.array([u.start for u in starts])])
+        return Calibration(shared.model, (*shared.unknowns, *starts), values)
 
     def named(self, derivatives: Floats) -> dict[str, Floats]:
         """Rows of derivatives by the unknowns' names."""
-        return dict(zip((u.name for u in self.unknowns), derivatives, strict=True))
+        return dict(zip((u.name for u in self.begun.unknowns), derivatives, strict=True))
 
     def bounded(self, values: Floats) -> Floats:
         """The values within their unknowns' bounds."""
-        return np.clip(values, [u.low for u in self.unknowns], [u.high for u in self.unknowns])
+        unknowns = self.begun.unknowns
+        return np.clip(values, [u.low for u in unknowns], [u.high for u in unknowns])
 
     def recorded(self) -> Prediction:
         """The same on the record that an arm like the point's model would leave. Not finite where its simulation is
         not."""
-        own = self.there.observation.imagined(self.point.model, self.unknowns, self.values, self.there.noise)
+        own = self.there.observation.imagined(self.begun, self.there.noise)
         observation = own.with_drive_as_input(self.point.observation.drive_is_input)
         return replace(self, there=replace(self.there, observation=observation))
 
     def shown(self, values: Floats | None = None) -> Floats:
         """The simulation that is given the record, (N,) in deviations of a reading; at other values (p,) than the
         point's, if given. Not finite where the simulation is not."""
-        own = self.values if values is None else values
-        readings = self.there.observation.shown(self.point.model, self.unknowns, own)
-        return self.there.observation.weighted(readings)
+        own = self.begun if values is None else self.begun.at(values)
+        return self.there.observation.weighted(self.there.observation.shown(own))
 
     def tangents(self, known: Mapping[str, Floats], values: Floats | None = None) -> Floats:
         """Derivatives (p, N) of that by the unknowns, at other values than the point's, if given. known: rows that are
@@ -109,13 +106,13 @@ class Prediction:
 
         Raises SpecError when the simulation does not stay finite.
         """
-        rows = dict(known)
-        missing = [k for k, u in enumerate(self.unknowns) if u.name not in rows]
+        rows, unknowns = dict(known), self.begun.unknowns
+        missing = [k for k, u in enumerate(unknowns) if u.name not in rows]
         if missing:
-            own = self.values if values is None else values
-            new = self.there.observation.tangents(self.point.model, self.unknowns, own, missing)
-            rows |= {self.unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
-        return np.stack([rows[u.name] for u in self.unknowns])
+            own = self.begun if values is None else self.begun.at(values)
+            new = self.there.observation.tangents(own, missing)
+            rows |= {unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
+        return np.stack([rows[u.name] for u in unknowns])
 
     def known_so_far(self) -> Floats:
         """Information (p, p) about the shared unknowns from traces and priors, those of single traces marginalised;

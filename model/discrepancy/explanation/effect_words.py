@@ -12,7 +12,7 @@ from model.effects.library import effect as effect_of
 
 @dataclass(frozen=True)
 class EffectWords:
-    """What an effect is called, and the last name of the parameter that is its size, if there is one."""
+    """What an effect is called, and which part of it is its size, if one is."""
 
     called: str
     size: str | None
@@ -92,16 +92,9 @@ def words_of(effect: str) -> EffectWords:
 
 def size_of(effect: str, parameters: Mapping[str, FoundValue], joint: int = 0) -> FoundValue | None:
     """The parameter that is the size of an effect: that of a joint, where several have one."""
-    size = words_of(effect).size
-    sizes = {n: v for n, v in parameters.items() if n.rpartition(".")[2] == size}
-    own = [v for n, v in sizes.items() if of_joint(n, joint)] or list(sizes.values())
+    sizes = [v for v in parameters.values() if v.part == words_of(effect).size]
+    own = [v for v in sizes if joint in v.joints] or sizes
     return own[0] if own else None
-
-
-def of_joint(name: str, joint: int) -> bool:
-    """Whether a parameter belongs to a joint, alone or with others."""
-    first = name.partition(".")[0]
-    return first == f"joint{joint}" or (first.startswith("joints") and str(joint) in first[6:].split("+"))
 
 
 def shape_in_torques(effect: str, *, slides: bool) -> str:

@@ -9,7 +9,7 @@ from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Note
 
 FAR = 4.0
-"""Stated deviations of a number, beyond which its estimate is a warning."""
+"""Distance of an estimate from the stated value, in stated deviations, beyond which there is a warning."""
 
 
 class _Expected(Protocol):

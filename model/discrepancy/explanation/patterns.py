@@ -9,28 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats, Mask
 from model.discrepancy.explanation.samples import Samples
 from model.discrepancy.grounds import Pattern, PatternKind
 from model.discrepancy.localisation.phases import CREEPING_SPEED, TURNING
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 NEAR_CHANGE = 0.1
-"""s around a change of speed that count as the change."""
+"""Time around a change of speed that counts as the change, s."""
 SLICE = 0.1
-"""s over which a lag after a change of direction is averaged."""
+"""Time over which a lag after a change of direction is averaged, s."""
 STARTING = 0.3
-"""s after motion begins that count as its start."""
+"""Time after motion begins that counts as its start, s."""
 FULL = 0.6
 """Share of the largest drive from which the drive counts as high."""
 LOW = 0.15
 """Share of the largest drive below which the drive counts as low."""
 
 FindPattern = Callable[[Samples, Mapping[str, float]], Pattern | None]
-"""Finds a pattern in samples, given the effect's parameters by last name; None where the record cannot show it."""
+"""Finds a pattern in samples, given the effect's parameters by part; None where the record cannot show it."""
 
 
 def lags_alike(s: Samples, _: Mapping[str, float]) -> Pattern | None:
@@ -217,7 +214,7 @@ def lags_under_drive(s: Samples, _: Mapping[str, float]) -> Pattern | None:
 
 
 def drives_otherwise(s: Samples, _: Mapping[str, float]) -> Pattern | None:
-    """Another drive for the same error than the controller's gain gives."""
+    """The drive for an error differs from what the controller's gain gives."""
     if not np.any(s.drive):
         return None
     ratio = _coefficient(s.drive, s.error) / _coefficient(s.expected_drive, s.expected_error)
@@ -242,7 +239,7 @@ def stays_off(s: Samples, _: Mapping[str, float]) -> Pattern | None:
 
 
 def is_off(s: Samples) -> Pattern:
-    """Off by so much, with no pattern that the record could show."""
+    """Off, without a pattern that the record could show."""
     return _pattern("is_off", 0.0, rms=_rms(s.without))
 
 
@@ -276,7 +273,7 @@ PATTERNS: dict[str, tuple[FindPattern, ...]] = {
     "wrong_gain": (drives_otherwise, lags_with_speed),
     "lost_set_points": (jolts, late_at_changes),
 }
-"""What speaks for each effect of the shared list, in the order in which an engineer would look for it."""
+"""The patterns of each effect of the shared list, in the order in which an engineer would look for them."""
 GENERAL: tuple[FindPattern, ...] = (
     lags_alike,
     lags_with_speed,
@@ -343,7 +340,7 @@ def _share(s: Samples, *shapes: Floats) -> float:
 
 
 def _energy(s: Samples, where: Mask) -> float:
-    """Share of the residual's mean square that lies there, beyond what the time there would hold."""
+    """Share of the residual's mean square that lies in these samples, less their share of the time."""
     held = float(np.sum(s.without[where] ** 2)) / max(float(np.sum(s.without**2)), 1e-300)
     return max(0.0, held - float(where.mean()))
 

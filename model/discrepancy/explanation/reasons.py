@@ -1,15 +1,15 @@
-"""What a record shows of an effect, as data: the clearest pattern without it, and what it takes off."""
+"""What a record shows of an effect, as data: the clearest pattern without it, and how far the error falls with it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Candidate, FoundValue
-from model.discrepancy.explanation.effect_words import of_joint
 from model.discrepancy.explanation.patterns import GENERAL, PATTERNS, is_off
 from model.discrepancy.explanation.samples import Left, Motions, Samples, motions
 from model.discrepancy.grounds import ErrorFall, NamedEffect, Pattern, Reason
@@ -20,7 +20,7 @@ from model.fitting.records import Record, Signal, resolution
 from model.machine_model.model import Model
 
 CLEAR = 0.1
-"""Share of a residual from which a pattern is taken before those that come after it in an effect's list."""
+"""Share of a residual from which a pattern is preferred to those after it in an effect's list."""
 LEAST_COUNTS = 0.1
 """Counts of a joint's sensor; a smaller deviation is not written as a number."""
 
@@ -37,7 +37,7 @@ def reason(
     rival: Candidate | None = None,
     left: Left | None = None,
 ) -> Reason:
-    """What speaks for an effect: the pattern that a record shows without it, and what it takes off.
+    """What speaks for an effect: the pattern that a record shows without it, and how far the error falls with it.
 
     The pattern is that of measured − simulated where the simulation has everything but the effect: the numbers of the
     fitted model, with the effect taken out again. So neither the other parameters nor the effect hide it.
@@ -53,16 +53,15 @@ def reason(
     Raises SpecError when a simulation does not stay finite.
     """
     found = motions(model, without_effect(model, before, effect, joints, parameters), records, signal, left)
-    modelled = model.machine.modelled_joints
+    machine, modelled = model.machine, model.machine.modelled_joints
     own = list(joints) or [modelled[_most_affected(found)]]
     joint = max(own, key=lambda j: _gone(found.joint(modelled.index(j))))
-    index = modelled.index(joint)
-    samples = found.joint(index)
+    samples = found.joint(modelled.index(joint))
     return Reason(
         joint=joint,
         pattern=clearest_pattern(effect, samples, parameters, joint),
-        units=_units(model, index),
-        rms=_fall(model, samples, joint),
+        units=_units(machine, joint),
+        rms=_fall(samples, *spoken_unit(machine, joint)),
         rival=None if rival is None else NamedEffect(effect=rival.effect, joints=rival.joints, evidence=rival.evidence),
     )
 
@@ -70,8 +69,8 @@ def reason(
 def clearest_pattern(
     effect: str, samples: Samples, parameters: Mapping[str, FoundValue], joint: int | None = None
 ) -> Pattern:
-    """The first of an effect's patterns that is clear in a record, else the clearest."""
-    values = by_last_name(parameters, joint)
+    """The first of an effect's patterns that is clear in a record; if none is, the clearest."""
+    values = by_part(parameters.values(), joint)
     found = [p for find in PATTERNS.get(effect, GENERAL) if (p := find(samples, values)) is not None]
     if not found:
         return is_off(samples)
@@ -93,10 +92,10 @@ def without_effect(
         return result
 
 
-def by_last_name(parameters: Mapping[str, FoundValue], joint: int | None) -> dict[str, float]:
-    """Values by the last part of their names; those of one joint where several have them."""
-    own = {n: v for n, v in parameters.items() if joint is None or of_joint(n, joint)}
-    return {n.rpartition(".")[2]: v.value for n, v in (own or parameters).items()}
+def by_part(found: Collection[FoundValue], joint: int | None) -> dict[str, float]:
+    """Values by the part of the effect that they are; those of one joint where several have them."""
+    own = [v for v in found if joint is None or joint in v.joints]
+    return {v.part: v.value for v in own or found}
 
 
 def _gone(samples: Samples) -> float:
@@ -110,21 +109,20 @@ def _most_affected(found: Motions) -> int:
     return max(range(count), key=lambda j: _gone(found.joint(j)))
 
 
-def _fall(model: Model, samples: Samples, joint: int) -> ErrorFall:
-    factor, unit = spoken_unit(model, joint)
+def _fall(samples: Samples, factor: float, unit: str) -> ErrorFall:
     before, after = (factor * float(np.sqrt(np.mean(r**2))) for r in (samples.without, samples.left))
     return ErrorFall(before=before, after=after, unit=unit)
 
 
-def _units(model: Model, index: int) -> ReadingUnits:
-    joint = model.machine.joint(model.machine.modelled_joints[index])
+def _units(machine: Machine, number: int) -> ReadingUnits:
+    joint = machine.joint(number)
     turns, velocity = joint.kind == "revolute", joint.sensor is not None and joint.sensor.measures == "velocity"
     place = "°" if turns else "mm"
     return ReadingUnits(
         factor=math.degrees(1.0) if turns else 1e3,
         unit=f"{place}/s" if velocity else place,
         place_unit=place,
-        drive_unit=drive_units(model)[index],
+        drive_unit=drive_units(machine)[machine.modelled_joints.index(number)],
         torque_unit="N·m" if turns else "N",
         least=0.0 if joint.sensor is None or velocity else LEAST_COUNTS * resolution(joint.sensor),
         turns=turns,

@@ -1,4 +1,5 @@
-"""Makes the sentences of an answer from its data: the last step of a diagnosis, and the only place that words it.
+"""Makes the sentences of an answer from its data. This is the last step of a diagnosis, and the only one that writes
+prose.
 
 Whoever wants to know something of an answer reads its data; sentences are for people and are not read back.
 """
@@ -175,10 +176,10 @@ def best_tried(candidates: Sequence[Candidate], needed: float) -> str:
     count = "The only candidate" if len(candidates) == 1 else f"The best of {len(candidates)} candidates"
     if not fitted:
         return (
-            f"None of the candidates promised enough to be fitted. {count}, {name}, promises an evidence of "
+            f"None of the candidates promised enough to be fitted. {count}, {name}, promises evidence of "
             f"{best.evidence:.0f}; an effect is named from {needed:g}."
         )
-    told = f"{count}, {name}, has an evidence of {best.evidence:.0f}"
+    told = f"{count}, {name}, has evidence of {best.evidence:.0f}"
     if best.evidence >= needed:
         return f"{told}. It is above the {needed:g} from which an effect is named, but takes off no more than noise."
     return f"{told}; an effect is named from {needed:g}."
@@ -188,10 +189,10 @@ def _nothing(rejected: Step | None) -> str:
     """Why no effect is named. `rejected`: a step that was refused on records not fitted to."""
     if rejected is None or rejected.effect is None:
         return "Nothing significant: the model explains the traces within noise and stated tolerances."
-    because = rejected.rejected_because or "records not fitted to do not confirm it"
+    because = rejected.rejected_because or "records that were not fitted to do not confirm it"
     return (
-        f"Nothing that records not fitted to confirm: {_called(rejected.effect, rejected.joints)} explains more of the "
-        f"fitted ones, with an evidence of {rejected.evidence:.0f}, but {because}."
+        f"No effect holds on records that were not fitted to: {_called(rejected.effect, rejected.joints)} explains "
+        f"more of the fitted ones, with evidence of {rejected.evidence:.0f}, but {because}."
     )
 
 
@@ -201,7 +202,7 @@ def _undecided(group: Sequence[Candidate], where: Where) -> str:
         raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
     named = ", ".join(f"{_called(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
     apart = max(c.evidence for c in group) - min(c.evidence for c in group)
-    return f"{where.summary} These explain it, with evidences that differ by no more than {apart:.0f}: {named}."
+    return f"{where.summary} These explain it, with evidence that differs by no more than {apart:.0f}: {named}."
 
 
 def _unknown(answer: Diagnosis) -> str:
@@ -264,19 +265,18 @@ def _torque_reason(step: Step, reason: Reason) -> str:
     place = f"{joints_in_words(step.joints)}: " if step.joints else ""
     seen = shape_in_torques(step.effect or "", slides=reason.slides)
     several = len(step.joints) > 1
-    sizes = ", ".join(_torque_size(n, v, several=several, slides=reason.slides) for n, v in step.parameters.items())
+    sizes = ", ".join(_torque_size(v, several=several, slides=reason.slides) for v in step.parameters.values())
     if reason.removed is None:
         return f"{place}{seen} ({sizes})"
     return f"{place}{seen} ({sizes}); it takes {reason.removed:.0%} off the mean square on records not fitted to"
 
 
-def _torque_size(name: str, value: FoundValue, *, several: bool, slides: bool) -> str:
-    group, last = name.partition(".")[0], name.rpartition(".")[2]
-    on = f" of {group}" if several and "joint" in group else ""
+def _torque_size(value: FoundValue, *, several: bool, slides: bool) -> str:
+    on = f" of {joints_in_words(value.joints)}" if several and value.joints else ""
     unit = "" if value.unit == "1" else f" {value.unit}"
-    if last == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
+    if value.part == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
         unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
-    return f"{last}{on} {plain(value.value, 3)}{unit}"
+    return f"{value.part}{on} {plain(value.value, 3)}{unit}"
 
 
 def _taken_off(reason: Reason) -> str:
@@ -296,10 +296,10 @@ def _beaten(rival: NamedEffect, step: Step) -> str:
     name = _called(rival.effect, rival.joints)
     if rival.evidence > step.evidence:  # it was ranked first, but came to less when its fit was taken to its end
         return (
-            f"its completed fit has an evidence of {step.evidence:.0f}, less than the {rival.evidence:.0f} of {name}: "
+            f"its completed fit has evidence of {step.evidence:.0f}, less than the {rival.evidence:.0f} of {name}: "
             "these traces do not tell which of the two it is"
         )
-    return f"the next best, {name}, has an evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
+    return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
 
 
 def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:

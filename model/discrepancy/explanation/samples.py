@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import NoController
-from model.discrepancy.localisation.phases import HOLD, asked_motion, asked_speed, directions, phases_of
+from model.arrays import Floats, Mask
+from model.discrepancy.localisation.phases import HOLD, AskedMotion
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import gravity_loads
 from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, at_rows, simulate
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -85,21 +83,20 @@ def _of_record(model: Model, without: Model, record: Record, signal: Signal) -> 
     loop: Literal["open", "closed"] = "open" if isinstance(model.machine.controller, NoController) else "closed"
     options = Options(loop=loop, quantise=False)
     plain, full = simulate(without, inputs, options), simulate(model, inputs, options)
-    asked = asked_motion(model, record)
-    speed = asked_speed(asked, inputs.period)
-    direction = directions(model, record).astype(np.float64)
+    asked = AskedMotion(model.machine, record)
+    direction = asked.direction.astype(np.float64)
     rows = np.round(inputs.rows).astype(np.int64)
     return {
         "without": record.measured - _seen(plain, signal),
         "left": record.measured - _seen(full, signal),
-        "time": np.repeat((inputs.rows * inputs.period)[:, None], asked.shape[1], axis=1),
-        "asked": asked,
-        "speed": speed,
-        "acceleration": np.gradient(speed, inputs.period, axis=0),
+        "time": np.repeat((inputs.rows * inputs.period)[:, None], asked.position.shape[1], axis=1),
+        "asked": asked.position,
+        "speed": asked.speed,
+        "acceleration": np.gradient(asked.speed, inputs.period, axis=0),
         "direction": direction,
         "since_turn": _since_turn(direction, inputs.period),
-        "moving": phases_of(model, record) != HOLD,
-        "gravity": gravity_loads(model, asked),
+        "moving": asked.phases != HOLD,
+        "gravity": gravity_loads(model, asked.position),
         "drive": inputs.drive[rows],
         "error": inputs.set_points[rows] - record.measured,
         "expected_drive": at_rows(plain.drive, inputs.rows),

@@ -1,4 +1,4 @@
-"""Which effects may explain residual torques, on which joints, and where to begin looking for their parameters."""
+"""Which effects may explain residual torques, on which joints, and from which values their parameters are searched."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import DcMotor, NoController
 from model import layout as at
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import Case
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
@@ -19,11 +19,10 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-Floats = NDArray[np.float64]
 Start = dict[str, float]
 
 UNSEEN = "damping"
-"""Part of an effect that torques do not show: a transmission's damping acts while it vibrates, above every cutoff."""
+"""Part of an effect that torques do not show: a transmission's damping acts in its vibration, above every cutoff."""
 MOTOR_EFFECTS = ("back_emf_error", "resistance_drift", "motor_inductance")
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
 ROTOR_EFFECTS = ("backlash", "joint_compliance")
@@ -36,13 +35,14 @@ DRIVE_QUANTILES = (0.2, 0.5, 0.8)
 LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
 """Limits of the drive that are tried, as shares of its largest value."""
 UNLIMITED = 0.7
-"""Share of the record in which a limit of the drive must not be reached."""
+"""Least share of the record in which the drive stays below a limit that is tried."""
 DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 """Delays, and time constants of windings, that are tried, s."""
 WARMING_TIMES = (10.0, 40.0, 200.0)
 """Thermal time constants that are tried, s."""
 WINDING_SHARES = (0.01, 0.1)
-"""Share of a joint's torque that moving the rotor apart from its link may take."""
+"""Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
+are tried."""
 PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
 LONGEST_SCAN = 400
@@ -181,10 +181,10 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
 
 
 def _narrowed(p: Parameter, place: _Place) -> Parameter:
-    """The parameter with bounds that the record allows.
+    """The parameter, with bounds narrowed to what the record allows.
 
-    A limit of the drive must leave most of the record below it: a drive that hardly ever acts explains any motion, by
-    bodies without mass. Friction must not change within the speeds at which its direction is not resolved.
+    A limit of the drive must leave most of the record below it: a drive that hardly ever acts would explain any motion,
+    with bodies without mass. Friction must not change within the speeds at which its direction is not resolved.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
@@ -272,7 +272,7 @@ def _spring(place: _Place) -> Iterator[Start]:
 
 
 def _compliance(place: _Place) -> Iterator[Start]:
-    """Compliances with which moving the rotor apart from the link takes a share of the torque."""
+    """Compliances with which the motion of the rotor relative to the link takes a share of the torque."""
     joint = place.numbers
     gain = joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE]
     torques = [gain * r.drive[:, place.column] for r in place.records]
@@ -332,4 +332,4 @@ _SEARCHED: dict[str, Callable[[_Place], Iterator[Start]]] = {
     "joint_compliance": _compliance,
     "backlash": _play,
 }
-"""Effects whose starting values have to be looked for in the record."""
+"""Effects whose starting values depend on the record, and the functions that find them."""

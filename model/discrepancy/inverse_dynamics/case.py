@@ -13,10 +13,8 @@ from model.discrepancy.inverse_dynamics.likelihood import Stretches, stretches_o
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
-Floats = NDArray[np.float64]
-
 FLOOR_SHARE = 0.3
-"""Share of the estimated noise below which no residual is believed to be: the estimate itself is rough."""
+"""Least deviation of a residual, as a share of the estimated noise: the estimate itself is rough."""
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
@@ -31,14 +31,13 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_b
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 
-Floats = NDArray[np.float64]
-
 CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
 SHOWN = 12
 """Most candidates that a step lists."""
 ABOVE_NOISE = 1.2
-"""Least mean square on held-out records, in those of noise, of a joint that counts for the share removed."""
+"""Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
+removed."""
 
 
 def diagnose_torques(
@@ -165,7 +164,7 @@ class _Workflow:
         self.now = self._fit(self.model, chosen.fit.values)
 
     def _timing(self, found: Findings, chosen: Fitted) -> Fitted | None:
-        """A delay of less than a sample that explains what the chosen effect does.
+        """A delay of less than a sample that explains as much as the chosen effect.
 
         No record tells whether a recorded drive acted at its moment or until the next sample: such a delay is taken
         into the model, and is no effect.
@@ -181,11 +180,11 @@ class _Workflow:
 
     def _predicted(self, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
-        held, data = self.case.held_out, self.case.data
+        held = self.case.held_out
         if held:
             squares = [holdout.held_out_squares(f.balance.model, f.values, held) for f in (before, after)]
         else:
-            squares = [holdout.block_squares(f, data) for f in (before, after)]
+            squares = [holdout.block_squares(f) for f in (before, after)]
         return squares[0], squares[1]
 
     def _step(self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float) -> Step:
@@ -195,7 +194,7 @@ class _Workflow:
         rivals = [c for c in found.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
-        values = found_values(chosen.fit, chosen.parameters, case.data)
+        values = found_values(chosen.fit, chosen.parameters)
         squares = [holdout.mean_squares(case.stretches, f.residual) for f in (self.now, chosen.fit)]
         return Step(
             effect=chosen.effect,
@@ -242,9 +241,7 @@ class _Workflow:
 
     def _candidate(self, c: Fitted) -> Candidate:
         squares = holdout.mean_squares(self.case.stretches, c.fit.residual)
-        values = {
-            p.name: FoundValue(value=c.fit.values[p.name], low=None, high=None, unit=p.unit) for p in c.parameters
-        }
+        values = {p.name: FoundValue.of(p, c.fit.values[p.name]) for p in c.parameters}
         return Candidate(
             effect=c.effect,
             joints=c.joints,
@@ -262,7 +259,7 @@ class _Workflow:
             without = self.model.without_effect(step.effect, step.joints or None)
             kept = {n: v for n, v in self.now.values.items() if n in without.by_name}
             smaller = self._fit(without, kept)
-            if evidence(smaller, self.now, self.case.data, self.now.noise.memory, len(step.parameters), 1) < 0:
+            if evidence(smaller, self.now, self.now.noise.memory, len(step.parameters), 1) < 0:
                 self.model, self.now = without.with_values(smaller.values), smaller
                 self.added -= set(step.parameters)
                 gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
@@ -270,11 +267,12 @@ class _Workflow:
                 self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
 
     def _as_last_fitted(self) -> tuple[Step, ...]:
-        """The steps with the parameters of the last fit: those of their own were biased by what was still missing."""
+        """The steps with the parameters of the last fit: a step's own values are biased by effects that were found
+        after it."""
         steps = []
         for step in self.steps:
             own = [self.model.parameter(name) for name in step.parameters] if step.adopted else []
-            last = found_values(self.now, own, self.case.data)
+            last = found_values(self.now, own)
             if not own:
                 steps.append(step)
                 continue
@@ -282,7 +280,8 @@ class _Workflow:
         return tuple(steps)
 
     def _shares(self) -> Note:
-        """Residual as a share of the recorded torque, before and after: a figure that is usual in the literature."""
+        """Residual as a share of the recorded torque, before and after: the figure that the literature usually
+        gives."""
         held = self.case.held_out
         records = held or self.case.records
         before = holdout.relative_torque_error(self.begin.with_values(self.first), records)
@@ -298,7 +297,7 @@ class _Workflow:
         return signal_errors(self.model, before, after, self.case.noise)
 
     def answer(self, traces: list[str], held_out: list[str], cutoff: float) -> Diagnosis:
-        """The whole answer, but for the times it took."""
+        """The whole answer, except for the times that it took."""
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]

@@ -5,47 +5,45 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.diagnosis import FoundValue, SignalError
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.likelihood import LONGEST_MEMORY
 from model.fitting.covariance import sandwich
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-Floats = NDArray[np.float64]
-
 BOUNDED = 3.0
-"""Standard deviation of an estimate, in sizes of the parameter, above which the data do not bound it."""
+"""Standard deviation of an estimate, relative to the parameter's size, above which the data do not bound it."""
 NORMAL_95 = 1.959964
 """Half width of a 95 % interval of the normal distribution, in standard deviations."""
 
 
-def found_values(now: BalanceFit, parameters: Sequence[Parameter], data: Data) -> dict[str, FoundValue]:
+def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, FoundValue]:
     """Estimates of an effect's parameters with 95 % intervals that hold for correlated residuals."""
-    deviations = _deviations(now, data)
+    deviations = _deviations(now)
     result = {}
     for p in parameters:
         value, deviation = now.values[p.name], deviations.get(p.name)
         typical = max(abs(value), p.deviation or 0.0)
         if deviation is None or not np.isfinite(deviation) or deviation > BOUNDED * typical:
-            result[p.name] = FoundValue(value=value, low=None, high=None, unit=p.unit)
+            result[p.name] = FoundValue.of(p, value)
             continue
         low, high = value - NORMAL_95 * deviation, value + NORMAL_95 * deviation
-        result[p.name] = FoundValue(value=value, low=max(low, p.low), high=min(high, p.high), unit=p.unit)
+        result[p.name] = FoundValue.of(p, value, max(low, p.low), min(high, p.high))
     return result
 
 
-def _deviations(now: BalanceFit, data: Data) -> dict[str, float]:
+def _deviations(now: BalanceFit) -> dict[str, float]:
     """Standard deviations of the unknowns that change the residual at all, by name."""
     slopes = now.slopes()
     used = [u for u in now.unknowns if any(np.abs(s).max() > 0 for s in slopes[u.name])]
     scale = np.array([u.scale for u in used])
     scores, information = [], np.zeros((len(used), len(used)))
-    for j in range(len(data.floor)):
+    for j in range(len(now.data.floor)):
         size = now.noise.deviation[j]
-        for i, rows in data.stretches.by_joint[j]:
+        for i, rows in now.data.stretches.by_joint[j]:
             jacobian = np.stack([slopes[u.name][i][rows, j] for u in used], axis=1) * scale / size
             scores.append(jacobian * (now.residual[i][rows, j] / size)[:, None])
             information += jacobian.T @ jacobian

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.likelihood import (
     NoiseModel,
     Stretches,
@@ -18,7 +18,6 @@ from model.discrepancy.inverse_dynamics.likelihood import (
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
-Floats = NDArray[np.float64]
 Slopes = dict[str, list[Floats]]
 """Derivatives (m, n) of the residual of every record, by parameter."""
 
@@ -40,13 +39,14 @@ class Data:
 
 @dataclass(frozen=True)
 class BalanceFit:
-    """A structure of model with its unknowns at their best.
+    """A model whose unknowns have their best values.
 
-    residual: per record (m, n). by_joint: −2 log likelihood (n,); prior: −2 log prior.
+    data: what it was fitted to. residual: per record (m, n). by_joint: −2 log likelihood (n,); prior: −2 log prior.
     """
 
     balance: TorqueBalance
     unknowns: tuple[Unknown, ...]
+    data: Data
     values: dict[str, float]
     residual: list[Floats]
     noise: NoiseModel
@@ -63,7 +63,7 @@ class BalanceFit:
         return self.balance.slope(self.values, self.residual, unknown)
 
     def slopes(self) -> Slopes:
-        """Derivatives by every unknown, by name, to be used again."""
+        """Derivatives by every unknown, by name, for reuse in later fits."""
         return {u.name: self.slope(u) for u in self.unknowns}
 
 
@@ -94,7 +94,7 @@ def fit(
         values = first.values
     best = _evaluate(balance, unknowns, values, data, memory)
     for _ in range(rounds):
-        aim = gauss_newton(best, data, known)
+        aim = gauss_newton(best, known)
         for share in STEPS:
             tried = {u.name: _between(u, best.values[u.name], aim[u.name], share) for u in unknowns}
             found = _evaluate(balance, unknowns, tried, data, memory)
@@ -118,18 +118,18 @@ def _evaluate(
     residual = balance.residual(values)
     noise = NoiseModel(noise_model(data.stretches, residual, data.floor).deviation, memory)
     by_joint = minus_twice_log_likelihood(data.stretches, residual, noise.memory, data.floor)
-    return BalanceFit(balance, tuple(unknowns), values, residual, noise, by_joint, prior_cost(unknowns, values))
+    return BalanceFit(balance, tuple(unknowns), data, values, residual, noise, by_joint, prior_cost(unknowns, values))
 
 
-def gauss_newton(now: BalanceFit, data: Data, known: Slopes | None = None) -> dict[str, float]:
+def gauss_newton(now: BalanceFit, known: Slopes | None = None) -> dict[str, float]:
     """Values after one bounded Gauss-Newton step."""
     unknowns = now.unknowns
     if not unknowns:
         return {}
     ready = known or {}
     slopes = stacked({u.name: ready[u.name] if u.name in ready else now.slope(u) for u in unknowns}, now)
-    A = np.concatenate(now.noise.weighted(data.stretches, slopes))
-    b = np.concatenate(now.noise.weighted(data.stretches, now.residual))
+    A = np.concatenate(now.noise.weighted(now.data.stretches, slopes))
+    b = np.concatenate(now.noise.weighted(now.data.stretches, now.residual))
     scale = np.array([u.scale for u in unknowns])
     at = np.array([now.values[u.name] for u in unknowns])
     rows, aims = prior_rows(unknowns, at)

@@ -8,14 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, fit
 from model.discrepancy.inverse_dynamics.likelihood import Stretches, stretches_of
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-
-Floats = NDArray[np.float64]
 
 FOLDS = 4
 """Blocks into which the fitted records are cut where none are held out; each is predicted from the others."""
@@ -42,9 +41,9 @@ def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[R
     return mean_squares(stretches_of(records), _residuals(model, values, records))
 
 
-def block_squares(now: BalanceFit, data: Data) -> Floats:
+def block_squares(now: BalanceFit) -> Floats:
     """Mean squares (n,) that a fit leaves on quarters of its own records, each predicted from the others."""
-    known = now.slopes()
+    known, data = now.slopes(), now.data
     whole: list[list[Floats]] = [[] for _ in range(len(data.floor))]
     for fold in range(FOLDS):
         inside = [_fold(len(r), fold) for r in now.residual]
@@ -71,7 +70,8 @@ def relative_torque_error(model: Model, records: tuple[RecordedMotion, ...]) -> 
 
 
 def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:
-    """Share of the mean square that is gone on records not fitted to, over the joints on which the fit fell."""
+    """Share of the mean square that is gone on records not fitted to, over the joints whose mean square fell in the
+    fit."""
     with np.errstate(invalid="ignore"):
         affected = (fitted_after < (1 - AFFECTED) * fitted_before) & np.isfinite(before) & np.isfinite(after)
     if not affected.any():
@@ -80,7 +80,7 @@ def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, a
 
 
 def is_beyond_noise(before: Floats, after: Floats, floor: Floats) -> bool:
-    """Whether a joint on which the fit fell had more to explain than the noise of its readings."""
+    """Whether any joint whose mean square fell in the fit had more to explain than the noise of its readings."""
     with np.errstate(invalid="ignore"):
         return bool(((after < (1 - AFFECTED) * before) & (before > (MORE_THAN_NOISE * floor) ** 2)).any())
 
@@ -115,7 +115,7 @@ def _with_own_phases(balance: TorqueBalance, values: Mapping[str, float]) -> dic
 def _turned(
     balance: TorqueBalance, values: Mapping[str, float], pair: tuple[Parameter, Parameter], size: float
 ) -> dict[str, float]:
-    """The pair of that size that leaves least of its joints' torque where they move; unchanged where none moves."""
+    """The pair of that amplitude with the least residual torque where its joints move; nothing where none moves."""
     sine, cosine = (p.name for p in pair)
     none = {sine: 0.0, cosine: 0.0}
     tried = [balance.residual({**values, **none, **only}) for only in ({}, {sine: size}, {cosine: size})]

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.fitting.whitening import autocovariance
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
-Floats = NDArray[np.float64]
 Stretch = tuple[int, slice]
 
 LONGEST_MEMORY = 60

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.diagnosis import (
     UNWRITTEN,
     AgainstWhat,
@@ -24,14 +24,12 @@ from model.discrepancy.localisation.dependence import AGAINST, Quantities, depen
 from model.discrepancy.localisation.statistics import Bins, correlation_of, significance_of_chi_square
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
-Floats = NDArray[np.float64]
-
 WINDOW = 0.5
 """Duration of one cell of the map, s."""
 LEAST = 0.3
 """Least deviation of a residual from which its correlation is taken, in deviations of noise."""
 FAST = 0.5
-"""Acceleration above which a joint starts to move or turns, as a share of its larger ones (95 % quantile)."""
+"""Acceleration above which a joint starts to move or turns back, as a share of its larger ones (95 % quantile)."""
 SLOW = 0.15
 """Speed below which a joint creeps, as a share of its larger ones (95 % quantile)."""
 SHAPE_SIGNIFICANCE = 6.0

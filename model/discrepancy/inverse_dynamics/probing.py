@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, Trial
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, Slopes, prior_rows, stacked
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, prior_rows, stacked
 from model.inverse_dynamics.torque_balance import TorqueBalance
-
-Floats = NDArray[np.float64]
 
 NONLINEAR = frozenset(
     {
@@ -43,7 +41,6 @@ class Prober:
     """A fit, prepared for probing: `basis` (N, p) spans what its unknowns can explain."""
 
     now: BalanceFit
-    data: Data
     basis: Floats
     left: Floats
 
@@ -65,7 +62,7 @@ class Prober:
     def _column(self, balance: TorqueBalance, values: Start) -> Floats:
         moved = balance.residual({**self.now.values, **values})
         change = [after - before for after, before in zip(moved, self.now.residual, strict=True)]
-        return self._prepared(np.concatenate(self.now.noise.weighted(self.data.stretches, change)))
+        return self._prepared(np.concatenate(self.now.noise.weighted(self.now.data.stretches, change)))
 
     def _prepared(self, signal: Floats) -> Floats:
         """A signal (N,) less what the unknowns explain of it, priors included."""
@@ -73,7 +70,7 @@ class Prober:
         return padded - self.basis @ (self.basis.T @ padded)
 
     def _explained(self, columns: Floats, trial: Trial, start: Start, null: Start) -> tuple[float, Floats]:
-        """Fall of the squares and the amplitudes (as shares of the start's) that give it; none of a wrong sign."""
+        """Fall of the squares, and the amplitudes (as shares of the start's) that cause it; none has a wrong sign."""
         kept = np.linalg.norm(columns, axis=0) > 1e-9
         shares = np.zeros(columns.shape[1])
         while kept.any():
@@ -97,13 +94,13 @@ class Prober:
         return not p.low - room <= value <= p.high + room
 
 
-def prepare_probes(now: BalanceFit, slopes: Slopes, data: Data) -> Prober:
+def prepare_probes(now: BalanceFit, slopes: Slopes) -> Prober:
     """A prober around a fit whose derivatives are `slopes`."""
-    A = np.concatenate(now.noise.weighted(data.stretches, stacked(slopes, now)))
+    A = np.concatenate(now.noise.weighted(now.data.stretches, stacked(slopes, now)))
     rows, _ = prior_rows(now.unknowns, np.array([now.values[u.name] for u in now.unknowns]))
     scale = np.array([u.scale for u in now.unknowns])
     whole = np.concatenate([A, rows]) * scale
     u, s, _ = np.linalg.svd(whole, full_matrices=False)
     basis = u[:, s > 1e-10 * s[0]] if s.size else np.zeros((whole.shape[0], 0))
-    left = np.concatenate([*now.noise.weighted(data.stretches, now.residual), np.zeros(len(rows))])
-    return Prober(now, data, basis, left - basis @ (basis.T @ left))
+    left = np.concatenate([*now.noise.weighted(now.data.stretches, now.residual), np.zeros(len(rows))])
+    return Prober(now, basis, left - basis @ (basis.T @ left))

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.progress import Cancel, Progress, stop_if
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
 from model.discrepancy.inverse_dynamics.case import Case
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, Slopes, fit
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
@@ -19,10 +19,8 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-Floats = NDArray[np.float64]
-
 SHORTLIST = 7
-"""Most effects that are fitted after the probes."""
+"""Most effects that are fitted after probing."""
 ALIKE = 0.97
 """Correlation of the torques of two effects above which they count as the same."""
 JOINT_GAIN = 12.0
@@ -46,7 +44,7 @@ class Fitted:
         return self.effect != other.effect and alike
 
     def imitates(self, other: Fitted, before: BalanceFit) -> bool:
-        """Whether this effect gives the torque of the other one, with more parameters."""
+        """Whether this effect gives the same torque as the other one, with more parameters."""
         if len(self.parameters) <= len(other.parameters):
             return False
         own, theirs = (
@@ -70,7 +68,7 @@ def search(model: Model, now: BalanceFit, case: Case, progress: Progress, cancel
     Raises CancelledError when asked to end.
     """
     slopes = now.slopes()
-    prober = prepare_probes(now, slopes, case.data)
+    prober = prepare_probes(now, slopes)
     fitted_model = model.with_values(now.values)
     probes: list[Probe] = []
     for trial in list_trials(fitted_model, now, case):
@@ -82,9 +80,9 @@ def search(model: Model, now: BalanceFit, case: Case, progress: Progress, cancel
     for chosen in _shortlist(probes):
         stop_if(cancel)
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
-        found.append(_fit_effect(fitted_model, now, slopes, case.data, chosen))
+        found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    return Findings(tuple(_weigh(found, now, case.data, places)), tuple(probes))
+    return Findings(tuple(_weigh(found, now, places)), tuple(probes))
 
 
 def _on(joints: tuple[int, ...]) -> str:
@@ -114,7 +112,7 @@ def _shortlist(probes: Sequence[Probe]) -> list[list[Probe]]:
     return chosen
 
 
-def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, data: Data, probes: Sequence[Probe]) -> Fitted:
+def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe]) -> Fitted:
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet."""
     effect, joints = probes[0].trial.effect, _joints(probes)
     wider = model.with_effect(effect, joints)
@@ -122,23 +120,24 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, data: Data, probe
     start: Start = {name: value for p in probes for name, value in p.start.items()}
     unknowns = (*now.unknowns, *(free_unknown(p) for p in own))
     balance = TorqueBalance(wider, now.balance.records)
-    fitted = fit(balance, unknowns, {**now.values, **start}, data, now.noise.memory, slopes)
+    fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
     return Fitted(effect, joints, wider, own, fitted, 0.0)
 
 
-def _weigh(found: Sequence[Fitted], now: BalanceFit, data: Data, places: int) -> list[Fitted]:
-    """The candidates with their evidence, best first; independent samples are counted in what the best one leaves."""
+def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted]:
+    """The candidates with their evidence, best first; the residual of the best one decides how many samples are
+    independent."""
     if not found:
         return []
     best = min(found, key=lambda f: f.fit.criterion)
-    memory = noise_model(data.stretches, best.fit.residual, data.floor).memory
-    weighed = [replace(f, evidence=evidence(now, f.fit, data, memory, len(f.parameters), places)) for f in found]
+    memory = noise_model(now.data.stretches, best.fit.residual, now.data.floor).memory
+    weighed = [replace(f, evidence=evidence(now, f.fit, memory, len(f.parameters), places)) for f in found]
     return sorted(weighed, key=lambda f: -f.evidence)
 
 
-def evidence(before: BalanceFit, after: BalanceFit, data: Data, memory: Floats, parameters: int, places: int) -> float:
+def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
-    counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in data.stretches.by_joint])
+    counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
     independent = max(float((counts / memory).sum()), 2.0)
     fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
     cost = parameters * float(np.log(independent))

@@ -1,4 +1,4 @@
-"""Which numbers of a model may be a little off without any effect being missing: unknowns with priors, and bounds."""
+"""Which numbers of a model may be slightly wrong although no effect is missing: unknowns with priors and bounds."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DeviationSource = Literal["stated", "fitted-before", "free"]
 
 
 def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple[Unknown, ...], DeviationSource]:
-    """Parameters that may be off, and where their deviations come from.
+    """Parameters that may be wrong, and where their deviations come from.
 
     Args:
         added: effects' parameters (full names) that the diagnosis itself put in; they have no prior.

@@ -7,16 +7,12 @@ from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from daq.contracts.machine import NoController
+from daq.contracts.machine import Machine, NoController
+from model.arrays import Floats
 from model.discrepancy.diagnosis import AgainstWhat
-from model.discrepancy.localisation.phases import asked_motion, asked_speed, directions
+from model.discrepancy.localisation.phases import AskedMotion
 from model.discrepancy.localisation.statistics import Bins, binned
-from model.fitting.records import Record
-from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 AGAINST: tuple[AgainstWhat, ...] = get_args(AgainstWhat)
 """The quantities, in the order in which they are examined."""
@@ -40,13 +36,14 @@ class Quantities:
     stretches: tuple[slice, ...]
 
 
-def quantities(model: Model, records: Sequence[Record]) -> Quantities:
-    """The quantities of records. Time is each record's own; the drive is the recorded one."""
-    kinds = [model.machine.joint(j).kind for j in model.machine.modelled_joints]
+def quantities(motions: Sequence[AskedMotion]) -> Quantities:
+    """The quantities of a machine's records. Time is each record's own; the drive is the recorded one."""
+    machine = motions[0].machine
+    kinds = [machine.joint(j).kind for j in machine.modelled_joints]
     angle = tuple("rad" if k == "revolute" else "m" for k in kinds)
-    per_record = [_of_record(model, record) for record in records]
+    per_record = [_of_record(asked) for asked in motions]
     stretches, begin = [], 0
-    for record in records:
+    for record in (asked.record for asked in motions):
         stretches += [slice(begin + run.start, begin + run.stop) for run in record.runs]
         begin += len(record.measured)
     return Quantities(
@@ -56,17 +53,17 @@ def quantities(model: Model, records: Sequence[Record]) -> Quantities:
             "position": angle,
             "speed": tuple(f"{a}/s" for a in angle),
             "direction": ("1",) * len(kinds),
-            "drive": drive_units(model),
+            "drive": drive_units(machine),
         },
         tuple(stretches),
     )
 
 
-def drive_units(model: Model) -> tuple[str, ...]:
+def drive_units(machine: Machine) -> tuple[str, ...]:
     """Unit of each joint's drive: volts at a motor, or the torque or force of a plain gain."""
     units = []
-    for joint in model.machine.modelled_joints:
-        own = model.machine.joint(joint)
+    for joint in machine.modelled_joints:
+        own = machine.joint(joint)
         torque = "N·m" if own.kind == "revolute" else "N"
         units.append("V" if own.drive.kind == "dc_motor" else torque)
     return tuple(units)
@@ -79,19 +76,17 @@ def dependence(signal: Floats, joint: int, against: AgainstWhat, known: Quantiti
     return None if edges is None else binned(signal, quantity, edges, known.stretches, floor)
 
 
-def _of_record(model: Model, record: Record) -> dict[AgainstWhat, Floats]:
-    inputs = record.inputs
+def _of_record(asked: AskedMotion) -> dict[AgainstWhat, Floats]:
+    inputs = asked.record.inputs
     rows = np.round(inputs.rows).astype(np.int64)
-    asked = asked_motion(model, record)
-    moved = directions(model, record).astype(np.float64)
     # A controller's drive contains the noise of the reading it responds to; one period later they are uncorrelated.
-    late = 0 if isinstance(model.machine.controller, NoController) else 1
-    drive = inputs.drive[np.maximum(rows - late, 0)] if np.any(inputs.drive) else np.full_like(asked, np.nan)
+    late = 0 if isinstance(asked.machine.controller, NoController) else 1
+    drive = inputs.drive[np.maximum(rows - late, 0)] if np.any(inputs.drive) else np.full_like(asked.position, np.nan)
     return {
-        "time": np.repeat((inputs.time[rows] - inputs.time[0])[:, None], asked.shape[1], axis=1),
-        "position": asked,
-        "speed": asked_speed(asked, inputs.period),
-        "direction": moved,
+        "time": np.repeat((inputs.time[rows] - inputs.time[0])[:, None], asked.position.shape[1], axis=1),
+        "position": asked.position,
+        "speed": asked.speed,
+        "direction": asked.direction.astype(np.float64),
         "drive": drive,
     }
 

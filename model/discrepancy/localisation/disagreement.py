@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
+from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
-from model.discrepancy.localisation.phases import HOLD, PHASES, phases_of
+from model.discrepancy.localisation.phases import HOLD, PHASES
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import (
     Correlation,
@@ -24,10 +25,6 @@ from model.discrepancy.localisation.statistics import (
 )
 from model.discrepancy.localisation.varying_parameters import moving_parameters
 from model.fitting.records import resolution
-from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 WINDOW = 0.3
 """Duration of one cell of the map, s."""
@@ -70,7 +67,7 @@ class _Map:
     @cached_property
     def phases(self) -> list[Integers]:
         """Per record (m, n), index of `PHASES`."""
-        return [phases_of(self.residuals.model, record) for record in self.residuals.records]
+        return [asked.phases for asked in self.residuals.motions]
 
     @cached_property
     def weighted(self) -> list[Floats]:
@@ -166,7 +163,7 @@ class _Map:
                 for run in record.runs
             ]
         )
-        scale, unit = spoken_unit(residuals.model, self.joints[j])
+        scale, unit = spoken_unit(residuals.model.machine, self.joints[j])
         rms, floor = float(np.sqrt(np.mean(own_residual**2))), float(residuals.deviations[j])
         return WorstPlace(
             joint=self.joints[j],
@@ -200,7 +197,7 @@ def locate(residuals: Residuals, traces: Sequence[Trace] = ()) -> Where:
     judged on fewer samples than noise of the sensor would be: significances are rather too small than too large.
 
     Where even the quieter half of a joint's windows exceeds the stated noise, by up to 1.5 times its variance, that
-    counts as the noise.
+    larger value counts as the noise.
 
     Args:
         traces: the same records as traces, where α(t) is wanted; needs the recorded drive (about 0.5 s).
@@ -238,7 +235,7 @@ def _windows(run: slice, period: float) -> list[slice]:
 
 def _dependences(residuals: Residuals) -> list[Dependence]:
     """The residual of every joint against every quantity that varies."""
-    known = quantities(residuals.model, residuals.records)
+    known = quantities(residuals.motions)
     every = np.concatenate(list(residuals.signals))
     found = []
     for j, joint in enumerate(residuals.model.machine.modelled_joints):
@@ -265,12 +262,12 @@ def optional(values: Floats) -> tuple[float | None, ...]:
     return tuple(None if math.isnan(v) else float(v) for v in values)
 
 
-def spoken_unit(model: Model, joint: int) -> tuple[float, str]:
+def spoken_unit(machine: Machine, joint: int) -> tuple[float, str]:
     """Factor and name of the unit in which people speak of a joint's residual: counts of its sensor, degrees, mm."""
-    sensor = model.machine.joint(joint).sensor
+    sensor = machine.joint(joint).sensor
     if sensor is not None and sensor.measures == "position":
         return 1.0 / resolution(sensor), "ADC counts"
     speed = "/s" if sensor is not None and sensor.measures == "velocity" else ""
-    if model.machine.joint(joint).kind == "revolute":
+    if machine.joint(joint).kind == "revolute":
         return math.degrees(1.0), f"°{speed}"
     return 1e3, f"mm{speed}"

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from daq.contracts.machine import NoController
+from daq.contracts.machine import Machine, NoController, Sensor
+from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import Phase
 from model.fitting.records import Record, resolution
-from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 """Phases in the order of their numbers: ramp start, steady ramp, reversal, creep, hold."""
@@ -33,68 +31,79 @@ LEAST_COUNTS = 1.5
 """Counts of the sensor within that time below which a joint is at rest."""
 
 
-def asked_motion(model: Model, record: Record) -> Floats:
-    """What each joint was asked to do, (m, n) rad or m, at the samples of a record: its set points.
+@dataclass(frozen=True)
+class AskedMotion:
+    """What the joints were asked to do, at the samples of a record: its set points. Without a controller nothing was
+    asked; then it is what the joints did, a measured velocity summed up."""
 
-    Without a controller nothing was asked; then it is what the joint did, a measured velocity summed up.
-    """
-    inputs = record.inputs
-    if not isinstance(model.machine.controller, NoController):
-        return inputs.set_points[np.round(inputs.rows).astype(np.int64)]
-    if _measures_velocity(model):
-        return np.asarray(np.cumsum(record.measured, axis=0) * inputs.period)
-    return record.measured
+    machine: Machine
+    record: Record
 
+    @cached_property
+    def position(self) -> Floats:
+        """(m, n) rad or m."""
+        inputs, measured = self.record.inputs, self.record.measured
+        if self._is_controlled:
+            return inputs.set_points[np.round(inputs.rows).astype(np.int64)]
+        return np.asarray(np.cumsum(measured, axis=0) * inputs.period) if self._measures_velocity else measured
 
-def asked_speed(asked: Floats, period: float) -> Floats:
-    """Speed (m, n) of such a motion, over a centred window of `SPEED_WINDOW`."""
-    half = max(1, round(0.5 * SPEED_WINDOW / period))
-    last = len(asked) - 1
-    after = np.minimum(np.arange(last + 1) + half, last)
-    before = np.maximum(np.arange(last + 1) - half, 0)
-    return np.asarray((asked[after] - asked[before]) / (period * np.maximum(after - before, 1))[:, None])
+    @cached_property
+    def speed(self) -> Floats:
+        """(m, n), over a centred window of `SPEED_WINDOW`."""
+        period = self.record.inputs.period
+        half = max(1, round(0.5 * SPEED_WINDOW / period))
+        last = len(self.position) - 1
+        after = np.minimum(np.arange(last + 1) + half, last)
+        before = np.maximum(np.arange(last + 1) - half, 0)
+        moved = self.position[after] - self.position[before]
+        return np.asarray(moved / (period * np.maximum(after - before, 1))[:, None])
 
+    @cached_property
+    def direction(self) -> Integers:
+        """Direction in which each joint moves or moved last, (m, n) of −1, 0 (not yet) and 1."""
+        moving = np.sign(self._speed_beyond_rest).astype(np.int64)
+        rows = np.where(moving != 0, np.arange(len(moving))[:, None], 0)
+        latest = np.maximum.accumulate(rows, axis=0)
+        return np.asarray(np.take_along_axis(moving, latest, axis=0))
 
-def directions(model: Model, record: Record) -> Integers:
-    """Direction in which each joint moves or moved last, (m, n) of −1, 0 (not yet) and 1."""
-    moving = np.sign(_speed_beyond_rest(model, record)).astype(np.int64)
-    rows = np.where(moving != 0, np.arange(len(moving))[:, None], 0)
-    latest = np.maximum.accumulate(rows, axis=0)
-    return np.asarray(np.take_along_axis(moving, latest, axis=0))
+    @cached_property
+    def phases(self) -> Integers:
+        """Number of the phase (index of `PHASES`) of each sample and joint, (m, n)."""
+        speed = self._speed_beyond_rest
+        return np.stack([_phases(speed[:, j], self.record.inputs.period) for j in range(speed.shape[1])], axis=1)
 
+    @cached_property
+    def _speed_beyond_rest(self) -> Floats:
+        """(m, n), zero where a joint rests."""
+        return np.where(np.abs(self.speed) > self._least_speed, self.speed, 0.0)
 
-def phases_of(model: Model, record: Record) -> Integers:
-    """Number of the phase (index of `PHASES`) of each sample and joint, (m, n)."""
-    speed = _speed_beyond_rest(model, record)
-    return np.stack([_phases(speed[:, j], record.inputs.period) for j in range(speed.shape[1])], axis=1)
+    @property
+    def _least_speed(self) -> Floats:
+        """(n,) speed below which a joint is at rest."""
+        measured = self.record.measured
+        if self._measures_velocity:
+            return 0.02 * np.abs(measured).max(axis=0)
+        least = []
+        for column, sensor in enumerate(self._sensors):
+            if self._is_controlled:
+                least.append(1e-6)  # set points have no noise: any step of them is motion
+            elif sensor is None:
+                least.append(1e-3 * float(np.ptp(measured[:, column])) / SPEED_WINDOW)
+            else:
+                least.append(LEAST_COUNTS * resolution(sensor) / SPEED_WINDOW)
+        return np.array(least)
 
+    @property
+    def _is_controlled(self) -> bool:
+        return not isinstance(self.machine.controller, NoController)
 
-def _speed_beyond_rest(model: Model, record: Record) -> Floats:
-    """Asked speed (m, n), zero where a joint rests."""
-    speed = asked_speed(asked_motion(model, record), record.inputs.period)
-    return np.where(np.abs(speed) > _least_speed(model, record), speed, 0.0)
+    @property
+    def _measures_velocity(self) -> bool:
+        return any(s is not None and s.measures == "velocity" for s in self._sensors)
 
-
-def _least_speed(model: Model, record: Record) -> Floats:
-    """(n,) speed below which a joint is at rest."""
-    if _measures_velocity(model):
-        return 0.02 * np.abs(record.measured).max(axis=0)
-    counted = not isinstance(model.machine.controller, NoController)
-    least = []
-    for column, joint in enumerate(model.machine.modelled_joints):
-        sensor = model.machine.joint(joint).sensor
-        if counted:
-            least.append(1e-6)  # set points have no noise: any step of them is motion
-        elif sensor is None:
-            least.append(1e-3 * float(np.ptp(record.measured[:, column])) / SPEED_WINDOW)
-        else:
-            least.append(LEAST_COUNTS * resolution(sensor) / SPEED_WINDOW)
-    return np.array(least)
-
-
-def _measures_velocity(model: Model) -> bool:
-    sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
-    return any(s is not None and s.measures == "velocity" for s in sensors)
+    @property
+    def _sensors(self) -> list[Sensor | None]:
+        return [self.machine.joint(j).sensor for j in self.machine.modelled_joints]
 
 
 def _phases(speed: Floats, period: float) -> Integers:

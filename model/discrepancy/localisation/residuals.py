@@ -1,18 +1,18 @@
-"""What a model leaves of records: the subject of every question about where it disagrees."""
+"""The residuals that a model leaves of records, from which all of this package computes where it disagrees."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from model.fitting.records import Record
+from model.arrays import Floats
+from model.discrepancy.localisation.phases import AskedMotion
+from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class Residuals:
     Args:
         signals: (m, n) measured − simulated per record, in the unit of the measurement.
         deviations: (n,) standard deviation of such a residual when nothing is wrong.
+        quantity: what the sensors measure. feedback_share: share of the recorded readings that the simulation
+            was given.
 
     Raises:
         SpecError: for residuals that do not belong to the records, or deviations that are not positive.
@@ -31,6 +33,8 @@ class Residuals:
     records: Sequence[Record]
     signals: Sequence[Floats]
     deviations: Floats
+    quantity: Signal = "position"
+    feedback_share: float = 0.0
 
     def __post_init__(self) -> None:
         if len(self.records) != len(self.signals):
@@ -45,6 +49,11 @@ class Residuals:
                 )
         if not (np.isfinite(self.deviations).all() and (self.deviations > 0).all()):
             raise SpecError(f"deviations of the noise {self.deviations}: must be positive numbers")
+
+    @cached_property
+    def motions(self) -> tuple[AskedMotion, ...]:
+        """What the joints were asked to do in each record."""
+        return tuple(AskedMotion(self.model.machine, record) for record in self.records)
 
     def of_joint(self, column: int) -> Floats:
         """The compared samples of one joint (index from 0), all records in a row."""

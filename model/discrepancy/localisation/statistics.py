@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from model.arrays import Floats
 from model.fitting.whitening import fitted_whitener
-
-Floats = NDArray[np.float64]
 
 LONGEST_MEMORY = 12
 """Largest order of the autoregression, samples."""

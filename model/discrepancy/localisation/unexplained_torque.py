@@ -12,24 +12,21 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from daq.contracts.machine import NoController
+from model.arrays import Floats
 from model.discrepancy.diagnosis import RemainingShape
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.disagreement import optional
 from model.discrepancy.localisation.residuals import Residuals
 from model.dynamics.recursive import mass_matrix
-from model.fitting.records import Record, Signal
-from model.machine_model.model import Model
+from model.fitting.records import Record
 from model.machine_model.parameter import initial_velocity
 from model.simulation.chain_of_model import chain_of
 from model.simulation.period import OUT_READING, OUT_SPEED
 from model.simulation.prepared import Options
 from model.simulation.simulate import sensitivities, simulate
-
-Floats = NDArray[np.float64]
 
 MEMORY = 40
 """Length of the impulse response, control periods."""
@@ -38,34 +35,28 @@ ROUGHEST, SMOOTHEST = 1e-6, 1e6
 TRIALS = 16
 """Bisections between them."""
 LEAST_EXCESS = 1.1
-"""Least mean square of the weighted residual with anything to explain."""
+"""Mean square of the weighted residual below which there is nothing to explain."""
 LEAST_EXPLAINED = 0.05
-"""Share of the torque's variance below which a dependence is no shape."""
+"""Least share of the torque's variance that a dependence must explain to be reported."""
 LEAST_SIGNIFICANCE = 4.0
-"""Standard deviations of a dependence below which it is not shown."""
+"""Least significance, in standard deviations, of a dependence that is reported."""
 
 
-def remaining_shapes(
-    residuals: Residuals, signal: Signal = "position", feedback_share: float = 0.0
-) -> tuple[RemainingShape, ...]:
-    """What is left as torques in bins of time, position, speed, direction and drive; what explains most comes first.
+def remaining_shapes(residuals: Residuals) -> tuple[RemainingShape, ...]:
+    """The remaining torque in bins of time, position, speed, direction and drive; the dependence that explains most
+    comes first.
 
     Empty where no joint is off by more than noise, or where what is left depends on none of these.
 
-    Args:
-        signal: what was measured. feedback_share: share of the recorded readings that the residuals' simulation was
-            given.
-
-    Raises:
-        SpecError: when a simulation does not stay finite.
+    Raises SpecError when a simulation does not stay finite.
     """
     machine = residuals.model.machine
-    known = quantities(residuals.model, residuals.records)
+    known = quantities(residuals.motions)
     found = []
     for j, joint in enumerate(machine.modelled_joints):
         if np.mean(np.square(residuals.of_joint(j))) < LEAST_EXCESS * residuals.deviations[j] ** 2:
             continue
-        torque = np.concatenate(_torques(residuals, j, signal, feedback_share))
+        torque = np.concatenate(_torques(residuals, j))
         size = float(np.sqrt(np.mean(torque**2)))
         for against in AGAINST:
             bins = dependence(torque, j, against, known, 1e-3 * size) if size > 0 else None
@@ -86,17 +77,17 @@ def remaining_shapes(
     return tuple(sorted(found, key=lambda s: -s.explained))
 
 
-def torque_of(residuals: Residuals, signal: Signal = "position", feedback_share: float = 0.0) -> list[Floats]:
-    """Torque (m, n) per record, N·m or N, that leaves its residual, joint by joint."""
-    columns = [_torques(residuals, j, signal, feedback_share) for j in range(residuals.model.joint_count)]
+def torque_of(residuals: Residuals) -> list[Floats]:
+    """Torque (m, n) per record, N·m or N, that would cause the residual, joint by joint."""
+    columns = [_torques(residuals, j) for j in range(residuals.model.joint_count)]
     return [np.stack(own, axis=1) for own in zip(*columns, strict=True)]
 
 
-def _torques(residuals: Residuals, j: int, signal: Signal, feedback_share: float) -> list[Floats]:
+def _torques(residuals: Residuals, j: int) -> list[Floats]:
     """The same of one joint, (m,) per record; zero outside the stretches that are compared."""
     found = []
     for record, residual in zip(residuals.records, residuals.signals, strict=True):
-        response = _impulse_response(residuals.model, record, j, signal, feedback_share)
+        response = _impulse_response(residuals, record, j)
         torque = np.zeros(len(residual))
         for run in record.runs:
             torque[run] = _deconvolved(residual[run, j], response, float(residuals.deviations[j]))
@@ -104,13 +95,14 @@ def _torques(residuals: Residuals, j: int, signal: Signal, feedback_share: float
     return found
 
 
-def _impulse_response(model: Model, record: Record, j: int, signal: Signal, feedback_share: float) -> Floats:
+def _impulse_response(residuals: Residuals, record: Record, j: int) -> Floats:
     """Readings (MEMORY,) after 1 N·m (N) at joint j for one period: exact derivatives by the speeds at the start.
 
     An impulse p at joint j changes all speeds by D⁻¹ e_j p.
     """
+    model, share = residuals.model, residuals.feedback_share
     loop: Literal["open", "closed"] = "open" if isinstance(model.machine.controller, NoController) else "closed"
-    run = simulate(model, record.inputs, Options(loop=loop, quantise=False, following=feedback_share))
+    run = simulate(model, record.inputs, Options(loop=loop, quantise=False, following=share))
     begin = _sliding(run.velocity[:, j])
     part = slice(begin, begin + MEMORY)
     inputs = replace(
@@ -125,8 +117,8 @@ def _impulse_response(model: Model, record: Record, j: int, signal: Signal, feed
         noise=record.inputs.noise[part],
     )
     speeds_at_start = [initial_velocity(joint) for joint in model.machine.modelled_joints]
-    slopes = sensitivities(model, inputs, speeds_at_start, Options(loop=loop, following=feedback_share)).of(
-        OUT_SPEED if signal == "velocity" else OUT_READING
+    slopes = sensitivities(model, inputs, speeds_at_start, Options(loop=loop, following=share)).of(
+        OUT_SPEED if residuals.quantity == "velocity" else OUT_READING
     )
     speeds = np.linalg.inv(mass_matrix(chain_of(model), run.position[begin]))[:, j]
     impulse = np.einsum("i,ik->k", speeds, slopes[:, :, j])
@@ -136,7 +128,7 @@ def _impulse_response(model: Model, record: Record, j: int, signal: Signal, feed
 
 
 def _sliding(speed: Floats) -> int:
-    """Period from which the joint slides on for `MEMORY` periods, as fast as it does anywhere."""
+    """Period at which the joint begins to slide for `MEMORY` periods, at the highest speed that it keeps up so long."""
     count = len(speed) - MEMORY
     if count <= 0:
         return 0

@@ -15,7 +15,7 @@ from model.validation.variation import Variation
 SHOWN = 5
 """Most parameters that are reported, those that explain most of the residual."""
 LEAST_EXPLAINED = 0.02
-"""Share of the residual's energy that a reported parameter's variation explains at least."""
+"""Least share of the residual's energy that a reported parameter's variation explains."""
 BY_CHANCE = 0.1
 """Twice the share of the time for which noise alone takes α(t) beyond two of its deviations."""
 TERMS: dict[str, AgainstWhat] = {

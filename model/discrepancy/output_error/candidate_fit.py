@@ -12,31 +12,29 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.candidates.library import TONES, Hypothesis
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.tones import tones_tried
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
 from model.fitting.unknowns import Unknown
 
-Floats = NDArray[np.float64]
-
 STEPS = 8
 """Steps of a search for a candidate's fit."""
 POLISHING = 4
-"""Steps of the searches that take a fit to its end."""
+"""Steps of each search that runs a fit to convergence."""
 LOST = 1.1
 """Fits that end above this multiple of the baseline cost are discarded as not converged."""
 AGAIN = 3
-"""Searches of a restarted fit, at most: the best candidate is taken to its end later."""
+"""Most searches of a restarted fit; the best candidate is run to convergence later."""
 BETTER = 3.0
-"""Fall of the cost from which a fit counts as better; less is another place on the same flat ground."""
+"""Least fall of the cost with which a fit counts as better; a smaller one is a move along a flat valley."""
 STRANGE = 1.15
-"""Misfit from which a fit has not explained the record, perhaps because it ended in a wrong place: it is restarted."""
+"""Misfit from which a fit is restarted: it has not explained the record, and may have ended in a wrong minimum."""
 STRAINED = 4.0
 """Deviation from a prior's mean, in its standard deviations, from which a fit is restarted as well."""
 SHAPE_PRIOR = 3.0
@@ -59,7 +57,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """A candidate, fitted: the probe that it began from, the fit that it led to, and its evidence."""
+    """A fitted candidate: the probe from which its fit began, the fit, and its evidence."""
 
     probe: Probe
     fit: Fit
@@ -67,7 +65,7 @@ class CandidateFit:
 
     @property
     def hypothesis(self) -> Hypothesis:
-        """What was fitted."""
+        """The hypothesis that was fitted."""
         return self.probe.hypothesis
 
     @property
@@ -77,15 +75,15 @@ class CandidateFit:
 
 
 def same_answer(one: CandidateFit, better: CandidateFit) -> bool:
-    """Whether a candidate says the same of the machine as one that is ranked above it."""
+    """Whether a candidate is the same answer as one ranked above it."""
     return says_no_more(one.hypothesis.name, one.hypothesis.joints, better.hypothesis.name, better.hypothesis.joints)
 
 
 def says_no_more(
     effect: str | None, joints: Sequence[int], of_better: str | None, joints_of_better: Sequence[int]
 ) -> bool:
-    """Whether an effect says the same of the machine as one ranked above it, or only some of it: it is the same effect
-    on fewer joints, or on more, which then brought nothing."""
+    """Whether an effect is the same answer as one ranked above it: the same effect on the same or fewer joints, or on
+    more, which then brought nothing."""
     own, others = set(joints), set(joints_of_better)
     return effect == of_better and (own <= others or own > others)
 
@@ -96,12 +94,12 @@ def judge(point: Point) -> Fit:
 
 
 def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit | None:
-    """The candidate fitted from where its probe points to.
+    """The candidate, fitted from the start that its probe proposes.
 
-    Where that leads nowhere, it is fitted from the expected numbers: a strong effect may have driven the tolerance
-    parameters far off. With a `goal`, the cost at which it would be a rival of a candidate that has explained the
-    record, only the first way is tried, and only as long as the goal is within reach. None where no simulation stays
-    finite, or all end far above the cost without the effect.
+    If that fit does not improve on the baseline, the candidate is fitted from the expected values, because a strong
+    effect may have driven the tolerance parameters far off. With a `goal`, the cost at which it would rival a candidate
+    that has explained the record, only the first start is tried, and only while the goal is within reach. None if no
+    simulation stays finite, or if every fit ends far above the baseline's cost.
     """
     found: list[Point] = []
     lost = LOST * before.point.cost
@@ -120,7 +118,7 @@ def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit 
 
 
 def nearest(before: Point, begun: Sequence[Probe]) -> Probe:
-    """Of several starts of a fit of the same effect, the one that explains most. Raises SpecError."""
+    """The start with the lowest cost, of several for a fit of the same effect. Raises SpecError."""
 
     def cost(probe: Probe) -> float:
         point = _start(before, probe)
@@ -130,17 +128,17 @@ def nearest(before: Point, begun: Sequence[Probe]) -> Probe:
 
 
 def _nearby(before: Point, probe: Probe, goal: float = math.inf) -> Point | None:
-    """A fit from where the probe points to."""
+    """A fit from the start that the probe proposes."""
     point = _start(before, probe)
     changing = _indices(point.unknowns, [p.name for p in probe.hypothesis.free])
     return descend(point, STEPS, changing, goal) if point.is_finite else None
 
 
 def _from_expected(before: Point, probe: Probe, goal: float) -> Point | None:
-    """A fit from the expected values of all that has a prior, and the best of the candidate's trials there.
+    """A fit from the expected value of every unknown with a prior, and from the best of the candidate's trials there.
 
-    It is fitted in closed loop first. None where it explains less there than the baseline does; given up when it would
-    not come to a cost of `goal`.
+    The closed loop is fitted first. None if that explains less than the baseline does. The fit is given up once a cost
+    of `goal` is out of reach.
     """
     closed_loop = before.observation.with_feedback_share(0.0)
     best: Point | None = None
@@ -158,8 +156,8 @@ def _from_expected(before: Point, probe: Probe, goal: float) -> Point | None:
 
 
 def polish(before: Fit, found: CandidateFit) -> CandidateFit:
-    """The fit continued with new derivatives by everything on the candidate's joints: a strong effect changes what the
-    tolerance parameters do there."""
+    """The fit, continued with new derivatives by every unknown of the candidate's joints or of the whole machine: a
+    strong effect changes what the tolerance parameters do there."""
     point = found.fit.point
     joints = found.hypothesis.joints or point.model.machine.modelled_joints
     near = [k for k, u in enumerate(point.unknowns) if not u.joints or set(u.joints) & set(joints)]
@@ -173,10 +171,10 @@ def polish(before: Fit, found: CandidateFit) -> CandidateFit:
 
 
 def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> CandidateFit:
-    """The fit, or a better one from the expected numbers, where it leaves the record unexplained or needs an unlikely
-    number: a descent from where a strong effect has driven the tolerance parameters may end in another minimum.
+    """The fit, or a better one from the expected values if it leaves the record unexplained or needs an unlikely value:
+    where a strong effect has driven the tolerance parameters off, a descent may end in another minimum.
 
-    Given up when it would not come to a cost of `goal`.
+    The new fit is given up once a cost of `goal` is out of reach.
     """
     if found.misfit < STRANGE and _strain(found.fit.point) < STRAINED:
         return found
@@ -190,7 +188,7 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
 
 def diverged_from_prior(point: Point) -> bool:
-    """Whether a strong effect has driven the tolerance parameters to unlikely numbers, and still shows."""
+    """Whether the tolerance parameters have unlikely values, and the record is unexplained all the same."""
     return point.misfit >= STRANGE and _strain(point) >= STRAINED
 
 
@@ -200,7 +198,7 @@ def _strain(point: Point) -> float:
 
 
 def finish(before: Fit, found: CandidateFit) -> CandidateFit:
-    """The fit taken to its end, all derivatives computed there."""
+    """The fit, run to convergence, with all derivatives computed anew."""
     try:
         point = converge(found.fit.point, POLISHING)
     except SpecError:
@@ -210,9 +208,10 @@ def finish(before: Fit, found: CandidateFit) -> CandidateFit:
 
 
 def improved_baseline(before: Fit, found: CandidateFit) -> Fit | None:
-    """A better fit without the candidate, from the values that the candidate's fit has found for all other unknowns.
+    """A better fit without the candidate, started at the values that the candidate's fit has found for all other
+    unknowns.
 
-    Such a fall of the cost is not the candidate's: the search before it had not come to its end. None where there is no
+    Such a fall of the cost is no merit of the candidate: the earlier search had not converged. None if there is no
     better fit.
     """
     point = before.point
@@ -250,12 +249,12 @@ def _start(before: Point, probe: Probe, observation: Observation | None = None, 
     if expected:
         values = [u.expected if u.deviation is not None else v for u, v in zip(unknowns, values, strict=True)]
     tangents = np.concatenate([before.tangents[kept], np.zeros((len(hypothesis.free), before.tangents.shape[1]))])
-    model, there = hypothesis.model, np.array(values)
-    return point_at(observation or before.observation, model, unknowns, there, tangents)
+    begun = Calibration(hypothesis.model, tuple(unknowns), np.array(values))
+    return point_at(observation or before.observation, begun, tangents)
 
 
 def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:
-    """The evidence for the candidate of a probe, from the point that its fit has led to."""
+    """The candidate of a probe with its evidence, from the point at which its fit has ended."""
     after = judge(point)
     fall = before.description - after.description
     if point.cost > before.point.cost:  # not converged: with more freedom, the cost cannot rise
@@ -264,7 +263,7 @@ def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:
 
 
 def price_of(observation: Observation, hypothesis: Hypothesis) -> float:
-    """What a candidate's freedom costs in evidence."""
+    """The cost of a candidate's free parameters, in evidence."""
     count = len(hypothesis.free)
     if hypothesis.name not in TONES:
         return count * math.log(observation.samples)

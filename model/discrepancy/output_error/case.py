@@ -1,4 +1,4 @@
-"""One case: the traces of a diagnosis, and every question that is put to a point about them."""
+"""One case: the traces of a diagnosis, and what they say about a point: its errors, its refusal, where it disagrees."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
@@ -16,14 +16,13 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.candidate_fit import CandidateFit
-from model.discrepancy.output_error.holdout import HeldOut, signal_errors
+from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
-
-Floats = NDArray[np.float64]
+from model.machine_model.model import Model
 
 
 @dataclass(frozen=True)
@@ -31,12 +30,15 @@ class Case:
     """What stays the same during a diagnosis by output error. It is built once and passed whole.
 
     Args:
+        model: as it was given. given: the point of that model, with the gains that records prove, before any fit.
         traces: the fitted ones. scoring: these traces as errors are reported, with less feedback of the record than
             fits get. floor: (n,) rad, the error that noise alone leaves on them.
         held: the held-out traces, if any. floor_held: the same on those; empty without any.
         excluded: effects that need not be tried.
     """
 
+    model: Model
+    given: Point
     traces: tuple[Trace, ...]
     scoring: Observation
     floor: Floats
@@ -51,6 +53,11 @@ class Case:
         """Identities of the fitted traces."""
         return tuple(t.record.trace_id for t in self.traces)
 
+    @property
+    def held_traces(self) -> tuple[Trace, ...]:
+        """The held-out traces."""
+        return () if self.held is None else self.held.traces
+
     def with_floors_of(self, point: Point) -> Case:
         """The same with floors that are no less than a point's: with play, noise decides where a joint comes to rest,
         so an added effect may raise the floor."""
@@ -60,8 +67,8 @@ class Case:
 
     def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
         """Errors of every joint on the fitted traces."""
-        old, new = (p.residuals_on(self.scoring) for p in (before, after))
-        return signal_errors(self.scoring, old, new, self.floor)
+        old, new = (self.scoring.residuals(p) for p in (before, after))
+        return self.scoring.errors(old, new, self.floor)
 
     def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
         """Residuals of the held-out traces; empty where there are none."""
@@ -69,12 +76,12 @@ class Case:
 
     def held_errors(self, before: Signals, after: Signals) -> tuple[SignalError, ...]:
         """Errors of every joint on the held-out traces; empty where there are none."""
-        return () if self.held is None else signal_errors(self.held.observation, before, after, self.floor_held)
+        return () if self.held is None else self.held.observation.errors(before, after, self.floor_held)
 
     def refused(
         self, found: CandidateFit, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
     ) -> Refusal | None:
-        """Why an effect is not taken, if held-out traces speak against it.
+        """Why an effect is refused; None unless the held-out traces speak against it.
 
         Args:
             current: the point without it. held: residuals of these traces without and with it. own: their errors on its
@@ -95,46 +102,56 @@ class Case:
         return None
 
     def where(self, point: Point, *, moving: bool = True) -> Where:
-        """Where the point disagrees with the fitted traces. moving: also which parameters would have to move, which
-        takes most of the time."""
+        """Where the point disagrees with the fitted traces. moving: also find which parameters would have to vary with
+        time, which takes longest."""
         driven = tuple(t for t in self.traces if moving and t.drive is not None)
         return locate(self._residuals(point), driven)
 
     def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
         """What the point leaves of the fitted traces, as torques."""
-        return remaining_shapes(self._residuals(point), feedback_share=FEEDBACK_SHARE_FOR_ERRORS)
+        return remaining_shapes(self._residuals(point))
 
     def _residuals(self, point: Point) -> Residuals:
-        left = point.residuals_on(self.scoring)
-        return Residuals(point.fitted_model, self.scoring.records, left, self.scoring.deviations)
+        left = self.scoring.residuals(point)
+        return Residuals(
+            model=point.fitted_model,
+            records=self.scoring.records,
+            signals=left,
+            deviations=self.scoring.deviations,
+            feedback_share=FEEDBACK_SHARE_FOR_ERRORS,
+        )
 
     def _square(self, point: Point) -> float:
         """Weighted sum of squares of a point, on the fitted traces as errors are reported."""
-        weighted = self.scoring.weighted(point.residuals_on(self.scoring))
+        weighted = self.scoring.weighted(self.scoring.residuals(point))
         return float(weighted @ weighted)
 
 
 def build_case(
-    point: Point,
+    model: Model,
+    given: Point,
+    fitted: Point,
     traces: Sequence[Trace],
     held: HeldOut | None = None,
     options: DiagnosisOptions | None = None,
     excluded: tuple[str, ...] = (),
 ) -> Case:
-    """The case of traces that a point was fitted to, with the floors that its model gives them."""
-    scoring = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
+    """The case of traces that a point was fitted to, with the floors that this point gives them."""
+    scoring = fitted.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
     return Case(
+        model=model,
+        given=given,
         traces=tuple(traces),
         scoring=scoring,
-        floor=noise_floor(scoring, point),
+        floor=noise_floor(scoring, fitted),
         held=held,
-        floor_held=np.zeros(0) if held is None else held.floor(point),
+        floor_held=np.zeros(0) if held is None else held.floor(fitted),
         options=options or DiagnosisOptions(),
         excluded=excluded,
     )
 
 
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:
-    """Errors of every joint on the fitted traces as the fit itself sees them, with its share of the record."""
+    """Errors of every joint on the fitted traces as the fit itself sees them, with its own feedback share."""
     floor = noise_floor(point.observation, point)
-    return signal_errors(point.observation, point.residuals, point.residuals, floor)
+    return point.observation.errors(point.residuals, point.residuals, floor)

@@ -1,7 +1,7 @@
 """Evidence from the recorded controller's own numbers, which needs no model of the arm.
 
-The board's record holds the set point that was sent, the position it read, the error it formed and the power it gave.
 Of a sampled PID the record holds no error; its drive tells it (`sampled_controller`).
+The board's record holds the set point that was sent, the position it read, the error it formed and the power it gave.
 Up to rounding, the error must be set point − position and the power the gain times the error. A violation proves lost
 set points or a wrong gain by itself, and its absence excludes them.
 """
@@ -10,16 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model import layout as at
+from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerProof
-from model.discrepancy.output_error.holdout import signal_errors
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.sampled_controller import controller_numbers, with_errors
 from model.drives.controller import POWER_MAX
@@ -28,15 +28,13 @@ from model.machine_model.model import Model
 COUNTS_OF_ROUNDING = 1.5
 """Counts by which a recorded error may differ: set points are rounded to posture units, and those to counts."""
 LEAST_SHARE = 1e-3
-"""Share of wrong samples below which they may be an accident of the record's start."""
+"""Share of wrong samples below which they may be due to the start of the record."""
 LEAST_GAIN_DEVIATION = 0.01
 """Least relative deviation of a gain that is reported: rounding may explain a smaller one."""
 LEAST_POWER = 4.0
 """Least power of a sample that is used for a gain, DAC counts: rounding dominates below it."""
 LEAST_SAMPLES = 20
 """Samples that the estimate of a gain needs."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,8 @@ def check_controller(
     found: list[ControllerFinding | None] = []
     for joint in machine.modelled_joints:
         stated = 0.0 if model is None else float(model.vector[at.slot(joint, at.GAIN_ERROR)])
-        found += [_lost_set_points(traces, machine, joint), _wrong_gain(traces, machine, joint, stated)]
+        own = _JointRecords(tuple(traces), machine, joint)
+        found += [_lost_set_points(own), _wrong_gain(own, stated)]
     return tuple(finding for finding in found if finding is not None)
 
 
@@ -80,17 +79,17 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
     if not traces or isinstance(machine.controller, NoController):
         return ()
     traces = with_errors(traces, machine)
-    joints = machine.modelled_joints
+    joints = [_JointRecords(tuple(traces), machine, joint) for joint in machine.modelled_joints]
     checks = {
-        "wrong_gain": all(_usable(traces, machine, joint) is not None for joint in joints),
-        "lost_set_points": all(_is_conclusive(_losses(traces, machine, joint)) for joint in joints),
+        "wrong_gain": all(own.error_and_power is not None for own in joints),
+        "lost_set_points": all(_is_conclusive(own.losses) for own in joints),
     }
     return tuple(name for name, judged in checks.items() if judged)
 
 
 def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
-    """The model with the gains that the records prove: in place of the gain error that it states for a joint, or as an
-    effect more. An error that several joints share is set for all of them.
+    """The model with the gains that the records prove: in place of the gain error that it states for a joint, or as a
+    further effect. An error that several joints share is set for all of them.
 
     Raises SpecError for a gain error beyond the bounds of the effect.
     """
@@ -129,11 +128,81 @@ class _Losses:
         return self.wrong >= max(2.0, LEAST_SHARE * self.samples)
 
 
+@dataclass(frozen=True)
+class _JointRecords:
+    """What traces hold of the controller of one joint."""
+
+    traces: tuple[Trace, ...]
+    machine: Machine
+    joint: int
+
+    @cached_property
+    def losses(self) -> _Losses | None:
+        """None where a trace does not hold set points and errors."""
+        sensor = self.machine.joint(self.joint).sensor
+        if sensor is None:
+            return None
+        tolerance = COUNTS_OF_ROUNDING * sensor.range.value / 2**sensor.bits
+        moved = lost = total = 0
+        for trace in self.traces:
+            if trace.error is None or trace.set_point is None:
+                return None
+            column = trace.column(self.joint)
+            used = trace.position[:, column] + trace.error[:, column]
+            changed = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) > 2 * tolerance
+            wrong = np.abs(trace.set_point[:, column] - used) > tolerance
+            moved, lost, total = (
+                moved + int(changed.sum()),
+                lost + int((wrong & changed).sum()),
+                total + int(wrong.sum()),
+            )
+        return _Losses(moved, lost, total, sum(len(t) for t in self.traces))
+
+    @cached_property
+    def error_and_power(self) -> tuple[Floats, Floats] | None:
+        """The power that P alone would give, and the recorded one, of all traces; None where one of them does not hold
+        them, or all together hold too few."""
+        pairs = [self._error_and_power(trace) for trace in self.traces]
+        known = [pair for pair in pairs if pair is not None]
+        if len(known) < len(pairs) or sum(len(wanted) for wanted, _ in known) < LEAST_SAMPLES:
+            return None
+        return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
+
+    @property
+    def rounding(self) -> float:
+        """Step of what the controller gives out: DAC counts, or the drive's unit; 0 where nothing is stated."""
+        if not isinstance(self.machine.controller, SampledPid):
+            return 1.0
+        stated = of_joint(self.machine.controller.drive_resolution, self.joint)
+        return 0.0 if stated is None else stated.value
+
+    def _error_and_power(self, trace: Trace) -> tuple[Floats, Floats] | None:
+        """The same of one trace, in DAC counts, where neither is at its limit; None where the trace does not hold them,
+        or I or D act. Of a sampled PID, the drives, whatever acts."""
+        controller, sensor = self.machine.controller, self.machine.joint(self.joint).sensor
+        if isinstance(controller, SampledPid):
+            numbers = controller_numbers(trace, self.machine, self.joint)
+            return None if numbers is None else (numbers.formed[numbers.free], numbers.drive[numbers.free])
+        if not isinstance(controller, BoardPid) or sensor is None or trace.power_raw is None or trace.error is None:
+            return None
+        gains = (trace.record.gains or {}).get(self.joint, controller.gains[self.joint - 1])
+        if any(gains[1:]):
+            return None
+        column = trace.column(self.joint)
+        unit = sensor.range.value / 2**sensor.bits
+        wanted = gains[0] * controller.dac_counts_per_adc_count.value * trace.error[:, column] / unit
+        power = trace.power_raw[:, column].astype(np.float64)
+        free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_POWER)
+        return wanted[free], power[free]
+
+
 def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
     """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its errors are zero."""
     part = "relative" if finding.effect == "wrong_gain" else "share"
     name = f"joint{finding.joint}.{finding.effect}.{part}"
-    value = FoundValue(value=finding.value, low=finding.low, high=finding.high, unit="1")
+    value = FoundValue(
+        value=finding.value, low=finding.low, high=finding.high, unit="1", part=part, joints=(finding.joint,)
+    )
     evidence = float(finding.samples)
     proof = Candidate(
         effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
@@ -146,30 +215,12 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
         evidence=evidence,
         margin=evidence,
         candidates=(proof,),
-        rmse_fit=signal_errors(observation, quiet, quiet, observation.deviations),
+        rmse_fit=observation.errors(quiet, quiet, observation.deviations),
         where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
         reason=UNWRITTEN,
         proof=ControllerProof(samples=finding.samples, of=finding.of),
         adopted=True,
     )
-
-
-def _losses(traces: Sequence[Trace], machine: Machine, joint: int) -> _Losses | None:
-    """None where a trace does not hold set points and errors."""
-    sensor = machine.joint(joint).sensor
-    if sensor is None:
-        return None
-    tolerance = COUNTS_OF_ROUNDING * sensor.range.value / 2**sensor.bits
-    moved = lost = total = 0
-    for trace in traces:
-        if trace.error is None or trace.set_point is None:
-            return None
-        column = trace.column(joint)
-        used = trace.position[:, column] + trace.error[:, column]
-        changed = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) > 2 * tolerance
-        wrong = np.abs(trace.set_point[:, column] - used) > tolerance
-        moved, lost, total = moved + int(changed.sum()), lost + int((wrong & changed).sum()), total + int(wrong.sum())
-    return _Losses(moved, lost, total, sum(len(t) for t in traces))
 
 
 def _is_conclusive(losses: _Losses | None) -> bool:
@@ -178,69 +229,30 @@ def _is_conclusive(losses: _Losses | None) -> bool:
     return losses is not None and (losses.moved > 0 or not losses.violated)
 
 
-def _lost_set_points(traces: Sequence[Trace], machine: Machine, joint: int) -> ControllerFinding | None:
-    losses = _losses(traces, machine, joint)
+def _lost_set_points(own: _JointRecords) -> ControllerFinding | None:
+    losses = own.losses
     if losses is None or not losses.violated or not losses.moved:
         return None
     share, (low, high) = losses.lost / losses.moved, _share_interval(losses.lost, losses.moved)
-    return ControllerFinding("lost_set_points", joint, share, low, high, losses.wrong, losses.moved)
+    return ControllerFinding("lost_set_points", own.joint, share, low, high, losses.wrong, losses.moved)
 
 
-def _wrong_gain(traces: Sequence[Trace], machine: Machine, joint: int, stated: float) -> ControllerFinding | None:
+def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
     """The ratio of power to P times error, where only P acts and the power is not at its limit, if it differs from the
     stated gain error."""
-    usable = _usable(traces, machine, joint)
-    if usable is None:
+    if own.error_and_power is None:
         return None
-    wanted, power = usable
+    wanted, power = own.error_and_power
     squares = float(wanted @ wanted)
     relative = float(power @ wanted) / squares - 1.0
     spread = float(np.mean((power - (1 + relative) * wanted) ** 2))
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
-    least = _rounding(machine, joint) ** 2 / 12
-    deviation = float(np.sqrt(max(spread, least) * np.sum((counts * values) ** 2)) / squares)
+    deviation = float(np.sqrt(max(spread, own.rounding**2 / 12) * np.sum((counts * values) ** 2)) / squares)
     if abs(relative - stated) < max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation):
         return None
     half, used = 2 * deviation, len(wanted)
-    return ControllerFinding("wrong_gain", joint, relative, relative - half, relative + half, used, used)
-
-
-def _usable(traces: Sequence[Trace], machine: Machine, joint: int) -> tuple[Floats, Floats] | None:
-    """`_error_and_power` of all traces; None where one of them does not hold them, or all together hold too few."""
-    pairs = [_error_and_power(trace, machine, joint) for trace in traces]
-    known = [pair for pair in pairs if pair is not None]
-    if len(known) < len(pairs) or sum(len(wanted) for wanted, _ in known) < LEAST_SAMPLES:
-        return None
-    return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
-
-
-def _error_and_power(trace: Trace, machine: Machine, joint: int) -> tuple[Floats, Floats] | None:
-    """The power that P alone would give, and the recorded one, in DAC counts, where neither is at its limit; None
-    where the trace does not hold them, or I or D act. Of a sampled PID, the drives, whatever acts."""
-    controller, sensor = machine.controller, machine.joint(joint).sensor
-    if isinstance(controller, SampledPid):
-        numbers = controller_numbers(trace, machine, joint)
-        return None if numbers is None else (numbers.formed[numbers.free], numbers.drive[numbers.free])
-    if not isinstance(controller, BoardPid) or sensor is None or trace.power_raw is None or trace.error is None:
-        return None
-    gains = (trace.record.gains or {}).get(joint, controller.gains[joint - 1])
-    if any(gains[1:]):
-        return None
-    column = trace.column(joint)
-    unit = sensor.range.value / 2**sensor.bits
-    wanted = gains[0] * controller.dac_counts_per_adc_count.value * trace.error[:, column] / unit
-    power = trace.power_raw[:, column].astype(np.float64)
-    free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_POWER)
-    return wanted[free], power[free]
-
-
-def _rounding(machine: Machine, joint: int) -> float:
-    """Step of what the controller gives out: DAC counts, or the drive's unit; 0 where nothing is stated."""
-    if not isinstance(machine.controller, SampledPid):
-        return 1.0
-    stated = of_joint(machine.controller.drive_resolution, joint)
-    return 0.0 if stated is None else stated.value
+    return ControllerFinding("wrong_gain", own.joint, relative, relative - half, relative + half, used, used)
 
 
 def _share_interval(count: int, of: int) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, improved_baseline, judge
 from model.discrepancy.output_error.case import Case, build_case, errors_of_fit
 from model.discrepancy.output_error.controller_evidence import (
@@ -79,11 +80,11 @@ def diagnose_by_simulation(
     if given.observation.drive_is_input:
         excluded = CONTROLLER_EFFECTS  # the plant gets the drive that was recorded, whatever the controller has done
     fitted = judge(_fit_tolerances(given))
-    case = build_case(fitted.point, traces, hold_out(known, holdout), options, excluded)
+    case = build_case(model, given, fitted.point, traces, hold_out(known, holdout), options, excluded)
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
-    answer = _answer(case, model, given, search, proved, ask, tuple(holdout))
+    answer = _answer(case, search, proved, ask)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
 
@@ -112,12 +113,11 @@ class _Search:
         return [Added(s.effect, s.joints, s.evidence) for s in self.steps if s.adopted]
 
 
-def _given_point(observation: Observation, model: Model, unknowns: Sequence[Unknown]) -> Point:
+def _given_point(observation: Observation, given: Calibration) -> Point:
     """The model as it was given; its derivatives are left at zero. Wrong gains, which the controller's own numbers
     prove, stay as they are."""
-    free = tuple(u for u in unknowns if u.parameter.effect != "wrong_gain")
-    values = np.array([u.start for u in free])
-    return point_at(observation, model, free, values, np.zeros((len(free), observation.samples)))
+    free = [k for k, u in enumerate(given.unknowns) if u.parameter.effect != "wrong_gain"]
+    return point_at(observation, given.only(free), np.zeros((len(free), observation.samples)))
 
 
 def _fit_tolerances(given: Point) -> Point:
@@ -136,7 +136,8 @@ def _fit_tolerances(given: Point) -> Point:
 
 
 def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
-    """Where a search from a point's values leads on an observation; None where no simulation there stays finite."""
+    """The point that a search on an observation reaches from another point's values; None if no simulation stays
+    finite."""
     try:
         begun = point.on(observation)
         return descend(begun, FIRST_STEPS) if begun.is_finite else None
@@ -145,7 +146,8 @@ def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
 
 
 def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
-    """Steps until nothing significant is left, what is left cannot be named, or the most steps are done."""
+    """Adds effects until nothing significant is left, until what is left cannot be named, or until the limit of
+    steps."""
     width = 0.8 / case.options.most_steps
     for number in range(case.options.most_steps):
 
@@ -178,8 +180,7 @@ def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel)
 
 
 def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tuple[Ranking, Fit]:
-    """The candidates, and the fit that they are compared with: the current one, or a better one that they have led
-    to."""
+    """The candidates, and the fit that they are compared with: the current one, or a better one found through them."""
     ranking = rank(case, search.current, progress, cancel, search.probes)
     better = improved_baseline(search.current, ranking.fitted[0]) if ranking.fitted else None
     if better is None:
@@ -187,16 +188,8 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
     return rank(case, better, progress, cancel), better
 
 
-def _answer(
-    case: Case,
-    model: Model,
-    given: Point,
-    found: _Search,
-    proved: tuple[Step, ...],
-    ask: Asker | None,
-    holdout: tuple[Trace, ...],
-) -> Diagnosis:
-    """The answer that a search has come to, after what is withdrawn of it. It does not know the time that it took."""
+def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | None) -> Diagnosis:
+    """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained_joints(case, found, looked)
     answered = verdict((*proved, *found.steps), unexplained=bool(left))
@@ -211,11 +204,11 @@ def _answer(
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
-        *on_unfinished((*case.traces, *holdout)),
-        *(() if holdout else (Note(kind="nothing-held-out"),)),
+        *on_unfinished((*case.traces, *case.held_traces)),
+        *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *(() if asked.note is None else (asked.note,)),
     )
-    held = case.held_errors(*case.held_residuals(given, end))
+    held = case.held_errors(*case.held_residuals(case.given, end))
     unknown = answered == "unknown-effect"
     answer = Diagnosis(
         verdict=answered,
@@ -227,11 +220,11 @@ def _answer(
         where=where,
         candidates=_candidates(found),
         remaining=remaining,
-        model_before=model,
-        model_after=_with_lineage(model, end, case.names),
+        model_before=case.model,
+        model_after=_with_lineage(case, end),
         traces=case.names,
-        holdout=tuple(t.record.trace_id for t in holdout),
-        rmse_fit=case.fitted_errors(given, end),
+        holdout=tuple(t.record.trace_id for t in case.held_traces),
+        rmse_fit=case.fitted_errors(case.given, end),
         rmse_holdout=held,
         significant=case.thresholds.significant,
         seconds=0.0,
@@ -282,8 +275,8 @@ def _stated(point: Point) -> list[Unknown]:
     return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
 
 
-def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
+def _with_lineage(case: Case, point: Point) -> Model:
     """The model of the last fit, and where it comes from."""
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
-    lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
+    lineage = Lineage(parent=case.model.identity, traces=case.names, fit=fit, note="diagnosis")
     return point.fitted_model.with_lineage(lineage)

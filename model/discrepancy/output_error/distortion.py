@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.validation.criterion import DAMPING_RATIO, contribution, required_deviation
 from model.validation.expected_deviation import Convention, expected_deviation
-
-Floats = NDArray[np.float64]
 
 
 def sum_of_contributions(

@@ -1,4 +1,4 @@
-"""The errors of a fit, on the fitted traces and on traces that were held out."""
+"""Held-out traces: what a fit leaves of them, with initial postures and phases of their own, and how far that rises."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import SignalError
+from model.arrays import Floats
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point, descend, point_at
@@ -18,8 +18,6 @@ from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
-
-Floats = NDArray[np.float64]
 
 DISTURBANCE = "periodic_disturbance"
 BLOCK = 0.2
@@ -33,16 +31,16 @@ problem."""
 class HeldOut:
     """Traces that no parameter is fitted to. starts: the unknowns of their initial postures, each of one trace."""
 
+    traces: tuple[Trace, ...]
     observation: Observation
     starts: tuple[Unknown, ...]
 
-    def floor(self, point: Point) -> Floats:
+    def floor(self, point: Calibration) -> Floats:
         """(n,) rad, as `noise_floor`, with the initial postures estimated here as well."""
-        unknowns, values = _values_here(point, self.starts)
-        here = replace(point, unknowns=unknowns, values=values)
+        here = _values_here(point, self.starts)
         return noise_floor(self.observation, here, lambda made: replace(self, observation=made).residuals(point))
 
-    def residuals(self, point: Point) -> Signals:
+    def residuals(self, point: Calibration) -> Signals:
         """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
 
         Each trace itself gives what no other trace can: its initial posture, within a count or so, because friction
@@ -72,25 +70,12 @@ class HeldOut:
 
 
 def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
-    """The held-out traces, ready; None without any. Raises TraceError and SpecError as for the fitted ones."""
+    """The held-out traces, prepared for simulation; None if there are none. Raises TraceError and SpecError as for the
+    fitted ones."""
     if not traces:
         return None
-    observation, _, unknowns = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)
-    return HeldOut(observation, tuple(u for u in unknowns if u.kind is Kind.INITIAL_POSITION))
-
-
-def signal_errors(observation: Observation, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
-    """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
-    found = []
-    for column, joint in enumerate(observation.machine.modelled_joints):
-        sizes = []
-        for signals in (before, after):
-            parts = [s[run, column] for s, r in zip(signals, observation.records, strict=True) for run in r.runs]
-            sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
-        unit = "rad" if observation.machine.joint(joint).kind == "revolute" else "m"
-        least = float(floor[column])
-        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
-    return tuple(found)
+    observation, given = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)
+    return HeldOut(tuple(traces), observation, tuple(u for u in given.unknowns if u.kind is Kind.INITIAL_POSITION))
 
 
 def _record(observation: Observation, number: int) -> Observation:
@@ -99,7 +84,7 @@ def _record(observation: Observation, number: int) -> Observation:
     return replace(observation, records=observation.records[own], prepared=observation.prepared[own])
 
 
-def _residuals(observation: Observation, point: Point, starts: tuple[Unknown, ...]) -> Floats:
+def _residuals(observation: Observation, point: Calibration, starts: tuple[Unknown, ...]) -> Floats:
     """Measured − simulated (m, n) rad of the one record of an observation."""
     phases = _phases(point)
     if phases:
@@ -107,27 +92,27 @@ def _residuals(observation: Observation, point: Point, starts: tuple[Unknown, ..
     return _fitted_here(observation, point, starts).residuals[0]
 
 
-def _fitted_here(observation: Observation, point: Point, own: tuple[Unknown, ...]) -> Point:
+def _fitted_here(observation: Observation, point: Calibration, own: tuple[Unknown, ...]) -> Point:
     """The point with the record's own unknowns at their best. They are not searched for where there are none, or where
     the simulation does not stay finite."""
-    unknowns, values = _values_here(point, own)
-    none = np.zeros((len(unknowns), observation.samples))
-    begun = point_at(observation, point.model, unknowns, values, none)
+    here = _values_here(point, own)
+    count = len(here.unknowns)
+    begun = point_at(observation, here, np.zeros((count, observation.samples)))
     if not own or not begun.is_finite:
         return begun
-    return descend(begun, START_STEPS, range(len(unknowns) - len(own), len(unknowns)))
+    return descend(begun, START_STEPS, range(count - len(own), count))
 
 
-def _values_here(point: Point, own: tuple[Unknown, ...]) -> tuple[tuple[Unknown, ...], Floats]:
-    """A point's unknowns and values for held-out traces: their own unknowns in place of the fitted traces' initial
-    postures."""
+def _values_here(point: Calibration, own: tuple[Unknown, ...]) -> Calibration:
+    """The same for held-out traces: with their own unknowns in place of the fitted traces' initial postures."""
     names = {u.name for u in own}
     kept = [k for k, u in enumerate(point.unknowns) if u.kind is not Kind.INITIAL_POSITION and u.name not in names]
     held = [replace(point.unknowns[k], deviation=None) for k in kept]  # no prior and no derivative: they stay
-    return (*held, *own), np.concatenate([point.values[kept], [u.start for u in own]])
+    values = np.concatenate([point.values[kept], [u.start for u in own]])
+    return Calibration(point.model, (*held, *own), values)
 
 
-def _phases(point: Point) -> tuple[Unknown, ...]:
+def _phases(point: Calibration) -> tuple[Unknown, ...]:
     """Sine and cosine of every periodic disturbance of a point, in pairs, free but for a prior of their amplitude."""
     fitted, found = point.by_name, []
     tones = [p for p in point.model.parameters if p.effect == DISTURBANCE]
@@ -142,8 +127,8 @@ def _phases(point: Point) -> tuple[Unknown, ...]:
     return tuple(found)
 
 
-def _with_phases(point: Point, phases: Sequence[Unknown], fitted: Point) -> Point:
-    """The point with its disturbances at the fitted phases.
+def _with_phases(point: Calibration, phases: Sequence[Unknown], fitted: Calibration) -> Calibration:
+    """The same with its disturbances at the fitted phases.
 
     The amplitude is kept fixed, so that a spurious disturbance cannot be fitted away on held-out data.
     """
@@ -155,5 +140,4 @@ def _with_phases(point: Point, phases: Sequence[Unknown], fitted: Point) -> Poin
             replace(u, start=size * part, deviation=None)
             for u, part in ((sine, math.cos(angle)), (cosine, math.sin(angle)))
         ]
-    unknowns, values = _values_here(point, tuple(turned))
-    return replace(point, unknowns=unknowns, values=values)
+    return _values_here(point, tuple(turned))

@@ -1,4 +1,4 @@
-"""Steps with the values of the last fit: effects that were still missing at their time had biased them.
+"""Updates steps to the values of the last fit: a step's own values are biased by effects that were found after it.
 
 The sentences of an answer are made afterwards, so that they give the size of the last fit too. The pattern of a reason,
 and its errors, stay those of the step.
@@ -55,8 +55,7 @@ def _without(point: Point, gone: Sequence[str]) -> Fit:
     for effect, joints in dict.fromkeys((known[n].effect, known[n].joints) for n in gone):
         model = model.without_effect(effect or "", joints or None)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in gone]
-    unknowns = [point.unknowns[k] for k in kept]
-    begun = point_at(point.observation, model, unknowns, point.values[kept], point.tangents[kept])
+    begun = point_at(point.observation, point.only(kept).of(model), point.tangents[kept])
     return judge(converge(begun, LAST_STEPS))
 
 

@@ -1,8 +1,8 @@
 """One effect on several joints at once.
 
-An effect that all gears of one make have, or all motors, shows on every joint. Looked for joint by joint, it would
-first be judged on one joint while it is still missing on the others: the tolerance parameters bend to make up for
-those, and their remainder looks like other effects.
+An effect that all gears of one make have, or all motors, shows on every joint. A search joint by joint would judge it
+on one joint while it is still missing on the others: the tolerance parameters make up for those, and what remains looks
+like other effects.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def _only_probed(found: CandidateFit, fitted: Sequence[CandidateFit], probes: Se
 def _better(
     current: Fit, parts: Sequence[CandidateFit], thresholds: Thresholds, further: CandidateFit | Probe | None = None
 ) -> CandidateFit | None:
-    """The parts fitted together, and on one further joint, where that brings what a further joint must bring."""
+    """The parts fitted together, and on one further joint if given; None if that brings less than a further joint
+    must."""
     most = max(r.evidence for r in parts)
     begun = _begun(current, parts, further)
     fit = refit(current, nearest(current.point, begun)) if begun else None

@@ -9,27 +9,27 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, side_by_side
-from model.discrepancy.output_error.search import Point
-
-Floats = NDArray[np.float64]
 
 REPLICAS, SEED = 6, 1991
 
 
-def noise_floor(observation: Observation, point: Point, left: Callable[[Observation], Signals] | None = None) -> Floats:
-    """Root mean square of each joint's residual, (n,) rad, over simulated records of the point's own model.
+def noise_floor(
+    observation: Observation, truth: Calibration, left: Callable[[Observation], Signals] | None = None
+) -> Floats:
+    """Root mean square of each joint's residual, (n,) rad, over simulated records of an arm that is this model.
 
     Where its simulations in closed loop do not stay finite: the noise of a reading.
 
     Args:
-        left: residuals of an observation, computed as those of the real records are; None for those of the point.
+        left: residuals of an observation, computed as those of the real records are; None for those of that very model.
     """
-    left = left or point.residuals_on
+    left = left or (lambda made: made.residuals(truth))
     rng = np.random.default_rng(SEED)
-    replicas = [_replica(observation, point, rng) for _ in range(REPLICAS)]
+    replicas = [_replica(observation, truth, rng) for _ in range(REPLICAS)]
     if not all(np.isfinite(r.measured).all() for replica in replicas for r in replica.records):
         return observation.deviations.copy()
     squares = []
@@ -38,8 +38,8 @@ def noise_floor(observation: Observation, point: Point, left: Callable[[Observat
     return np.asarray(observation.deviations * np.sqrt(np.mean(squares, axis=0)))
 
 
-def _replica(observation: Observation, point: Point, rng: np.random.Generator) -> Observation:
-    """The same experiments on an arm that is the point's model, with random noise of the stated size."""
+def _replica(observation: Observation, truth: Calibration, rng: np.random.Generator) -> Observation:
+    """The same experiments on an arm that is this model, with random noise of the stated size."""
     scale = observation.deviations / observation.unit
     noise = [scale * rng.normal(size=p.noise.shape) for p in observation.prepared]
-    return observation.imagined(point.model, point.unknowns, point.values, noise)
+    return observation.imagined(truth, noise)

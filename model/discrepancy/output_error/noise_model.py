@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.fitting.whitening import Whitener, fitted_whitener
-
-Floats = NDArray[np.float64]
 
 LONGEST_MEMORY = 6
 """Largest order of the autoregression in samples: 0.12 s at 20 ms."""

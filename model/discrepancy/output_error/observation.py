@@ -18,12 +18,14 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, Machine, SampledPid
 from daq.contracts.trace import Trace
 from model import layout as at
+from model.arrays import Floats
+from model.discrepancy.diagnosis import SignalError
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
@@ -38,9 +40,10 @@ from model.simulation.period import OUT_DRIVE, OUT_READING, OUTPUTS
 from model.simulation.prepared import Options, Prepared, prepare
 from model.simulation.simulate import at_rows
 
-Floats = NDArray[np.float64]
 Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
+State = tuple[Floats, list[Floats]]
+"""What a simulation begins with: the model's flat vector, and initial states (n, 2) of every record."""
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -109,9 +112,7 @@ class Observation:
         prepared = tuple(p.with_setting(at.DRIVE_RECORDED, int(recorded)) for p in self.prepared)
         return replace(self, prepared=prepared)
 
-    def imagined(
-        self, model: Model, unknowns: Sequence[Unknown], values: Floats, noise: Sequence[Floats]
-    ) -> Observation:
+    def imagined(self, truth: Calibration, noise: Sequence[Floats]) -> Observation:
         """The same experiments on an arm that is the model, in closed loop, with noise (k, n) of its readings, counts.
 
         Readings and drives take the place of the recorded ones. Not finite where the simulation is not.
@@ -122,8 +123,7 @@ class Observation:
             .with_setting(at.QUANTISE, at.DRIVE_ROUNDED)
             for p, own in zip(self.prepared, noise, strict=True)
         )
-        vector, initials = self.state(model, unknowns, values)
-        outputs = replace(self, prepared=alone).outputs(model, vector[None], [i[None] for i in initials])
+        outputs = replace(self, prepared=alone).outputs(truth.model, [self.state(truth)])
         shown = [at_rows(out[0, OUT_READING], r.inputs.rows) for out, r in zip(outputs, self.records, strict=True)]
         records = tuple(replace(r, measured=own) for r, own in zip(self.records, shown, strict=True))
         prepared = tuple(
@@ -136,13 +136,11 @@ class Observation:
         )
         return replace(self, records=records, prepared=prepared)
 
-    def readings(
-        self, model: Model, vectors: Floats, initials: Sequence[Floats], longest_step: float = STEP
-    ) -> list[Floats]:
-        """Simulated readings of p parameter sets, per record (p, m, n), rad; NaN where a run diverged. Arguments as
-        `outputs`."""
+    def readings(self, model: Model, states: Sequence[State], longest_step: float = STEP) -> list[Floats]:
+        """Simulated readings of p states of a model, per record (p, m, n) rad, with noise where the simulation has
+        some; NaN where a run diverged. longest_step: of the integration, s."""
         found = []
-        outputs = self.outputs(model, vectors, initials, longest_step, (OUT_READING,))
+        outputs = self.outputs(model, states, longest_step, (OUT_READING,))
         for record, out in zip(self.records, outputs, strict=True):
             found.append(np.stack([at_rows(one, record.inputs.rows) for one in out[:, 0]]))
         return found
@@ -150,20 +148,20 @@ class Observation:
     def outputs(
         self,
         model: Model,
-        vectors: Floats,
-        initials: Sequence[Floats],
+        states: Sequence[State],
         longest_step: float = STEP,
         columns: Sequence[int] = range(OUTPUTS),
     ) -> list[Floats]:
-        """Simulations of p parameter sets, with noise where they have some.
+        """Simulations of p states of a model, with noise where they have some; NaN where a run diverged.
 
         Args:
-            vectors: (p, size). initials: per record (p, n, 2). longest_step: of the integration, s.
-            columns: which outputs.
+            longest_step: of the integration, s. columns: which outputs.
 
         Returns:
-            per record (p, columns, k, n), in the order of `model.simulation.period`; NaN where a run diverged.
+            per record (p, columns, k, n), in the order of `model.simulation.period`.
         """
+        vectors = np.stack([vector for vector, _ in states])
+        initials = [np.stack([own[t] for _, own in states]) for t in range(len(self.records))]
         longest = max(len(r.inputs) for r in self.records)
         count = len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
@@ -186,57 +184,61 @@ class Observation:
                 found[t].append(out[rows][:, list(columns), : len(record.inputs)])
         return [np.concatenate(parts) for parts in found]
 
-    def state(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> tuple[Floats, list[Floats]]:
-        """Flat vector and initial states (n, 2) of every record, for values of the unknowns."""
-        vector = model.vector.copy()
+    def state(self, tried: Calibration) -> State:
+        """What a simulation with the values of a calibration begins with."""
+        vector = tried.model.vector.copy()
         initials = [record.inputs.initial.copy() for record in self.records]
-        for value, unknown in zip(values, unknowns, strict=True):
+        for value, unknown in zip(tried.values, tried.unknowns, strict=True):
             place = unknown.parameter.initial
             if place is None:
-                vector[list(model.by_name.get(unknown.name, unknown.parameter).slots)] = value
+                vector[list(tried.model.by_name.get(unknown.name, unknown.parameter).slots)] = value
             else:
                 for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
                     initials[t][place] += value
         return vector, initials
 
-    def shown(self, model: Model, unknowns: Sequence[Unknown], values: Floats, longest_step: float = STEP) -> Signals:
-        """Simulated readings for values of the unknowns, rad. Not finite where the simulation is not."""
-        vector, initials = self.state(model, unknowns, values)
-        readings = self.readings(model, vector[None], [i[None] for i in initials], longest_step)
+    def shown(self, tried: Calibration, longest_step: float = STEP) -> Signals:
+        """Simulated readings of a calibration, rad. Not finite where the simulation is not."""
+        readings = self.readings(tried.model, [self.state(tried)], longest_step)
         return tuple(one[0] for one in readings)
 
-    def residuals(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> Signals:
+    def residuals(self, tried: Calibration) -> Signals:
         """Measured − simulated, rad. Not finite where the simulation is not."""
-        shown = self.shown(model, unknowns, values)
+        shown = self.shown(tried)
         return tuple(record.measured - one for record, one in zip(self.records, shown, strict=True))
 
-    def tangents(
-        self,
-        model: Model,
-        unknowns: Sequence[Unknown],
-        values: Floats,
-        which: Sequence[int] | None = None,
-    ) -> Floats:
-        """Derivatives (p, N) of the weighted readings by the unknowns `which` (indices; None: all).
+    def tangents(self, tried: Calibration, which: Sequence[int] | None = None) -> Floats:
+        """Derivatives (p, N) of the weighted readings by a calibration's unknowns `which` (indices; None: all).
 
         They are finite differences over a small share of each unknown's expected deviation, at a third of the cost of
         dual numbers. Raises SpecError when the simulation does not stay finite.
         """
-        which = range(len(unknowns)) if which is None else which
+        which = range(len(tried.unknowns)) if which is None else which
         seconds = max(len(r.inputs) * r.inputs.period for r in self.records)
-        moves = [_difference(model, unknowns[k], float(values[k]), seconds) for k in which]
-        states = [self.state(model, unknowns, values)]
+        moves = [_difference(tried, k, seconds) for k in which]
+        states = [self.state(tried)]
         for index, move in zip(which, moves, strict=True):
-            moved = values.copy()
+            moved = tried.values.copy()
             moved[index] += move
-            states.append(self.state(model, unknowns, moved))
-        vectors = np.stack([vector for vector, _ in states])
-        starts = [np.stack([initials[t] for _, initials in states]) for t in range(len(self.records))]
-        shown = self.readings(model, vectors, starts, step_of_derivatives(model))
+            states.append(self.state(tried.at(moved)))
+        shown = self.readings(tried.model, states, step_of_derivatives(tried.model))
         found = self.weighted([one[1:] - one[:1] for one in shown]) / np.array(moves)[:, None]
         if not np.isfinite(found).all():
             raise SpecError("the simulation does not stay finite: the loop is unstable")
         return found
+
+    def errors(self, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
+        """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
+        found = []
+        for column, joint in enumerate(self.machine.modelled_joints):
+            sizes = []
+            for signals in (before, after):
+                parts = [s[run, column] for s, r in zip(signals, self.records, strict=True) for run in r.runs]
+                sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
+            unit = "rad" if self.machine.joint(joint).kind == "revolute" else "m"
+            least = float(floor[column])
+            found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
+        return tuple(found)
 
     def weighted(self, signals: Sequence[Floats]) -> Floats:
         """Signals (…, m, n) in standard deviations of a reading, all compared samples in one row: (…, N)."""
@@ -263,10 +265,11 @@ class Observation:
 
 def observe(
     model: Model, traces: Sequence[Trace], feedback_share: float = FEEDBACK_SHARE
-) -> tuple[Observation, Model, tuple[Unknown, ...]]:
-    """Traces ready for a diagnosis, the model with potentiometers that may bend within their linearity, and the
-    tolerance parameters: all numbers that may differ from the model's on a sound machine. These are every number with
-    an expected deviation, the potentiometers' bends, the form of friction near zero speed, and the initial postures.
+) -> tuple[Observation, Calibration]:
+    """Traces ready for a diagnosis, and the model as it was given, with potentiometers that may bend within their
+    linearity. Its unknowns are the tolerance parameters, all numbers that may differ from the model's on a sound
+    machine: every number with an expected deviation, the potentiometers' bends, the form of friction near zero speed,
+    and the initial postures.
 
     Raises:
         TraceError, SpecError: as `model.fitting.fit.fit`.
@@ -288,7 +291,8 @@ def observe(
     )
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
     unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
-    return Observation(model.machine, problem.records, problem.floor, unit, prepared), problem.model, unknowns
+    observation = Observation(model.machine, problem.records, problem.floor, unit, prepared)
+    return observation, Calibration(problem.model, unknowns, np.array([u.start for u in unknowns]))
 
 
 def _drive_is_input(machine: Machine, record: Record) -> bool:
@@ -298,7 +302,7 @@ def _drive_is_input(machine: Machine, record: Record) -> bool:
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
-    """The unknown; that of an effect in the given model is expected to have the value it has there."""
+    """The unknown; the prior mean of an effect's parameter is the value that it has in the given model."""
     return replace(unknown, expected=given[unknown.name]) if unknown.name in given else unknown
 
 
@@ -312,10 +316,11 @@ def step_of_derivatives(model: Model) -> float:
     return STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
 
 
-def _difference(model: Model, unknown: Unknown, value: float, seconds: float) -> float:
-    """The step of the finite difference by an unknown, away from its upper bound. seconds: length of the longest
-    record."""
-    parameter = model.by_name.get(unknown.name)
+def _difference(tried: Calibration, index: int, seconds: float) -> float:
+    """The step of the finite difference by the unknown of an index, away from its upper bound. seconds: length of the
+    longest record."""
+    unknown, value = tried.unknowns[index], float(tried.values[index])
+    parameter = tried.model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
     rate = (unknown.parameter.effect, unknown.parameter.part)
@@ -327,7 +332,7 @@ def _difference(model: Model, unknown: Unknown, value: float, seconds: float) ->
 
 
 def _loose_start(unknown: Unknown) -> Unknown:
-    """The unknown; that of an initial posture is free to be where the trace shows it."""
+    """The unknown; an initial posture gets a prior so wide that the trace decides it."""
     if unknown.kind is not Kind.INITIAL_POSITION or unknown.deviation is None:
         return unknown
     limit = 2 * LOOSE_START * unknown.deviation
@@ -335,7 +340,8 @@ def _loose_start(unknown: Unknown) -> Unknown:
 
 
 def _even_bend(unknown: Unknown, model: Model) -> Unknown:
-    """The unknown; the bends of a sound potentiometer get equal priors: nothing says that its curve is smooth."""
+    """The unknown; all bends of a sound potentiometer get the same prior, because nothing says that its curve is
+    smooth."""
     if not (unknown.nuisance and unknown.parameter.effect == "potentiometer_nonlinearity"):
         return unknown
     sensor = model.machine.joint(unknown.joints[0]).sensor
@@ -345,7 +351,7 @@ def _even_bend(unknown: Unknown, model: Model) -> Unknown:
 
 
 def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """`work` of every item, in their order, `AT_ONCE` at a time: simulations hold no lock of Python's, so two fits take
+    """`work` of every item, in their order, `AT_ONCE` at a time: simulations release Python's lock, so two fits take
     little longer than one. Raises what the first item that fails raises."""
     with ThreadPoolExecutor(AT_ONCE) as threads:
         return list(threads.map(work, items))

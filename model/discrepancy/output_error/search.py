@@ -1,4 +1,4 @@
-"""Least squares with derivatives that are kept: what fits the tolerance parameters, alone and with a candidate.
+"""Least squares with kept derivatives. It fits the tolerance parameters, alone and together with a candidate.
 
 Derivatives take most of the time, and those by the tolerance parameters change little when an effect is added. So they
 are computed once and kept. Every simulation of a step, also of one that does not descend, corrects them along the step
@@ -13,15 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.fitting.bounded_step import bounded_step
-from model.fitting.unknowns import Unknown
-from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3.0))
 """Steps that are tried, as a share of the whole one and a damping in shares of the information's diagonal (Marquardt
@@ -34,35 +31,17 @@ MOST_SEARCHES = 8
 
 
 @dataclass(frozen=True)
-class Point:
-    """Values of the unknowns, and the residual that they leave of an observation.
+class Point(Calibration):
+    """A calibration, and the residual that it leaves of an observation.
 
-    values (p,); residuals: measured − simulated (m, n) rad per record; weighted (N,): the same in standard deviations
-    of a reading; tangents (p, N): derivatives of the weighted readings, at this point or one near it.
+    residuals: measured − simulated (m, n) rad per record; weighted (N,): the same in standard deviations of a reading;
+    tangents (p, N): derivatives of the weighted readings, at this point or one near it.
     """
 
     observation: Observation
-    model: Model
-    unknowns: tuple[Unknown, ...]
-    values: Floats
     residuals: Signals
     weighted: Floats
     tangents: Floats
-
-    @property
-    def precision(self) -> Floats:
-        """(p,) one over the prior variance; 0 where nothing is claimed."""
-        return np.array([0.0 if u.deviation is None else u.deviation**-2 for u in self.unknowns])
-
-    @property
-    def expected(self) -> Floats:
-        """(p,) means of the priors."""
-        return np.array([u.expected for u in self.unknowns])
-
-    @property
-    def prior(self) -> float:
-        """−2 ln prior, up to a constant."""
-        return float(np.sum(self.precision * (self.values - self.expected) ** 2))
 
     @property
     def cost(self) -> float:
@@ -80,45 +59,27 @@ class Point:
         return self.tangents @ self.tangents.T + np.diag(self.precision)
 
     @property
-    def by_name(self) -> dict[str, float]:
-        """Values by the unknowns' names."""
-        return {u.name: float(v) for u, v in zip(self.unknowns, self.values, strict=True)}
-
-    @property
-    def fitted_model(self) -> Model:
-        """The model with the point's values, where they are parameters of it."""
-        return self.model.with_values({n: v for n, v in self.by_name.items() if n in self.model.by_name})
-
-    @property
     def is_finite(self) -> bool:
         """Whether the simulation stayed finite."""
         return bool(np.isfinite(self.weighted).all())
-
-    def value(self, name: str) -> float:
-        """Value of one unknown."""
-        return float(self.values[[u.name for u in self.unknowns].index(name)])
-
-    def residuals_on(self, observation: Observation) -> Signals:
-        """Measured − simulated (m, n) rad of other records with the point's values."""
-        return observation.residuals(self.model, self.unknowns, self.values)
 
     def on(self, observation: Observation, tangents: Floats | None = None) -> Point:
         """The point of the same values on another observation; derivatives are computed unless given.
 
         Raises SpecError when the simulation does not stay finite.
         """
-        return point_at(observation, self.model, self.unknowns, self.values, tangents)
+        return point_at(observation, self, tangents)
 
     def moved_to(self, values: Floats) -> Point:
         """The point at other values, with this one's derivatives."""
-        return point_at(self.observation, self.model, self.unknowns, values, self.tangents)
+        return point_at(self.observation, self.at(values), self.tangents)
 
     def with_new_tangents(self, which: Sequence[int] | None = None) -> Point:
         """The point with derivatives computed at it, by the unknowns of these indices or by all.
 
         Raises SpecError when the simulation does not stay finite.
         """
-        new = self.observation.tangents(self.model, self.unknowns, self.values, which)
+        new = self.observation.tangents(self, which)
         if which is None:
             return replace(self, tangents=new)
         tangents = self.tangents.copy()
@@ -126,18 +87,16 @@ class Point:
         return replace(self, tangents=tangents)
 
 
-def point_at(
-    observation: Observation, model: Model, unknowns: Sequence[Unknown], values: Floats, tangents: Floats | None = None
-) -> Point:
-    """A point; derivatives are computed unless some of a point near it are given.
+def point_at(observation: Observation, tried: Calibration, tangents: Floats | None = None) -> Point:
+    """The point of a calibration; derivatives are computed unless some of a point near it are given.
 
     Raises SpecError when the simulation does not stay finite.
     """
-    unknowns = tuple(unknowns)
     if tangents is None:
-        tangents = observation.tangents(model, unknowns, values)
-    residuals = observation.residuals(model, unknowns, values)
-    return Point(observation, model, unknowns, values, residuals, observation.weighted(residuals), tangents)
+        tangents = observation.tangents(tried)
+    residuals = observation.residuals(tried)
+    weighted = observation.weighted(residuals)
+    return Point(tried.model, tried.unknowns, tried.values, observation, residuals, weighted, tangents)
 
 
 def descend(point: Point, steps: int, changing: Sequence[int] = (), goal: float = math.inf) -> Point:

@@ -87,8 +87,8 @@ def _left(point: Point) -> Left:
     """
     closed_loop = point.observation.with_feedback_share(0.0)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in point.model.by_name]
-    unknowns, values = [point.unknowns[k] for k in kept], point.values[kept]
-    return lambda model: closed_loop.residuals(model, unknowns, values)
+    starts = point.only(kept)
+    return lambda model: closed_loop.residuals(starts.of(model))
 
 
 def _sum_lambda2(point: Point, before: Point) -> float:

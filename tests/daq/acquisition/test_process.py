@@ -60,9 +60,9 @@ def ask_at_the_socket(_process: Running) -> None:
 @pytest.mark.parametrize(
     ("end_it", "reason"),
     [
-        (send_signal(signal.SIGTERM), "stopped by a signal"),
-        (speak, "stopped by Ctrl-C, or by the program that started the run"),
-        (ask_at_the_socket, "stopped on request, by daq stop or through the service"),
+        (send_signal(signal.SIGTERM), "by a signal"),
+        (speak, "by Ctrl-C, or by the program that started the run"),
+        (ask_at_the_socket, "on request, by daq stop or through the service"),
     ],
     ids=["SIGTERM", "its parent", "the stop socket"],
 )

@@ -1,4 +1,4 @@
-"""The operator's word is True, and nothing that only counts as true."""
+"""The operator's consent is True, and nothing that only counts as true."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_what_is_like_it_is_refused_before_anything_is_asked(word: object) -> No
     with Client("http://127.0.0.1:1") as client:
         robot = client.robot("ma2000")
         for say in (lambda: robot.control(moves_real_arm=given), lambda: robot.queue.resume(moves_real_arm=given)):
-            with pytest.raises(SpecError, match="True is the operator's word"):
+            with pytest.raises(SpecError, match="True is the operator's consent"):
                 say()
 
 

@@ -150,7 +150,7 @@ def test_a_restarted_board_is_a_fault_even_if_its_ticks_go_on() -> None:
 
 def test_a_board_frozen_by_somebody_else_stops_the_run() -> None:
     verdict = running().check(row(7, status=StatusFlag.FROZEN), {})
-    assert verdict.stop == "stopped on the board at tick 7"
+    assert verdict.stop == "on the board, at tick 7"
     assert not verdict.trips
 
 

@@ -148,7 +148,7 @@ def test_set_points_never_run_further_ahead_than_the_following_error_limit() -> 
 def test_a_stop_from_elsewhere_ends_it() -> None:
     arm = StandIn()
     arm.frozen = True
-    with pytest.raises(StoppedError, match="stopped on the board at tick 1"):
+    with pytest.raises(StoppedError, match="stopped: on the board, at tick 1"):
         driven(arm, {1: 0.1}, held_until=10, periods=10)
     assert arm.log == ["stop"]
 

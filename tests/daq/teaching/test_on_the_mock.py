@@ -109,7 +109,7 @@ def test_nothing_is_switched_after_a_stop(controller: Controller) -> None:
     asked = itertools.count()
 
     def ended() -> str | None:
-        return "stopped on request" if next(asked) >= 30 else None
+        return "on request" if next(asked) >= 30 else None
 
     before = controller.process().outputs
     with pytest.raises(StoppedError, match="on request"):
@@ -127,7 +127,7 @@ def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: Watche
     def ended() -> bool:
         if len(arm.seen) < 10:
             return False
-        arm.control.stop("stopped on request, by daq stop or through the service")
+        arm.control.stop("on request, by daq stop or through the service")
         return True
 
     with pytest.raises(StoppedError, match="through the service; the board confirmed: set points are frozen"):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
-from daq.trajectories import control_period, make_plan, plan, plan_move, snapped, start_angles
+from daq.trajectories import control_period, make_plan, plan, plan_move, representable_angles, start_angles
 from firmware_protocol.errors import UnitsError
 from tests.daq.trajectories.machines import MA2000, PERIOD, motion, planned
 
@@ -71,7 +71,7 @@ def specs(draw: st.DrawFn) -> ExperimentSpec:
 def test_every_plan_starts_where_the_arm_is_and_leaves_other_joints_alone(spec: ExperimentSpec) -> None:
     start = start_angles(spec, MA2000)
     made = plan(spec, MA2000, start)
-    assert np.array_equal(made.angles[0], snapped(MA2000, start))
+    assert np.array_equal(made.angles[0], representable_angles(MA2000, start))
     still = [joint - 1 for joint in range(1, 7) if joint not in spec.joints]
     assert (made.postures[:, still] == made.postures[0, still]).all()
     assert np.isfinite(made.angles).all()
@@ -125,7 +125,7 @@ def test_postures_are_rounded_by_the_rule_of_the_wire(joint: int, angles: list[f
 def test_a_posture_is_where_it_is_snapped_to(joint: int, posture: int) -> None:
     angles = REST.tolist()
     angles[joint - 1] = MA2000.calibration(joint).posture_to_rad(posture)
-    made = make_plan(MA2000, (), snapped(MA2000, angles)[None, :])
+    made = make_plan(MA2000, (), representable_angles(MA2000, angles)[None, :])
     assert made.postures[0, joint - 1] == posture
 
 
@@ -137,7 +137,7 @@ def test_a_set_point_outside_the_range_is_planned_as_it_is_and_not_clipped() -> 
 def test_a_reading_in_the_last_fraction_of_the_range_is_posture_999() -> None:
     angles = REST.tolist()
     angles[0] = MA2000.calibration(1).counts_to_rad(4095)
-    assert make_plan(MA2000, (), snapped(MA2000, angles)[None, :]).postures[0, 0] == 999
+    assert make_plan(MA2000, (), representable_angles(MA2000, angles)[None, :]).postures[0, 0] == 999
 
 
 @pytest.mark.parametrize(
@@ -219,8 +219,8 @@ def test_a_move_to_a_start_arrives_together_and_never_exceeds_its_speed(
     offset = np.array([math.pi, math.pi / 2, 0, 0, 0, 0])
     start, target = (offset + [pair[end] for pair in ends] for end in (0, 1))
     made = plan_move(MA2000, start.tolist(), target.tolist(), speed)
-    assert np.array_equal(made.angles[0], snapped(MA2000, start.tolist()))
-    assert made.angles[-1] == pytest.approx(snapped(MA2000, target.tolist()))
+    assert np.array_equal(made.angles[0], representable_angles(MA2000, start.tolist()))
+    assert made.angles[-1] == pytest.approx(representable_angles(MA2000, target.tolist()))
     assert np.abs(np.diff(made.angles, axis=0)).max(initial=0) <= speed * PERIOD * (1 + 1e-9)
     assert set(made.moving) == {joint + 1 for joint in np.flatnonzero(made.postures[0] != made.postures[-1])}
 

@@ -77,7 +77,7 @@ def test_an_answer_without_steps_shows_what_it_rests_on(answer: Diagnosis) -> No
     )
     text = " ".join(answer_text(bare).split())
     assert f"where {step.where.summary}" in text
-    best = "The best of 7 candidates, Coulomb friction on joint 2, has an evidence of 2; an effect is named from 10."
+    best = "The best of 7 candidates, Coulomb friction on joint 2, has evidence of 2; an effect is named from 10."
     assert best in text
     assert "rms error on traces fitted to, model as given → with its tolerances fitted (noise)" in text
     assert "rms error on traces held out, model as given" in text

@@ -192,7 +192,7 @@ def test_looking_less_often_and_in_coarser_steps_gives_the_same(
 ) -> None:
     parts = with_effect(name, **values)
     quick = separation(parts, short(), known)
-    monkeypatch.setattr(hidden_separation, "_AS_FORETOLD", -1.0)
+    monkeypatch.setattr(hidden_separation, "_AS_PREDICTED", -1.0)
     monkeypatch.setattr(hidden_separation, "_CLEAR", math.inf)
     monkeypatch.setattr(hidden_separation, "_step_length", lambda _parts: 1000)
     thorough = separation(parts, short(), known)

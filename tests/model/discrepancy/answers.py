@@ -37,7 +37,7 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
     records = records_of([fit], before.machine, "position")
     deviations = noise_floor(records, before.machine, "position")
     left = Residuals(before, records, [residual(before, fit)], deviations)
-    value = FoundValue(value=TORQUE, low=7.8, high=8.2, unit="N·m")
+    value = FoundValue.of(after.parameter(NAME), TORQUE, 7.8, 8.2)
     candidates = (
         Candidate(effect=EFFECT, joints=(2,), evidence=2410.0, misfit=1.02, refitted=True, parameters={NAME: value}),
         Candidate(effect="stiction", joints=(2,), evidence=1890.0, misfit=1.31, refitted=True),

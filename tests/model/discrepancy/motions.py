@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.machine_model.model import Model
 from tests.model.fitting import imagined
-
-Floats = NDArray[np.float64]
 
 HOME = np.array([3.1, 0.9, -0.4])
 """rad: a posture of joints 1-3 with gravity on joint 2."""

@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
+from daq.contracts.service.jobs import ParameterWords
 from model.arrays import Floats
-from model.fitting.identifiability import judged
+from model.fitting.identifiability import judged, undetermined_in_words
 from model.fitting.unknowns import Unknown, torque_power
 from model.machine_model.parameter import Kind, Parameter
 
@@ -78,6 +79,9 @@ def test_a_sum_is_named_as_a_combination() -> None:
     assert {m.name for m in only.members} == {"a", "b"}
     assert only.members[0].change == pytest.approx(-only.members[1].change)
     assert [p.verdict for p in report.parameters] == ["combination", "combination", "known"]
+    words = {"a": ParameterWords(joint=2, group="joint 2", short="friction", label="J2 friction")}
+    assert only.text in ("together a +1 %, b −1 %", "together a −1 %, b +1 %")
+    assert undetermined_in_words(report, words) == (only.text.replace("a ", "J2 friction "),)
 
 
 def test_a_parameter_without_influence_is_unknown_and_says_why() -> None:

@@ -131,8 +131,7 @@ def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparis
     assert all(any(isinstance(b, Picture) for b in s.blocks) for s in report.sections[:4])
     text = words(html(report))
     assert (
-        "The best of 5 candidates, Coulomb friction on joint 2, has an evidence of 3; an effect is named from 10."
-        in text
+        "The best of 5 candidates, Coulomb friction on joint 2, has evidence of 3; an effect is named from 10." in text
     )
     assert "and no effect was added" in text
     assert "tables above" not in text

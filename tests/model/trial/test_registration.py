@@ -8,7 +8,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
-from model.trial.arms import KINDS, LOADS, arms, compose, drawn_arms, parse_choice, parse_numbers, some_of
+from model.trial.arms import KINDS, LOADS, arms, compose, drawn_arms, parse_choice, parse_numbers, sample_arms
 from model.trial.registration import parse_registration
 
 TEXT = """
@@ -57,12 +57,12 @@ def test_arms_carry_the_loads_in_turn() -> None:
 
 def test_some_of_the_seeds_are_of_all_kinds_and_the_same_each_time() -> None:
     seeds = [compose(number, kind, "nominal") for kind in KINDS for number in range(20)]
-    some = some_of(seeds, 30)
+    some = sample_arms(seeds, 30)
     assert len(some) == 30
-    assert some == some_of(seeds[::-1], 30)
-    assert some[:10] == some_of(seeds, 10)
+    assert some == sample_arms(seeds[::-1], 30)
+    assert some[:10] == sample_arms(seeds, 10)
     assert {seed // 10 % 10 for seed in some} == set(KINDS.values())
-    assert some_of(seeds[:2], 5) == some_of(seeds[:2], 2)
+    assert sample_arms(seeds[:2], 5) == sample_arms(seeds[:2], 2)
 
 
 def test_seeds_drawn_from_a_commit_are_new_with_each_commit_and_far_from_those_for_tuning() -> None:

@@ -13,22 +13,24 @@ from uvicorn.server import ServerState
 
 from server.access.connections import MOST_HEADERS, Connection
 
-MOST = 4
-
 
 async def _answer(scope: Scope, receive: Receive, send: Send) -> None:
     await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"0")]})
     await send({"type": "http.response.body", "body": b""})
 
 
-def test_a_crowd_that_asks_for_nothing_keeps_nobody_out_and_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.access.connections.MOST_CONNECTIONS", MOST)
+class OneOfFew(Connection):
+    """A connection of which there may be only four."""
 
+    most = 4
+
+
+def test_a_crowd_that_asks_for_nothing_keeps_nobody_out_and_does_not_grow() -> None:
     async def asked(listener: socket.socket) -> tuple[int, int]:
         config, state = uvicorn.Config(_answer, lifespan="off", log_config=None), ServerState()
         loop, address = asyncio.get_running_loop(), listener.getsockname()
-        server = await loop.create_server(lambda: Connection(config, state, {}), sock=listener)
-        crowd = [await asyncio.open_connection(*address) for _ in range(3 * MOST)]
+        server = await loop.create_server(lambda: OneOfFew(config, state, {}), sock=listener)
+        crowd = [await asyncio.open_connection(*address) for _ in range(3 * OneOfFew.most)]
         async with httpx.AsyncClient() as client:
             status = (await client.get(f"http://127.0.0.1:{address[1]}", timeout=60)).status_code
         held = len(state.connections)
@@ -43,7 +45,7 @@ def test_a_crowd_that_asks_for_nothing_keeps_nobody_out_and_does_not_grow(monkey
     with socket.create_server(("127.0.0.1", 0)) as listener:
         status, held = asyncio.run(asked(listener))
     assert status == 200
-    assert held <= MOST
+    assert held <= OneOfFew.most
 
 
 class _Transport(asyncio.Transport):

@@ -9,7 +9,6 @@ import pytest
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import MotionPreview
-from server.access import lanes
 from server.access.lanes import AT_ONCE, MOST_WAITING, Lanes
 from server.bounded.messages import Limits, WorkOutMotion
 from server.bounded.motion import preview_of
@@ -42,11 +41,9 @@ def test_a_caller_has_a_few_turns_and_another_one_as_many() -> None:
     asyncio.run(turns())
 
 
-def test_nobody_waits_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lanes, "WAIT_AT_MOST", 0.001)
-
+def test_nobody_waits_for_ever() -> None:
     async def turns() -> None:
-        desk = Lanes()
+        desk = Lanes(wait_at_most=0.001)
         async with desk.turn("anna"), desk.turn("anna"):
             with pytest.raises(ProblemError, match="have waited for their turn"):
                 async with desk.turn("anna"):

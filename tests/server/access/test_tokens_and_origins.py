@@ -251,15 +251,13 @@ def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(tmp_path: Path) -
     store.close()
 
 
-def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.access.gate.LOOK_EVERY", 0.001)
+def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(tmp_path: Path) -> None:
     clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
     store.migrate()
     tokens, tickets = TokenStore(store), Tickets(clock)
     token = tokens.add("anna", "operator", clock.utc())
-    gate, sent, ended = Gate(KnownTokens(tokens, clock), tickets, open_on_loopback=False), [], []
+    gate = Gate(KnownTokens(tokens, clock), tickets, open_on_loopback=False, look_every=0.001)
+    sent, ended = [], []
 
     async def watches(_scope: Scope, _receive: Receive, send: Send) -> None:
         await send({"type": "websocket.accept"})

@@ -109,7 +109,7 @@ def service_with_gains(service: Service) -> Iterator[Service]:
 
 def _lease(service: Service) -> str:
     answer = service.robot.post("/control", json={})
-    assert answer.status_code == 200, answer.text
+    assert answer.status_code == 201, answer.text
     lease: str = answer.json()["lease"]
     return lease
 

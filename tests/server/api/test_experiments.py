@@ -52,7 +52,7 @@ def test_a_running_experiment_is_cancelled_by_a_stop_and_the_queue_waits_for_a_p
     assert (ended["state"], ended["outcome"], ended["reason"]) == ("cancelled", "stopped", "cancelled by local")
     status = service.status()
     assert status["arm"] == "stopped"
-    assert status["cause"].startswith("stopped by the service: what ran was cancelled")
+    assert status["cause"].startswith("by the service: what ran was cancelled")
     assert status["queue"]["paused"]
     assert "look at the arm" in status["queue"]["reason"]
     assert service.robot.post("/queue/resume", json={}).status_code == 409
@@ -76,4 +76,4 @@ def test_a_stop_while_nothing_waits_pauses_the_queue_until_it_is_resumed(service
     assert service.robot.post("/reset", json={}).status_code == 200
     service.until_arm("idle")
     queue = service.robot.get("/queue").json()
-    assert (queue["paused"], queue["reason"][:22]) == (True, "local asked for a stop")
+    assert (queue["paused"], queue["reason"][:22]) == (True, "local requested a stop")

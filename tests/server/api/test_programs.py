@@ -110,14 +110,15 @@ def test_what_is_gone_or_another_robots_is_not_there(programs: ProgramStore, clo
         programs.remove(ROBOT, "pick")
 
 
-def test_there_is_an_end_to_how_many_are_kept(
-    programs: ProgramStore, clock: HandClock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_there_is_an_end_to_how_many_are_kept(tmp_path: Path, clock: HandClock) -> None:
     assert MOST_PROGRAMS == 1000
-    monkeypatch.setattr("server.store.programs.MOST_PROGRAMS", 1)
+    store = Store(f"sqlite:///{tmp_path / 'few.sqlite'}")
+    store.migrate()
+    programs = ProgramStore(store, most=1)
     _put(programs, clock, _program())
     with pytest.raises(ProblemError, match="there are 1 programs"):
         _put(programs, clock, _program("place"))
+    store.close()
 
 
 def test_a_list_reads_no_programs_and_a_damaged_one_is_told(tmp_path: Path, clock: HandClock) -> None:

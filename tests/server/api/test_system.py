@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import httpx
 import pytest
+from sqlalchemy import event
 from sqlalchemy.exc import OperationalError
 
 from server.clock import SystemClock
@@ -51,7 +52,7 @@ def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_rob
     stranger = api.get(address, headers=STRANGER)
     assert stranger.status_code == 503
     checks = stranger.json()["checks"]
-    assert {checks["database"], checks["traces"]} == {"not well: a token is needed to be told more"}
+    assert {checks["database"], checks["traces"]} == {"not well: details need a token"}
     assert "/the/folder" not in stranger.text
 
 
@@ -74,12 +75,10 @@ def test_readiness_is_looked_at_once_for_all_who_ask_and_again_after_a_second() 
     asyncio.run(ask())
 
 
-def test_a_database_that_can_be_read_and_not_written_is_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.store.engine.BUSY_TIMEOUT_MS", 1)
+def test_a_database_that_can_be_read_and_not_written_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "service.sqlite"
     store = Store(f"sqlite:///{path}")
+    event.listen(store.engine, "connect", lambda connection, _: connection.execute("PRAGMA busy_timeout=1"))
     store.migrate()
     before = store.changes
     store.require_writable()

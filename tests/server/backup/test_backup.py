@@ -129,7 +129,7 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     store.close()
 
 
-@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "paused by anna", NOW)])
+@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "by anna", NOW)])
 def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
     here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
     store = Store(here.url)
@@ -147,7 +147,7 @@ def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) 
 
 def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
     assert archive.stat().st_mode & 0o077 == 0
-    with pytest.raises(BackupError, match="is there already"):
+    with pytest.raises(BackupError, match="exists already"):
         back_up(places_in(tmp_path / "here"), archive, NOW, quietly)
     assert verify(archive).count("traces") == 2
 
@@ -184,7 +184,7 @@ def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archi
     places = filled(tmp_path / "there")
     (places.traces / "aaa.mcap").write_bytes(b"another trace of this number")
     before = everything(tmp_path / "there")
-    with pytest.raises(BackupError, match=r"are there already .*: with --overwrite they are put aside"):
+    with pytest.raises(BackupError, match=r"exist already .*: with --overwrite they are moved aside"):
         restore(archive, places, NOW, quietly)
     assert everything(tmp_path / "there") == before
     restored = restore(archive, places, NOW, quietly, overwrite=True)
@@ -292,15 +292,11 @@ def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path)
         pass
 
 
-def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(
-    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.backup.write.RESERVE", 1 << 60)
+def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(archive: Path, tmp_path: Path) -> None:
     with pytest.raises(BackupError, match="are free, a backup needs"):
-        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly)
-    monkeypatch.setattr("server.backup.restore.RESERVE", 1 << 60)
+        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly, reserve=1 << 60)
     with pytest.raises(BackupError, match="are needed"):
-        restore(archive, places_in(tmp_path / "there"), NOW, quietly)
+        restore(archive, places_in(tmp_path / "there"), NOW, quietly, reserve=1 << 60)
     assert not (tmp_path / "second.zip").exists()
     assert everything(tmp_path / "there") == {}
     assert {path.name for path in tmp_path.iterdir()} == {"here", "there", "arm.zip"}
@@ -317,7 +313,7 @@ def daq(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(service.folder)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
-    return CommandLine(capsys, monkeypatch)
+    return CommandLine(capsys)
 
 
 def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
@@ -341,7 +337,7 @@ def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
     said = daq("restore", "../arm.zip")
     assert said.code == 0, said.err
     assert f"{trace[:8]}" in daq("traces", "ls").out
-    daq("restore", "../arm.zip").complains(2, "are there already")
+    daq("restore", "../arm.zip").complains(2, "exist already")
     store = Store(f"sqlite:///{tmp_path / 'elsewhere' / 'service' / 'service.sqlite'}")
     experiments = ExperimentStore(store)
     assert experiments.get("ma2000", done).state == "done"
@@ -353,7 +349,7 @@ def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
 def test_what_cannot_be_backed_up_or_restored_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
     daq("restore", str(tmp_path / "none.zip")).complains(2, "none.zip", "cannot be read")
     (tmp_path / "no.zip").write_text("no")
-    daq("restore", str(tmp_path / "no.zip"), "--check").complains(2, "is damaged, or no backup")
+    daq("restore", str(tmp_path / "no.zip"), "--check").complains(2, "is damaged, or not a backup")
     daq("backup", str(tmp_path / "no" / "folder.zip")).complains(2, "cannot be written")
 
 
@@ -364,5 +360,5 @@ def test_the_configured_places(tmp_path: Path) -> None:
     places = places_of(Settings(server=ServiceSettings(folder=tmp_path)))
     assert places.target(DATABASE) == tmp_path / "service.sqlite"
     assert places.target("jobs/0123456789ab/result.json") == tmp_path / "jobs" / "0123456789ab" / "result.json"
-    with pytest.raises(BackupError, match="is no file"):
+    with pytest.raises(BackupError, match="is not a file"):
         places_of(Settings(server=ServiceSettings(database="postgresql://x/y")))

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 from mcap.writer import Writer
@@ -24,16 +24,19 @@ from server.problems import ProblemError
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
+from tests.server.meanwhile import Meanwhile, raising
 
 ROBOT = "ma2000"
 
 
 @dataclass
 class Shelf:
-    """A catalogue with one trace, which has a tag; `copy` is its file elsewhere."""
+    """A catalogue with one trace, which has a tag; `copy` is its file elsewhere. Something may happen at a call of
+    `experiments`."""
 
     catalogue: Catalogue
     traces: TraceStore
+    experiments: Meanwhile
     number: str
     path: Path
     copy: Path
@@ -49,7 +52,8 @@ def shelf(tmp_path: Path) -> Iterator[Shelf]:
     store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
     store.migrate()
     traces = TraceStore(store)
-    catalogue = Catalogue(tmp_path / "traces", ROBOT, traces, ExperimentStore(store))
+    experiments: Any = Meanwhile(ExperimentStore(store))
+    catalogue = Catalogue(tmp_path / "traces", ROBOT, traces, experiments)
     table, copy = tmp_path / "table.csv", tmp_path / "copy.mcap"
     table.write_text("time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50)))
     trace = import_csv(table)
@@ -59,7 +63,7 @@ def shelf(tmp_path: Path) -> Iterator[Shelf]:
     path.write_bytes(copy.read_bytes())
     assert catalogue.add(path) == trace.record.trace_id
     traces.change(ROBOT, trace.record.trace_id, TraceChange(tags=("rig b",), notes="loose belt"))
-    yield Shelf(catalogue, traces, trace.record.trace_id, path, copy)
+    yield Shelf(catalogue, traces, experiments, trace.record.trace_id, path, copy)
     store.close()
 
 
@@ -87,7 +91,7 @@ def test_a_trace_whose_file_is_gone_comes_back_with_a_file(shelf: Shelf, noticed
 
 
 def test_a_trace_that_is_there_is_not_taken_in_again(shelf: Shelf) -> None:
-    with pytest.raises(ProblemError, match="is there already"):
+    with pytest.raises(ProblemError, match="exists already"):
         shelf.catalogue.move_in(shelf.copy, shelf.path, summary_of(shelf.copy))
     other = shelf.catalogue.folder / "other.mcap"
     assert not shelf.catalogue.move_in(shelf.copy, other, summary_of(shelf.copy))
@@ -136,15 +140,9 @@ def test_a_file_that_cannot_be_taken_in_keeps_no_other_out(shelf: Shelf, caplog:
     assert "its name is not UTF-8" in lines[3]
 
 
-def test_no_row_without_a_file_stays_where_its_experiment_cannot_be_told(
-    shelf: Shelf, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_row_without_a_file_stays_where_its_experiment_cannot_be_told(shelf: Shelf) -> None:
     shelf.catalogue.remove(shelf.number)
-
-    def fails(*_: object) -> NoReturn:
-        raise OSError("the disk is away")
-
-    monkeypatch.setattr(ExperimentStore, "traced", fails)
+    shelf.experiments.before("traced", raising(OSError("the disk is away")))
     with pytest.raises(OSError, match="away"):
         shelf.catalogue.move_in(shelf.copy, shelf.path, summary_of(shelf.copy))
     assert shelf.traces.get(ROBOT, shelf.number).file == shelf.path.name

@@ -57,6 +57,8 @@ def test_a_diagnosis_is_told_with_its_pictures() -> None:
     assert [c.evidence for c in step.candidates] == [c.evidence for c in answer.steps[0].candidates]
     assert 2.0 < step.chance < 6.0
     assert [d.name for d in found.differences] == ["joint2.coulomb_friction.torque"]
+    assert found.words["joint2.coulomb_friction.torque"].label == "J2 Coulomb friction torque"
+    assert found.words["link1.mass"].joint == 1
     assert [m.label for m in found.models] == ["before", "after"]
     assert all(len(one.time) >= LEAST_POINTS for one in found.signals)
     again = DiagnosisData.model_validate_json(found.model_dump_json())
@@ -67,8 +69,9 @@ def test_a_diagnosis_is_told_with_its_pictures() -> None:
 
 def test_an_answer_from_before_it_told_what_is_significant_still_opens() -> None:
     stored = diagnosis_data(an_answer(4.0)[0], None).model_dump(mode="json")
-    del stored["significant"]
-    assert DiagnosisData.model_validate(stored).significant is None
+    del stored["significant"], stored["words"]
+    opened = DiagnosisData.model_validate(stored)
+    assert (opened.significant, opened.words) == (None, {})
 
 
 def test_headlines_name_what_was_found() -> None:

@@ -32,6 +32,7 @@ from server.store.models import ModelStore
 from server.store.traces import TraceStore
 from tests.daq.traces.samples import write
 from tests.server.clocks import HandClock
+from tests.server.meanwhile import Meanwhile, raising
 from tests.server.store.rows import new_trace
 
 MACHINE = load_machine("ma2000")
@@ -56,21 +57,22 @@ class HandExecutor(Executor):
 
 
 class Bench:
-    """A desk, its stores, and everything that it has told."""
+    """A desk, its stores, at whose calls something may happen, and everything that it has told."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder / "jobs"
         self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
         self.store.migrate()
-        self.jobs = JobStore(self.store)
+        self.jobs: Any = Meanwhile(JobStore(self.store))
         self.clock = HandClock()
-        self.traces = TraceStore(self.store)
+        self.traces: Any = Meanwhile(TraceStore(self.store))
         traces = folder / "traces"
         traces.mkdir()
         self.catalogue = Catalogue(traces, "ma2000", self.traces, ExperimentStore(self.store))
         self.traces.insert(new_trace(1))
         (traces / "1.mcap").touch()
-        self.models = Models(folder / "models", "ma2000", MACHINE, ModelStore(self.store), self.clock)
+        models = Models(folder / "models", "ma2000", MACHINE, ModelStore(self.store), self.clock)
+        self.models: Any = Meanwhile(models)
         self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")
         self.executor = HandExecutor(self._carry_out)
         self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
@@ -106,11 +108,15 @@ class Bench:
         """Waits for it; the test's own time limit ends the wait."""
         with self.changed:
             self.changed.wait_for(lambda: self.state_of(job) not in ("queued", "running"))
-        return self.jobs.get("ma2000", job.id)
+        return self._kept(job)
 
     def state_of(self, job: Job) -> str:
         """As the database says."""
-        return self.jobs.get("ma2000", job.id).state
+        return self._kept(job).state
+
+    def _kept(self, job: Job) -> Job:
+        found: Job = self.jobs.get("ma2000", job.id)
+        return found
 
 
 @pytest.fixture
@@ -154,37 +160,18 @@ def test_a_job_that_is_cancelled_as_it_is_handed_over_is_told_to_end_and_the_nex
     assert bench.end_of(first).state == "cancelled"
 
 
-def test_a_job_that_is_cancelled_just_before_it_is_taken_is_never_computed(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_job_that_is_cancelled_just_before_it_is_taken_is_never_computed(bench: Bench) -> None:
     first, second = _submitted(bench), _submitted(bench)
-    waiting = bench.jobs.waiting
-
-    def then_cancelled(robot: str) -> list[Job]:
-        found = waiting(robot)
-        monkeypatch.setattr(bench.jobs, "waiting", waiting)
-        bench.desk.cancel(first.id, "anna")
-        return found
-
-    monkeypatch.setattr(bench.jobs, "waiting", then_cancelled)
+    bench.jobs.after("waiting", lambda: bench.desk.cancel(first.id, "anna"))
     bench.desk.start()
     assert bench.end_of(second).state == "done"
     assert bench.state_of(first) == "cancelled"
     assert bench.executor.given == [second.id]
 
 
-def test_a_job_that_begins_while_it_is_being_cancelled_is_told_to_end(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_job_that_begins_while_it_is_being_cancelled_is_told_to_end(bench: Bench) -> None:
     job = _submitted(bench)
-    change = bench.jobs.change
-
-    def taken_first(*args: Any, **named: Any) -> Job:
-        monkeypatch.setattr(bench.jobs, "change", change)
-        change("ma2000", job.id, Event.TAKEN, bench.clock.utc())
-        return change(*args, **named)
-
-    monkeypatch.setattr(bench.jobs, "change", taken_first)
+    bench.jobs.before("change", lambda: bench.jobs.change("ma2000", job.id, Event.TAKEN, bench.clock.utc()))
     assert bench.desk.cancel(job.id, "anna").state == "running"
     assert (bench.folder / job.id / CANCEL).exists()
 
@@ -224,37 +211,20 @@ def _makes_a_model(folder: Path) -> Ended:
     return Ended(model=model.identity, headline="fitted")
 
 
-def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(bench: Bench) -> None:
     bench.carry_out = _makes_a_model
-    take_in = bench.models.take_in
-    refused: list[bool] = []
-
-    def fails_once(*args: Any) -> str:
-        if not refused:
-            refused.append(True)
-            raise OperationalError("INSERT", {}, Exception("database or disk is full"))
-        return take_in(*args)
-
-    monkeypatch.setattr(bench.models, "take_in", fails_once)
+    bench.models.before("take_in", raising(OperationalError("INSERT", {}, Exception("database or disk is full"))))
     job = bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
     bench.desk.start()
     ended = bench.end_of(job)
     assert (ended.state, ended.headline) == ("done", "fitted")
     assert ended.model is not None
     assert bench.models.path_of(ended.model).is_file()
-    assert refused
 
 
 @pytest.mark.parametrize("error", [ValueError("no model"), OSError("read-only")])
-def test_a_model_that_can_never_be_kept_holds_up_no_other_job(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
-    def fails(*_args: Any) -> str:
-        raise error
-
-    monkeypatch.setattr(bench.models, "take_in", fails)
+def test_a_model_that_can_never_be_kept_holds_up_no_other_job(bench: Bench, error: Exception) -> None:
+    bench.models.before("take_in", *[raising(error)] * 1000)
     bench.carry_out = lambda folder: _makes_a_model(folder) if folder.name == first.id else Ended()
     first = bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
     second = _submitted(bench)
@@ -265,21 +235,15 @@ def test_a_model_that_can_never_be_kept_holds_up_no_other_job(
         assert (failed.failure, failed.reason) == ("program-fault", "program fault: ValueError: no model")
 
 
-def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    waiting = bench.jobs.waiting
-
-    def locked(_robot: str) -> list[Job]:
-        monkeypatch.setattr(bench.jobs, "waiting", waiting)
-        raise OperationalError("SELECT", {}, Exception("database is locked"))
-
+def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench) -> None:
     job = _submitted(bench)
-    monkeypatch.setattr(bench.jobs, "waiting", locked)
+    bench.jobs.before("waiting", raising(OperationalError("SELECT", {}, Exception("database is locked"))))
     bench.desk.start()
     assert bench.end_of(job).state == "done"
 
 
 def _kept(bench: Bench) -> tuple[Job, ...]:
-    return bench.jobs.page("ma2000", (), None, None, 10).items
+    return tuple(bench.jobs.page("ma2000", (), None, None, 10).items)
 
 
 def test_there_is_no_job_without_its_request(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -307,31 +271,15 @@ def test_the_same_key_is_the_same_job_whatever_became_of_its_traces(bench: Bench
         bench.desk.submit(COMPARE, "anna", "another key")
 
 
-def test_a_job_refers_to_no_trace_that_is_deleted_as_it_is_submitted(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    submit = bench.jobs.submit
-
-    def deleted_first(*args: Any) -> tuple[Job, bool]:
-        bench.traces.remove("ma2000", TRACE)
-        return submit(*args)
-
-    monkeypatch.setattr(bench.jobs, "submit", deleted_first)
+def test_a_job_refers_to_no_trace_that_is_deleted_as_it_is_submitted(bench: Bench) -> None:
+    bench.jobs.before("submit", lambda: bench.traces.remove("ma2000", TRACE))
     with pytest.raises(ProblemError, match="there is no trace"):
         _submitted(bench)
     assert _kept(bench) == ()
 
 
-def test_a_trace_is_not_deleted_when_a_job_comes_to_refer_to_it_meanwhile(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    remove = bench.traces.remove
-
-    def submitted_first(*args: Any) -> None:
-        _submitted(bench)
-        remove(*args)
-
-    monkeypatch.setattr(bench.traces, "remove", submitted_first)
+def test_a_trace_is_not_deleted_when_a_job_comes_to_refer_to_it_meanwhile(bench: Bench) -> None:
+    bench.traces.before("remove", lambda: _submitted(bench))
     one = SimpleNamespace(robot=SimpleNamespace(name="ma2000"), catalogue=bench.catalogue)
     with pytest.raises(ProblemError, match="is used by"):
         delete_trace(TRACE, one, SimpleNamespace(traces=bench.traces), None)  # type: ignore[arg-type]

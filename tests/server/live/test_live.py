@@ -183,10 +183,7 @@ def test_a_client_that_takes_nothing_is_hopeless_and_one_that_waits_for_news_is_
     assert not outbox.is_hopeless(2000.0)
 
 
-def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_fault(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("server.api.stream.LOOK_EVERY", 0.001)
+def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_fault() -> None:
     clock = HandClock()
 
     async def never(*_: object) -> None:
@@ -196,7 +193,7 @@ def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_f
         hub = Hub(clock, History(6, 0.02, 1.0), lambda: pytest.fail("nobody asks for it"))
         socket = SimpleNamespace(accept=lambda: asyncio.sleep(0), receive=never, send_text=never, close=never)
         one = SimpleNamespace(robot=SimpleNamespace(clock=clock), hub=hub)
-        serving = asyncio.create_task(stream(socket, one, LOCAL))  # type: ignore[arg-type]
+        serving = asyncio.create_task(stream(socket, one, LOCAL, look_every=0.001))  # type: ignore[arg-type]
         while hub.clients == 0:
             await asyncio.sleep(0)
         (client,) = hub._clients

@@ -89,24 +89,21 @@ def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
     order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity="program")
     states, answers = served({2: order})
     assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
-    assert "the link is lost; it is being tried again" in answers[0].problem
+    assert "the link is lost; the service tries to reconnect" in answers[0].problem
     assert states[-1] == "idle"
 
 
-def test_a_reset_is_told_before_its_answer_though_the_stop_before_it_never_was(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_reset_is_told_before_its_answer_though_the_stop_before_it_never_was() -> None:
     """The service has noted the stop by then, and lets nobody resume the queue until it is told of another state."""
-    monkeypatch.setattr(long_orders, "answered_quickly", lambda _robot, order: Answer(number=order.number))
     told: list[int] = []
     _, answers = served({0: Reset(number=7, asked=time.monotonic(), here=False)}, anew=told)
     assert [answer.number for answer in answers] == [7]
     assert told == [0]
 
 
-def test_an_order_that_comes_late_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process was put aside with the order in its pipe, and goes on when nobody expects it any more."""
-    monkeypatch.setattr(long_orders, "perform", lambda *_: pytest.fail("the arm has begun"))
+def test_an_order_that_comes_late_moves_nothing() -> None:
+    """The process was put aside with the order in its pipe, and goes on when nobody expects it any more. Its program is
+    missing: a fault if it began."""
     late = time.monotonic() - BEGINS_WITHIN - 0.1
     order = cast(Any, RunProgram).model_construct(number=7, asked=late, activity="program")
     _, (answer,) = served({0: order})

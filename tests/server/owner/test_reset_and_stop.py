@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
 from daq.acquisition import stop_socket
 from daq.acquisition.guardian import EndCause, Guardian
+from daq.acquisition.speaker import Speaker
 from daq.acquisition.stop_socket import StopAnswer, request_stop, stop_listener
 from daq.contracts.errors import SafetyError
-from daq.driver import Controller
+from daq.contracts.machine import load_machine
 from daq.link import Link
 from daq.runner import ArmControl
 from daq.safety import State
@@ -24,7 +24,9 @@ from firmware_protocol.commands import ReadStatus, Release, Request, Stop, to_fr
 from firmware_protocol.framing import Frame
 from mock_controller.bridge.bridge import Bridge
 from server.owner.messages import Reset
+from server.owner.owned_robot import OwnedRobot
 from server.owner.quick_orders import carry_out
+from server.owner.watched_controller import WatchedController
 from tests.mock.in_process import InProcess
 
 
@@ -52,7 +54,7 @@ class Scene:
     endpoint: InProcess
     guardian: Guardian
     control: ArmControl
-    robot: Any
+    robot: OwnedRobot
 
     def press_stop(self) -> None:
         """On this computer: through the guardian."""
@@ -74,7 +76,7 @@ class Scene:
 
 @contextmanager
 def owner_at(endpoint: InProcess) -> Iterator[Scene]:
-    controller = Controller(Link(cast(Any, endpoint)))
+    machine, controller = load_machine("ma2000"), WatchedController(Link(cast(Any, endpoint)))
     control = ArmControl(controller)
 
     def freeze(cause: str) -> StopAnswer:
@@ -83,14 +85,8 @@ def owner_at(endpoint: InProcess) -> Iterator[Scene]:
         return StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)
 
     with stop_listener("arm") as listener, Guardian(listener, None, freeze) as guardian:
-        robot = SimpleNamespace(
-            activity="none",
-            controller=controller,
-            control=control,
-            guardian=guardian,
-            read_gains=controller.gains,
-            ended=lambda: guardian.cause and guardian.cause.value,
-        )
+        unheard, no_inbox = Speaker(-1), cast(Any, None)
+        robot = OwnedRobot("arm", machine, machine.limits, Path(), controller, control, guardian, no_inbox, unheard)
         yield Scene(endpoint, guardian, control, robot)
 
 

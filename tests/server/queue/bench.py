@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
 from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import Outcome
@@ -19,11 +20,13 @@ from server.owner.messages import Answer, ArmReport, Finished
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
 from server.robot.control import ControlService
+from server.robot.robot import RobotPlace
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from tests.server.clocks import HandClock
+from tests.server.meanwhile import Meanwhile
 
 CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
 MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
@@ -32,8 +35,30 @@ FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
 
 
+@dataclass
+class Arm:
+    """What the queue knows of a robot. ask: what becomes of an experiment; orders: what it was told besides"""
+
+    place: RobotPlace
+    ask: Callable[..., Future[Answer]]
+    orders: list[object]
+    identity: RobotIdentity | None = MOCK
+    arm: ArmReport | None = CALM
+    problem: str = ""
+    experiment: str | None = None
+
+    @property
+    def name(self) -> str:
+        """As in addresses and rows."""
+        return self.place.name
+
+    def tell(self, order: object) -> None:
+        """An order without an answer."""
+        self.orders.append(order)
+
+
 class Bench:
-    """A queue, its stores, an arm, and all events.
+    """A queue, its stores, at whose calls something may happen, an arm, and all events.
 
     answer:   what the arm answers an experiment with; None while it moves
     fails_at: the event whose listener fails, once
@@ -43,7 +68,8 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
         self.store.migrate()
-        self.experiments, self.schedules = ExperimentStore(self.store), ScheduleStore(self.store)
+        self.experiments: Any = Meanwhile(ExperimentStore(self.store))
+        self.schedules: Any = Meanwhile(ScheduleStore(self.store))
         self.clock = HandClock()
         self.answer: Answer | None = Answer(number=1, problem="refused", exit_code=2)
         self.asked: Future[Answer] = Future()
@@ -57,17 +83,9 @@ class Bench:
         self.control = ControlService(
             self.clock, lambda who: self._end("lapsed", who), lambda who: self._end("given_back", who)
         )
-        self.robot: Any = SimpleNamespace(
-            name="ma2000",
-            identity=MOCK,
-            arm=CALM,
-            problem="",
-            experiment=None,
-            place=SimpleNamespace(folder=folder),
-            ask=self._ask,
-            tell=self.orders.append,
-        )
-        self.queues = QueueStore(self.store)
+        place = RobotPlace("ma2000", "mock://", load_machine("ma2000"), folder)
+        self.robot: Any = Arm(place, self._ask, self.orders)
+        self.queues: Any = Meanwhile(QueueStore(self.store))
         self.queue = self.begun_anew()
 
     def close(self) -> None:
@@ -133,7 +151,9 @@ class Bench:
 
     def schedule(self, every: float = 3600) -> Schedule:
         """One whose first run is due now, and then every hour."""
-        return self.schedules.create("ma2000", ScheduleRequest(spec=SPEC, every=every), self.clock.utc(), "anna")
+        request = ScheduleRequest(spec=SPEC, every=every)
+        made: Schedule = self.schedules.create("ma2000", request, self.clock.utc(), "anna")
+        return made
 
     def runs(self, schedule: Schedule) -> list[Experiment]:
         """What it has submitted."""
@@ -141,7 +161,7 @@ class Bench:
 
     def counted(self, schedule: Schedule) -> int:
         """How many runs count as made."""
-        return self.schedules.get("ma2000", schedule.id).submitted_runs
+        return int(self.schedules.get("ma2000", schedule.id).submitted_runs)
 
 
 def done(outcome: Outcome = "complete") -> Answer:

@@ -34,7 +34,7 @@ def test_a_control_that_lapses(bench: Bench) -> None:
     while bench.control.take_for_queue("an experiment") is False:
         pass
     bench.control.give_back_for_queue()
-    _is_held(bench, f"the control of anna has lapsed: {LOOK}")
+    _is_held(bench, f"anna's control has lapsed: {LOOK}")
 
 
 def test_no_word_outlasts_the_sleep_of_the_computer(bench: Bench) -> None:
@@ -52,7 +52,7 @@ def test_a_control_that_lapses_while_the_queue_looks_for_work(bench: Bench) -> N
     bench.queue.start()
     bench.clock.turn(LEASE_TIME)
     bench.queue.wake()
-    bench.until(lambda event: event == f"queue: paused: the control of anna has lapsed: {LOOK}")
+    bench.until(lambda event: event == f"queue: paused: anna's control has lapsed: {LOOK}")
     assert "experiment: started" not in bench.events
 
 
@@ -62,7 +62,7 @@ def test_a_control_that_lapses_with_nothing_waiting_holds_what_a_schedule_brings
     bench.control.take("bert", moves_real_arm=True)  # tells that anna's has lapsed
     bench.schedule()
     bench.queue.start()
-    bench.until(lambda event: event == f"queue: paused: the control of anna has lapsed: {LOOK}")
+    bench.until(lambda event: event == f"queue: paused: anna's control has lapsed: {LOOK}")
     bench.until(lambda event: "queued by schedule" in event)
     assert "experiment: started" not in bench.events
 
@@ -71,7 +71,7 @@ def test_a_control_that_is_given_back_while_something_waits(bench: Bench) -> Non
     lease = bench.control.take("anna", moves_real_arm=True).lease
     bench.submit()
     bench.control.give_back(lease)
-    _is_held(bench, f"anna gave the control back while 1 experiment waited: {LOOK}")
+    _is_held(bench, f"anna gave control back while 1 experiment waited: {LOOK}")
 
 
 def test_a_control_that_is_given_back_while_nothing_waits_holds_nothing(bench: Bench) -> None:
@@ -87,7 +87,7 @@ def test_an_operator_who_left_holds_the_queue_though_nothing_waits_and_they_come
     bench.queue.resume("anna", moves_real_arm=True)
     bench.clock.turn(ATTENDANCE)
     bench.queue.attend()
-    _is_held(bench, f"no operator says to be there any more: {LOOK}")
+    _is_held(bench, f"no operator confirms presence any more: {LOOK}")
 
 
 def test_a_link_that_is_lost(bench: Bench) -> None:
@@ -132,20 +132,20 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
 def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -> None:
     bench.queue.stop_asked("anna")
     bench.schedule()
-    _is_held(bench, "anna asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+    _is_held(bench, "anna requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
 
 
 @pytest.mark.parametrize("taken", [True, False])
 def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: Bench, taken: bool) -> None:
-    bench.queue.pause("paused by anna", "anna")
+    bench.queue.pause("by anna", "anna")
     bench.queue.stop_asked("anna")
     seen = bench.queue.notices.seen  # a request that waits for the queue
     bench.queue.stop_asked("bert")
     if taken:
         bench.queue.notices.take()
     bench.queue.resume("anna", moves_real_arm=False, seen=seen)
-    assert bench.queue.status().reason.startswith("bert asked")
-    _is_held(bench, "bert asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+    assert bench.queue.status().reason.startswith("bert requested")
+    _is_held(bench, "bert requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
 
 
 def test_a_word_that_was_given_for_one_connection_is_none_for_the_next(bench: Bench) -> None:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import shutil
 import threading
-from collections.abc import Callable
 from datetime import timedelta
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.service.experiments import Experiment, ExperimentRequest
+from daq.contracts.service.experiments import ExperimentRequest
 from server.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
+from tests.server.meanwhile import raising
 from tests.server.queue.bench import CALM, FULL, REAL, SPEC, Bench, done
 
 
@@ -36,29 +35,17 @@ def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_r
     assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
 
 
-def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench) -> None:
     schedule = bench.schedule()
-    submit = bench.experiments.submit
-
-    def fails_once(*args: Any, **named: Any) -> tuple[Experiment, bool]:
-        monkeypatch.setattr(bench.experiments, "submit", submit)
-        raise OperationalError("INSERT", {}, Exception("database or disk is full"))
-
-    monkeypatch.setattr(bench.experiments, "submit", fails_once)
+    bench.experiments.before("submit", raising(FULL))
     bench.queue.start()
     bench.until(lambda event: "queued by schedule" in event)
     assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
 
 
-def test_an_experiment_is_made_only_with_the_count_of_its_run(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_experiment_is_made_only_with_the_count_of_its_run(bench: Bench) -> None:
     schedule = bench.schedule()
-    count = bench.schedules.count_run
-
-    def fails_once(*_args: Any) -> None:
-        monkeypatch.setattr(bench.schedules, "count_run", count)
-        raise OperationalError("UPDATE", {}, Exception("database or disk is full"))
-
-    monkeypatch.setattr(bench.schedules, "count_run", fails_once)
+    bench.schedules.before("count_run", raising(FULL))
     bench.queue.start()
     bench.until(lambda event: "queued by schedule" in event)
     assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
@@ -87,18 +74,6 @@ def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, e
     how = state if state == "failed" else f"was {state}"
     expected = f"{SPEC.name or SPEC.trajectory.kind} {how} (why): look at the arm, then resume the queue"
     assert bench.queue.status().reason == expected
-
-
-def _fails(times: int, otherwise: Callable[..., Any]) -> Callable[..., Any]:
-    """What a full disk makes of `otherwise`, and of those who call it again."""
-    left = [FULL] * times
-
-    def tried(*args: Any, **named: Any) -> Any:
-        if left:
-            raise left.pop()
-        return otherwise(*args, **named)
-
-    return tried
 
 
 def _is_free(bench: Bench) -> bool:
@@ -136,11 +111,9 @@ def test_a_trace_that_cannot_be_taken_in_holds_the_queue_and_is_looked_for(bench
     assert bench.experiments.get("ma2000", following.id).state == "queued"
 
 
-def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(bench: Bench) -> None:
     bench.answer = done()
-    monkeypatch.setattr(bench.experiments, "end", _fails(2, bench.experiments.end))
+    bench.experiments.before("end", raising(FULL), raising(FULL))
     made, following = bench.submit(), bench.submit()
     bench.queue.start()
     bench.until(lambda event: event.startswith("queue: paused"))
@@ -152,25 +125,21 @@ def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(
     assert bench.experiments.get("ma2000", following.id).state == "queued"
 
 
-def test_a_pause_holds_though_the_database_does_not_know_it_yet(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    write, written = bench.queues.set, threading.Event()
-
-    def then_told(*args: Any) -> None:
-        write(*args)
-        written.set()
-
-    monkeypatch.setattr(bench.queues, "set", _fails(1, then_told))
-    bench.queue.pause("paused by anna", "anna")
+def test_a_pause_holds_though_the_database_does_not_know_it_yet(bench: Bench) -> None:
+    written = threading.Event()
+    bench.queues.before("set", raising(FULL))
+    bench.queue.pause("by anna", "anna")
     assert bench.queue.status().paused
     assert bench.begun_anew().status().paused is False
+    bench.queues.after("set", written.set)
     bench.queue.start()
     written.wait()
-    assert bench.begun_anew().status().reason == "paused by anna"
+    assert bench.begun_anew().status().reason == "by anna"
 
 
-def test_a_queue_whose_resuming_cannot_be_written_stays_paused(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench.queue.pause("paused by anna", "anna")
-    monkeypatch.setattr(bench.queues, "set", _fails(1, bench.queues.set))
+def test_a_queue_whose_resuming_cannot_be_written_stays_paused(bench: Bench) -> None:
+    bench.queue.pause("by anna", "anna")
+    bench.queues.before("set", raising(FULL))
     with pytest.raises(OperationalError):
         bench.queue.resume("anna", moves_real_arm=True)
     assert bench.queue.status().paused
@@ -185,7 +154,7 @@ def test_a_pause_lets_the_one_that_runs_go_on_where_an_operator_must_be_there(be
     bench.submit()
     bench.queue.start()
     bench.moves.wait()
-    bench.queue.pause("paused by anna", "anna")
+    bench.queue.pause("by anna", "anna")
     attended = bench.queue.status().attended_until
     assert attended is not None  # else the run is stopped within a second
     assert attended > bench.clock.utc()
@@ -246,7 +215,7 @@ def test_switching_a_schedule_on_submits_nothing_that_was_due_while_it_was_off(b
 
 def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
     schedule = bench.schedule(every=10)
-    bench.queue.pause("paused by anna", "anna")
+    bench.queue.pause("by anna", "anna")
     runs = DueRuns(bench.queue._context)
     for _ in range(5):
         runs.submit()

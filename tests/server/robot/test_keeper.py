@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from daq.contracts.machine import load_machine
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
 from tests.server.clocks import HandClock
+from tests.server.meanwhile import Meanwhile
 
 
 class SlowOwner:
@@ -39,32 +41,24 @@ class SlowOwner:
 
 
 @pytest.fixture
-def owners(monkeypatch: pytest.MonkeyPatch) -> type[SlowOwner]:
+def owners() -> Any:
     """What stands for processes of owners."""
 
     class Owners(SlowOwner):
         made, begun, go = [], threading.Event(), threading.Event()
 
-    monkeypatch.setattr("server.robot.robot.OwnerProcess", Owners)
     return Owners
 
 
 @pytest.fixture
-def robot() -> Robot:
-    """Not connected."""
-    return Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
+def robot(owners: Any) -> Any:
+    """Not connected; something may happen as it is asked to connect or disconnect."""
+    return Meanwhile(Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock(), owners))
 
 
-def test_a_port_is_not_free_while_a_process_for_it_is_started(
-    owners: type[SlowOwner], robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    keeper, disconnect, entered = Keeper(robot), robot.disconnect, threading.Event()
-
-    def entering(patience: float) -> bool:
-        entered.set()
-        return disconnect(patience)
-
-    monkeypatch.setattr(robot, "disconnect", entering)
+def test_a_port_is_not_free_while_a_process_for_it_is_started(owners: Any, robot: Any) -> None:
+    keeper, entered = Keeper(robot), threading.Event()
+    robot.before("disconnect", entered.set)
     keeper.start(connect=False)
     connecting = threading.Thread(target=_refused, args=(keeper.connect,))
     connecting.start()
@@ -83,16 +77,9 @@ def test_a_port_is_not_free_while_a_process_for_it_is_started(
 
 
 @pytest.mark.parametrize("ending", ["disconnect", "close"])
-def test_nothing_is_begun_that_is_not_wanted_any_more(
-    owners: type[SlowOwner], robot: Robot, monkeypatch: pytest.MonkeyPatch, ending: str
-) -> None:
-    keeper, connect = Keeper(robot), robot.connect
-
-    def after_an_end(**options: Any) -> object:
-        keeper.disconnect() if ending == "disconnect" else keeper.close(60)
-        return connect(**options)
-
-    monkeypatch.setattr(robot, "connect", after_an_end)
+def test_nothing_is_begun_that_is_not_wanted_any_more(owners: Any, robot: Any, ending: str) -> None:
+    keeper = Keeper(robot)
+    robot.before("connect", keeper.disconnect if ending == "disconnect" else partial(keeper.close, 60))
     owners.go.set()
     _refused(keeper.connect)
     assert owners.made == []

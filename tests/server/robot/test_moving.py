@@ -104,7 +104,7 @@ def test_an_experiment_waits_while_a_client_has_the_control_and_then_for_a_perso
     assert waiting_for == "somebody has control of the robot"
     service.robot.delete("/control", headers=mine)
     queue = service.robot.get("/queue").json()
-    line = "local gave the control back while 1 experiment waited: look at the arm, then resume the queue"
+    line = "local gave control back while 1 experiment waited: look at the arm, then resume the queue"
     assert (queue["paused"], queue["reason"]) == (True, line)
     service.robot.post("/queue/resume", json={})
     assert service.end_of(made["id"])["state"] == "done"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
-from types import SimpleNamespace
 from typing import NoReturn
 
 import pytest
@@ -25,27 +24,18 @@ HALF = '{"kind":"answer","num'
 LINES = '{"kind":"told","text":"first"}\n{"kind":"told","text":"second"}\n'
 MACHINE = load_machine("ma2000")
 OPEN = Open(url="mock://", machine=MACHINE, limits=MACHINE.limits, folder=Path(), robot="ma2000")
-Start = Callable[[str], None]
+Start = Callable[..., OwnerProcess]
 
 
-@pytest.fixture
-def owners_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Start:
-    """From now on an owner is a program that writes something, reads its first order, and kills itself."""
-
-    def replaced(output: str) -> None:
-        program = tmp_path / "owner"
-        program.write_text(f"#!/bin/sh\nprintf '%s' '{output}'\nread -r order\nkill -9 $$\n")
-        program.chmod(0o700)
-        monkeypatch.setattr("server.robot.owner_process.sys", SimpleNamespace(executable=str(program)))
-
-    return replaced
+def killed_after(output: str) -> Start:
+    """Starts an owner that is a program which writes something, reads its first order, and kills itself."""
+    return partial(OwnerProcess, program=("sh", "-c", f"printf '%s' '{output}'; read -r order; kill -9 $$"))
 
 
 @pytest.mark.parametrize("output", [HALF, f"{HALF}\n", f"no JSON\n{HALF}", ""])
-def test_an_owner_killed_in_the_middle_of_a_report_is_gone(owners_are: Start, output: str) -> None:
-    owners_are(output)
+def test_an_owner_killed_in_the_middle_of_a_report_is_gone(output: str) -> None:
     ended: SimpleQueue[str] = SimpleQueue()
-    owner = OwnerProcess(OPEN, lambda _report: None, ended.put)
+    owner = killed_after(output)(OPEN, lambda _report: None, ended.put)
     answer = owner.ask(ReadGains, asked=0.0)
     assert ended.get(timeout=60) == "signal 9"
     for asked in (answer, owner.ask(ReadGains, asked=0.0)):
@@ -54,9 +44,8 @@ def test_an_owner_killed_in_the_middle_of_a_report_is_gone(owners_are: Start, ou
     assert owner.close()
 
 
-def test_a_listener_at_fault_costs_nobody_else_a_report(owners_are: Start) -> None:
-    owners_are(LINES)
-    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+def test_a_listener_at_fault_costs_nobody_else_a_report() -> None:
+    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock(), killed_after(LINES))
     heard: SimpleQueue[Report] = SimpleQueue()
     ends: SimpleQueue[str] = SimpleQueue()
 
@@ -78,31 +67,29 @@ def _refused(robot: Robot) -> None:
         robot.connect()
 
 
-def test_a_process_that_cannot_be_started_is_a_robot_that_is_not_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_process(*_: object, **__: object) -> NoReturn:
+def test_a_process_that_cannot_be_started_is_a_robot_that_is_not_reached() -> None:
+    def no_process(*_: object) -> NoReturn:
         raise OSError(12, "Cannot allocate memory")
 
-    monkeypatch.setattr(subprocess, "Popen", no_process)
-    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock(), no_process)
     with pytest.raises(ReachError, match="Cannot allocate memory"):
         robot.connect()
     assert (robot.connection, "Cannot allocate memory" in robot.problem) == ("disconnected", True)
 
 
 @pytest.mark.parametrize("error", [OSError(24, "Too many open files"), ValueError("a fault"), ReachError("no answer")])
-def test_whatever_keeps_it_from_connecting_is_tried_again(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.robot.keeper.DELAYS", ReconnectDelay(1e-6, 1e-6))
-    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+def test_whatever_keeps_it_from_connecting_is_tried_again(error: Exception) -> None:
     tried, third = [0], threading.Event()
 
-    def connect(**_: object) -> None:
-        tried[0] += 1
-        if tried[0] == 3:
-            third.set()
-        raise error
+    class Unreachable(Robot):
+        def connect(self, **_: object) -> None:
+            tried[0] += 1
+            if tried[0] == 3:
+                third.set()
+            raise error
 
-    monkeypatch.setattr(robot, "connect", connect)
-    keeper = Keeper(robot)
+    robot = Unreachable(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+    keeper = Keeper(robot, ReconnectDelay(1e-6, 1e-6))
     keeper.start(connect=True)
     assert third.wait(60)
     keeper.close(60)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from types import SimpleNamespace
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
-from daq.acquisition.stop_socket import StopAnswer
 from daq.contracts.machine import load_machine
-from daq.contracts.service.robot import ArmState
+from daq.contracts.service.robot import ArmState, StopResult
 from server.owner.messages import Answer, ArmReport
 from server.problems import ProblemError
 from server.robot.robot import Robot, RobotPlace
@@ -23,21 +21,28 @@ from tests.server.clocks import HandClock
 JOG = {2: 0.1}
 
 
+class Busy(Robot):
+    """What it is asked goes on."""
+
+    def ask(self, kind: Any, **fields: object) -> Future[Answer]:
+        """An order that has no answer yet."""
+        del kind, fields
+        return Future()
+
+
 @pytest.fixture
-def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """Connected, idle; what it is asked goes on."""
-    robot = Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
-    monkeypatch.setattr(robot, "ask", lambda *_, **__: Future[Answer]())
+def robot() -> Robot:
+    """Connected, idle."""
+    robot = Busy(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
     robot._on_report(_report("idle"))
     return robot
 
 
 @pytest.fixture
-def desk(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Iterator[StopService]:
+def desk(robot: Robot) -> Iterator[StopService]:
     """Whose stops are confirmed."""
-    answer = StopAnswer(robot="ma2000", port="mock://", delivered=True, confirmed=True, tick=7, text="")
-    monkeypatch.setattr("server.stopping.arm.request_stop", lambda *_: [SimpleNamespace(answer=answer)])
-    desk = StopService(robot)
+    confirmed = StopResult(delivered=True, confirmed=True, tick=7, seconds=0.0, text="stopped")
+    desk = StopService(robot, lambda _reach: confirmed)
     yield desk
     desk.close()
 
@@ -74,7 +79,8 @@ def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered
     told = desk.stop_now()
     desk.close()
     assert (told.delivered, told.confirmed) == (False, False)
-    assert told.text.startswith("stop NOT DELIVERED: ")
+    assert told.text == f"stop NOT DELIVERED: {told.detail}"
+    assert told.detail == f"{told.note}. Use the emergency stop."
     assert told.text.endswith("Too many open files. Use the emergency stop.")
 
 

@@ -16,7 +16,6 @@ from daq.teaching.lead import PATIENCE
 from daq.teaching.program import Relative
 from server.owner.messages import Answer, Finish, JogBegin, JogDrive, RunProgram
 from server.problems import ProblemError, conflict
-from server.robot import teaching
 from server.robot.robot import Robot, RobotPlace
 from server.robot.teaching import LEAD_ENDS_WITHIN, TeachingService, Word
 from tests.server.clocks import HandClock
@@ -125,10 +124,10 @@ def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked
 
 
 def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_rest(
-    robot: Asked, desk: TeachingService, monkeypatch: pytest.MonkeyPatch
+    robot: Asked,
 ) -> None:
     assert LEAD_ENDS_WITHIN > PATIENCE
-    monkeypatch.setattr(teaching, "ANSWER_WITHIN", 0.0)
+    desk = TeachingService(robot, lambda _line: None, ends_within=0.0)
     desk.lead(Word(0.0), (1,))
     ending = threading.Thread(target=desk.finish)
     ending.start()
@@ -138,20 +137,16 @@ def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_
     assert desk.status().path is not None
 
 
-def test_a_lead_that_does_not_end_says_that_a_stop_holds_nothing(
-    desk: TeachingService, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(teaching, "LEAD_ENDS_WITHIN", 0.0)
+def test_a_lead_that_does_not_end_says_that_a_stop_holds_nothing(robot: Asked) -> None:
+    desk = TeachingService(robot, lambda _line: None, lead_ends_within=0.0)
     desk.lead(Word(0.0), (1,))
     with pytest.raises(ProblemError, match="lead did not end within") as refused:
         desk.finish()
     assert "HOLD THE ARM" in refused.value.advice
 
 
-def test_a_jog_that_does_not_end_is_to_be_stopped(
-    robot: Asked, desk: TeachingService, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(teaching, "ANSWER_WITHIN", 0.0)
+def test_a_jog_that_does_not_end_is_to_be_stopped(robot: Asked) -> None:
+    desk = TeachingService(robot, lambda _line: None, ends_within=0.0)
     desk.jog(JOG, robot.clock.monotonic())
     with pytest.raises(ProblemError, match="jog did not end within") as refused:
         desk.finish()

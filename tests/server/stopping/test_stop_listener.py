@@ -197,7 +197,7 @@ def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: P
             assert httpx.post(stop, timeout=30).json()["delivered"] is False
             while not (queue := service.robot.get("/queue").json())["paused"]:
                 assert service.process.poll() is None
-            assert queue["reason"].startswith("local asked for a stop")
+            assert queue["reason"].startswith("local requested a stop")
 
 
 @pytest.mark.parametrize(
@@ -395,7 +395,6 @@ def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
-    monkeypatch.setattr("server.stopping.door.BEGIN_AGAIN_AFTER", 0.01)
     begin, refused, popen = _begin(tmp_path), [1, 2], subprocess.Popen
 
     def seldom(*words: Any, **options: Any) -> Any:
@@ -404,7 +403,7 @@ def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
             raise BlockingIOError(11, "Resource temporarily unavailable")
         return popen(*words, **options)
 
-    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin)) as door:
+    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin, 0.01)) as door:
         door.wait_ready()
         monkeypatch.setattr("server.stopping.door.subprocess.Popen", seldom)
         os.kill(door.pid, signal.SIGKILL)

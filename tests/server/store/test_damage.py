@@ -98,7 +98,7 @@ def test_serve_says_so_and_ends(
     _garble(folder / FILE)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    said = CommandLine(capsys, monkeypatch)("serve", "--port", "0")
+    said = CommandLine(capsys)("serve", "--port", "0")
     assert said.code == 2
     records = [json.loads(line) for line in said.err.splitlines()]  # standard error is no terminal here: JSON alone
     complaint = records[-1]["text"]

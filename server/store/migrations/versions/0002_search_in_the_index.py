@@ -11,7 +11,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """To this version."""
+    """Upgrades the tables to this version."""
     with op.batch_alter_table("traces", schema=None) as batch_op:
         batch_op.drop_index("traces_by_time")
         batch_op.create_index(
@@ -20,7 +20,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Back to the version before."""
+    """Undoes the upgrade."""
     with op.batch_alter_table("traces", schema=None) as batch_op:
         batch_op.drop_index("traces_found")
         batch_op.create_index("traces_by_time", ["robot", "created", "id"], unique=False)

@@ -12,12 +12,12 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """To this version."""
+    """Upgrades the tables to this version."""
     with op.batch_alter_table("jobs", schema=None) as batch_op:
         batch_op.add_column(sa.Column("headline", sa.Text(), nullable=False, server_default=""))
 
 
 def downgrade() -> None:
-    """Back."""
+    """Undoes the upgrade."""
     with op.batch_alter_table("jobs", schema=None) as batch_op:
         batch_op.drop_column("headline")

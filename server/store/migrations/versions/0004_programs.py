@@ -12,7 +12,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """To this version."""
+    """Upgrades the tables to this version."""
     op.create_table(
         "programs",
         sa.Column("robot", sa.String(length=32), nullable=False),
@@ -27,5 +27,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Back."""
+    """Undoes the upgrade."""
     op.drop_table("programs")

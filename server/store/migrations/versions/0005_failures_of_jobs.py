@@ -12,7 +12,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """To this version. Of older jobs only the sentence is known."""
+    """Upgrades the tables to this version. Older jobs have a reason only in words."""
     with op.batch_alter_table("jobs", schema=None) as batch_op:
         batch_op.add_column(sa.Column("failure", sa.String(length=32), nullable=True))
     op.execute("UPDATE jobs SET failure = 'program-fault' WHERE reason LIKE 'program fault: %'")
@@ -21,6 +21,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Back."""
+    """Undoes the upgrade."""
     with op.batch_alter_table("jobs", schema=None) as batch_op:
         batch_op.drop_column("failure")

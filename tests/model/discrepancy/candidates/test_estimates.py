@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from model.discrepancy.candidates.estimates import found_values, shift_by_noise, standard_deviations
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.candidate_fit import Fit, judge
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import observe
@@ -58,12 +59,12 @@ def dead_zone_fitted(noise: float) -> tuple[Fit, Parameter]:
     """A dead zone, fitted on a record of so much noise, and the parameter that is its width."""
     arm = imagined.arm().with_effect("dead_zone", (1,), {"width": WIDTH})
     begun = imagined.arm().with_effect("dead_zone", (1,), {"width": 0.7 * WIDTH})
-    observation, model, unknowns = observe(begun, [imagined.trace(arm, seconds=20.0, noise=noise)])
-    parameter = model.by_name["joint1.dead_zone.width"]
+    observation, stated = observe(begun, [imagined.trace(arm, seconds=20.0, noise=noise)])
+    parameter = stated.model.by_name["joint1.dead_zone.width"]
     width = Unknown(parameter, 0.7 * WIDTH, 0.0, 10.0, 0.0, None)
-    free = (*(u for u in unknowns if u.name != parameter.name), width)
-    given = point_at(observation, model, free, np.array([u.start for u in free]))
-    return judge(converge(given, 4)), parameter
+    free = (*(u for u in stated.unknowns if u.name != parameter.name), width)
+    given = Calibration(stated.model, free, np.array([u.start for u in free]))
+    return judge(converge(point_at(observation, given), 4)), parameter
 
 
 def test_an_interval_includes_how_far_noise_has_shifted_the_estimate() -> None:
@@ -85,11 +86,11 @@ def test_an_interval_includes_how_far_noise_has_shifted_the_estimate() -> None:
 def test_derivatives_by_a_tones_rate_do_not_depend_on_their_step(monkeypatch: pytest.MonkeyPatch) -> None:
     ripple = {"sine": 0.6, "cosine": 0.3, "cycles": 30.0}
     arm = imagined.arm().with_effect("torque_ripple", (3,), ripple)
-    observation, model, unknowns = observe(arm, [imagined.trace(arm, seconds=20.0)])
-    cycles = model.by_name["joint3.torque_ripple.cycles"]
-    free = (*unknowns, Unknown(cycles, 30.0, 1.0, 100.0, 30.0, 18.0))
-    values = np.array([u.start for u in free])
-    taken = observation.tangents(model, free, values, [len(free) - 1])
+    observation, stated = observe(arm, [imagined.trace(arm, seconds=20.0)])
+    cycles = Unknown(stated.model.by_name["joint3.torque_ripple.cycles"], 30.0, 1.0, 100.0, 30.0, 18.0)
+    free = Calibration(stated.model, (*stated.unknowns, cycles), np.append(stated.values, 30.0))
+    last = [len(stated.unknowns)]
+    taken = observation.tangents(free, last)
     monkeypatch.setattr("model.discrepancy.output_error.observation.TONE_DIFFERENCE", 0.005)
-    finer = observation.tangents(model, free, values, [len(free) - 1])
+    finer = observation.tangents(free, last)
     assert np.linalg.norm(taken - finer) < 0.05 * np.linalg.norm(finer)

@@ -23,9 +23,7 @@ RIPPLE = {"sine": 1.0, "cosine": 0.0, "cycles": 40.0}
 
 def seen(truth: Model, known: Model, seconds: float = 20.0) -> Point:
     """A record of `truth`, and what `known` leaves of it."""
-    observation, model, unknowns = observe(known, [trace_of(truth, seconds)])
-    values = np.array([u.start for u in unknowns])
-    return point_at(observation, model, unknowns, values)
+    return point_at(*observe(known, [trace_of(truth, seconds)]))
 
 
 def looked_at(seconds: float) -> Observation:
@@ -124,8 +122,7 @@ def test_the_response_is_taken_from_the_record_that_moves_a_joint_furthest() -> 
     """The first is too short to show an answer of 1.5 s."""
     truth = imagined.arm().with_effect("torque_ripple", (2,), RIPPLE)
     short, long = imagined.trace(truth, 1, seconds=1.2), trace_of(truth, 20.0)
-    observation, model, unknowns = observe(imagined.arm(), [short, long])
-    point = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    point = point_at(*observe(imagined.arm(), [short, long]))
     ripple = next(p for p in propose_tones(point, (2,)) if p.hypothesis.name == "torque_ripple")
     assert abs(ripple.start["joint2.torque_ripple.cycles"] - RIPPLE["cycles"]) < 1.0
 

@@ -28,6 +28,7 @@ from model.discrepancy.experiment_design.next_experiment import (
 )
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.candidate_fit import CandidateFit, judge
 from model.discrepancy.output_error.case import build_case
 from model.discrepancy.output_error.observation import observe
@@ -57,15 +58,13 @@ def record(arm: Model, spec: ExperimentSpec, seed: int) -> Trace:
 
 def known(trace: Trace) -> Point:
     """The model without an effect, fitted."""
-    observation, model, unknowns = observe(imagined.arm(), [trace])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
-    return converge(given, 6)
+    return converge(point_at(*observe(imagined.arm(), [trace])), 6)
 
 
 def ranking(trace: Trace, effects: tuple[str, ...]) -> Ranking:
     """These effects on joint 2, fitted and ranked."""
     point = known(trace)
-    case = build_case(point, [trace], options=DiagnosisOptions(effects=effects, joints=(2,)))
+    case = build_case(point.model, point, point, [trace], options=DiagnosisOptions(effects=effects, joints=(2,)))
     return rank(case, judge(point), silent, Never())
 
 
@@ -108,13 +107,11 @@ def misfit(rival: CandidateFit, before: Trace, new: Trace) -> float:
 
 def again(point: Point, traces: list[Trace]) -> Point:
     """A rival fitted anew to more traces, from where it was."""
-    observation, _, unknowns = observe(point.model, traces)
-    shared = [k for k, u in enumerate(point.unknowns) if u.trace is None]
-    starts = [u for u in unknowns if u.trace is not None]
-    every = (*(point.unknowns[k] for k in shared), *starts)
-    values = np.concatenate([point.values[shared], [u.start for u in starts]])
-    begun = point_at(observation, point.model, every, values)
-    return converge(begun, 6)
+    observation, given = observe(point.model, traces)
+    shared = point.only([k for k, u in enumerate(point.unknowns) if u.trace is None])
+    starts = given.only([k for k, u in enumerate(given.unknowns) if u.trace is not None])
+    every, values = (*shared.unknowns, *starts.unknowns), np.concatenate([shared.values, starts.values])
+    return converge(point_at(observation, Calibration(point.model, every, values)), 6)
 
 
 def speed_law(trace: Trace, point: Point, effect: str) -> CandidateFit:

@@ -130,8 +130,10 @@ def torque_reason(effect: str, values: dict[str, FoundValue], removed: float, *,
 
 def test_a_reason_in_torques_says_what_cycles_are_counted_in() -> None:
     values = {
-        "joint1.torque_ripple.sine": FoundValue(value=-5.12, low=None, high=None, unit="N"),
-        "joint1.torque_ripple.cycles": FoundValue(value=200.0, low=None, high=None, unit="1"),
+        "joint1.torque_ripple.sine": FoundValue(value=-5.12, low=None, high=None, unit="N", part="sine", joints=(1,)),
+        "joint1.torque_ripple.cycles": FoundValue(
+            value=200.0, low=None, high=None, unit="1", part="cycles", joints=(1,)
+        ),
     }
     turning = torque_reason("torque_ripple", values, 0.99, slides=False)
     assert turning.startswith("Joint 1: the torque goes up and down with the angle, ")

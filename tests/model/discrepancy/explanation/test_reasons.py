@@ -121,12 +121,12 @@ def put_in(arm: Model, name: str, joint: int) -> tuple[Model, tuple[int, ...], d
     joints = () if effect(name).whole_machine else (joint,)
     present = any(use.name == name and (not joints or joint in use.joints) for use in arm.effects)
     if present:
-        names = {p.name: p for p in arm.parameters if p.effect == name and joint in p.joints}
-        strange = arm.with_values({n: SIZES[name][n.rpartition(".")[2]] for n in names})
+        stated = [p for p in arm.parameters if p.effect == name and joint in p.joints]
+        strange = arm.with_values({p.name: SIZES[name][p.part] for p in stated})
     else:
         strange = arm.with_effect(name, joints, SIZES[name])
     own = [p for p in strange.parameters if p.effect == name and (not joints or joint in p.joints)]
-    return strange, joints, {p.name: FoundValue(value=p.value, low=None, high=None, unit=p.unit) for p in own}
+    return strange, joints, {p.name: FoundValue.of(p, p.value) for p in own}
 
 
 def test_every_effect_of_the_shared_list_has_its_entry() -> None:
@@ -160,13 +160,15 @@ def test_a_reason_says_what_the_record_shows(arm: Model, name: str) -> None:
 def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
     strange = arm.with_effect("coulomb_friction", (1, 2), {"torque": 4.0})
     records = records_of([trace_of(strange)], arm.machine, "position")
-    found = {f"joint{j}.coulomb_friction.torque": FoundValue(value=4.0, low=3.8, high=4.2, unit="N·m") for j in (1, 2)}
+    found = {}
+    for p in (p for p in strange.parameters if p.effect == "coulomb_friction"):
+        found[p.name] = FoundValue.of(p, 4.0, 3.8, 4.2)
     rival = Candidate(effect="stiction", joints=(1, 2), evidence=600.0)
     speaks = reason("coulomb_friction", (1, 2), found, model=strange, before=arm, records=records, rival=rival)
     text = reason_text(step_with("coulomb_friction", (1, 2), found, speaks))
     assert "(and likewise joint " in text
     assert "Coulomb friction, 4 N·m (3.8 to 4.2)" in text
-    assert text.endswith("The next best, stiction on joints 1 and 2, has an evidence of 600, and this has 900.")
+    assert text.endswith("The next best, stiction on joints 1 and 2, has evidence of 600, and this has 900.")
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +176,8 @@ def friction(arm: Model) -> tuple[dict[str, FoundValue], Reason]:
     """Parameters and reason of Coulomb friction on joint 2, with stiction as its rival."""
     records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
     strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1.0})
-    found = {"joint2.coulomb_friction.torque": FoundValue(value=1.0, low=0.9, high=1.1, unit="N·m")}
+    torque = strange.parameter("joint2.coulomb_friction.torque")
+    found = {torque.name: FoundValue.of(torque, 1.0, 0.9, 1.1)}
     rival = Candidate(effect="stiction", joints=(2,), evidence=728.0)
     return found, reason("coulomb_friction", (2,), found, model=strange, before=arm, records=records, rival=rival)
 
@@ -183,7 +186,7 @@ def test_a_rival_that_has_come_to_more_is_said_as_such(friction: tuple[dict[str,
     """The fit that was ranked first came to less when it was completed."""
     text = reason_text(step_with("coulomb_friction", (2,), *friction, evidence=539.0, margin=-189.0))
     assert text.endswith(
-        "Its completed fit has an evidence of 539, less than the 728 of stiction on joint 2: these traces do not tell "
+        "Its completed fit has evidence of 539, less than the 728 of stiction on joint 2: these traces do not tell "
         "which of the two it is."
     )
 
@@ -202,7 +205,7 @@ def test_a_place_that_is_not_the_effect_s_is_mentioned(
 def test_a_reason_gives_the_size_of_the_last_fit(friction: tuple[dict[str, FoundValue], Reason]) -> None:
     speaks = friction[1].model_copy(update={"joint": 3, "rival": None})
     first = {
-        f"joint{j}.dead_zone.width": FoundValue(value=v, low=0.724, high=0.77, unit="V")
+        f"joint{j}.dead_zone.width": FoundValue(value=v, low=0.724, high=0.77, unit="V", part="width", joints=(j,))
         for j, v in ((2, 0.747), (3, 0.8))
     }
     last = {
@@ -214,7 +217,7 @@ def test_a_reason_gives_the_size_of_the_last_fit(friction: tuple[dict[str, Found
     assert "a dead zone of the amplifier, 0.9 V (0.673 to 0.822), which" in reason_text(fitted)
     shapeless = step_with("periodic_disturbance", (3,), {}, speaks)
     assert ": a periodic torque from outside, which" in reason_text(shapeless)
-    load = {"payload.mass": FoundValue(value=1.6, low=1.5, high=1.7, unit="kg")}
+    load = {"payload.mass": FoundValue(value=1.6, low=1.5, high=1.7, unit="kg", part="mass")}
     assert "a load other than the model's, 1.6 kg (1.5 to 1.7), which" in reason_text(
         step_with("payload", (), load, speaks)
     )
@@ -223,7 +226,8 @@ def test_a_reason_gives_the_size_of_the_last_fit(friction: tuple[dict[str, Found
 def test_a_rival_without_evidence_and_an_error_that_hardly_falls_are_said_as_such(arm: Model) -> None:
     records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
     strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1e-3})
-    found = {"joint2.coulomb_friction.torque": FoundValue(value=1e-3, low=0.0, high=0.01, unit="N·m")}
+    torque = strange.parameter("joint2.coulomb_friction.torque")
+    found = {torque.name: FoundValue.of(torque, 1e-3, 0.0, 0.01)}
     rival = Candidate(effect="stiction", joints=(2,), evidence=-3.0)
     speaks = reason("coulomb_friction", (2,), found, model=strange, before=arm, records=records, rival=rival)
     text = reason_text(step_with("coulomb_friction", (2,), found, speaks, evidence=30.0, margin=33.0))
@@ -234,7 +238,8 @@ def test_a_rival_without_evidence_and_an_error_that_hardly_falls_are_said_as_suc
 def test_a_caller_that_simulates_better_is_believed(arm: Model) -> None:
     records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
     strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1.0})
-    found = {"joint2.coulomb_friction.torque": FoundValue(value=1.0, low=0.9, high=1.1, unit="N·m")}
+    torque = strange.parameter("joint2.coulomb_friction.torque")
+    found = {torque.name: FoundValue.of(torque, 1.0, 0.9, 1.1)}
 
     def left(model: Model) -> list[np.ndarray]:
         return [np.full_like(records[0].measured, 0.1 if model is strange else 0.2)]
@@ -283,7 +288,7 @@ def test_an_undecided_answer_lists_the_group_with_its_evidence(arm: Model) -> No
     )
     step = step_with("stiction", (2,), {}).model_copy(update={"group": group})
     assert answer(arm, verdict="ambiguous", steps=(step,)).summary == (
-        "Joint 2, after reversals: 2.1 ADC counts rms. These explain it, with evidences that differ by no more than 2: "
+        "Joint 2, after reversals: 2.1 ADC counts rms. These explain it, with evidence that differs by no more than 2: "
         "stiction on joint 2 (120), Coulomb friction on joint 2 (118)."
     )
 
@@ -296,9 +301,7 @@ def test_an_answer_with_nothing_significant_says_what_was_refused(arm: Model) ->
     assert found.steps[0].rejected_because == (
         "the error on the held-out traces rises: its sum of squares by 15 ± 7 variances of a reading"
     )
-    assert (
-        "stiction on joint 2 explains more of the fitted ones, with an evidence of 120, but the error" in found.summary
-    )
+    assert "stiction on joint 2 explains more of the fitted ones, with evidence of 120, but the error" in found.summary
 
 
 def test_several_reasons_and_what_is_left_are_sentences_one_after_the_other(

@@ -11,13 +11,12 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace, TraceRecord
+from model.arrays import Floats
 
-Floats = NDArray[np.float64]
 Wanted = Callable[[float], tuple[float, float, float]]
 
 

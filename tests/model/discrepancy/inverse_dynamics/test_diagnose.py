@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError, TraceError
@@ -150,9 +149,10 @@ def test_without_held_out_traces_an_effect_must_hold_on_quarters_of_the_record()
     assert found.steps[0].rmse_holdout == ()
 
 
-def test_an_effect_that_does_not_hold_there_is_refused_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("model.discrepancy.inverse_dynamics.holdout.block_squares", lambda _now, _data: np.array([1.0]))
-    found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})])
+def test_an_effect_that_explains_too_little_of_records_not_fitted_to_is_refused() -> None:
+    """Where nearly all of the mean square must go, noise alone is too much."""
+    nearly_all = TorqueOptions(least_share=0.9999)
+    found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})], (), nearly_all)
     assert found.steps[0].effect == "coulomb_friction"
     assert not any(step.adopted for step in found.steps)
     assert found.steps[0].refusal is not None

@@ -8,7 +8,7 @@ import pytest
 from daq.contracts.errors import SpecError
 from model.discrepancy.explanation.renderer import where_with_summary
 from model.discrepancy.localisation.disagreement import _beyond, locate
-from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, directions, phases_of
+from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, AskedMotion
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import (
     Correlation,
@@ -47,7 +47,7 @@ def alike(shape: tuple[int, int], seed: int, memory: float = 0.7) -> np.ndarray:
 
 
 def test_phases_are_what_a_person_would_call_them(arm: Model, records: tuple[Record, ...]) -> None:
-    phase = phases_of(arm, records[0])[:, 0]
+    phase = AskedMotion(arm.machine, records[0]).phases[:, 0]
 
     def at(seconds: float) -> int:
         return int(phase[round(seconds / PERIOD)])
@@ -65,7 +65,7 @@ def test_phases_are_what_a_person_would_call_them(arm: Model, records: tuple[Rec
 
 
 def test_a_direction_is_kept_through_a_rest(arm: Model, records: tuple[Record, ...]) -> None:
-    moved = directions(arm, records[0])[:, 0]
+    moved = AskedMotion(arm.machine, records[0]).direction[:, 0]
     assert [moved[round(t / PERIOD)] for t in (0.2, 1.0, 1.8, 2.4, 3.2)] == [0, 1, 1, -1, -1]
 
 
@@ -105,8 +105,8 @@ def test_significance_of_correlated_samples_follows_a_gaussian(memory: float) ->
 def test_a_lag_after_reversals_is_located_in_the_reversals(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     residual = alike(records[0].measured.shape, 1) * deviations
-    reversal = phases_of(arm, records[0])[:, 1] == REVERSAL
-    residual[:, 1] -= np.where(reversal, 5 * deviations[1] * directions(arm, records[0])[:, 1], 0.0)
+    reversal = AskedMotion(arm.machine, records[0]).phases[:, 1] == REVERSAL
+    residual[:, 1] -= np.where(reversal, 5 * deviations[1] * AskedMotion(arm.machine, records[0]).direction[:, 1], 0.0)
     found = locate(Residuals(arm, records, [residual], deviations))
     assert (found.joint, found.phase) == (2, "reversal")
     assert found.worst is not None
@@ -127,7 +127,7 @@ def test_a_dependence_is_the_most_significant_of_its_joint(
     from model.discrepancy.localisation.dependence import quantities
 
     deviations = noise_floor(records, arm.machine, "position")
-    quantity = np.nan_to_num(quantities(arm, records).values[against][:, 2])
+    quantity = np.nan_to_num(quantities([AskedMotion(arm.machine, r) for r in records]).values[against][:, 2])
     shape = np.sin(3 * (quantity - quantity.mean()) / quantity.std()) if against != "direction" else quantity
     residual = alike(records[0].measured.shape, 2) * deviations
     residual[:, 2] += 3 * deviations[2] * shape

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from model.discrepancy.diagnosis import CLEAR_SHAPE, AgainstWhat, RemainingShape, clear_shape
-from model.discrepancy.localisation.phases import asked_motion
+from model.discrepancy.localisation.phases import AskedMotion
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes, torque_of
 from model.fitting.records import Record, noise_floor, records_of
@@ -35,16 +35,16 @@ def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(ar
     sprung = arm.with_effect("spring_torque", (JOINT,), {"stiffness": STIFFNESS, "rest": -0.4})
     records = records_of([trace_of(sprung)], arm.machine, "position")
     deviations = noise_floor(records, arm.machine, "position")
-    residuals = Residuals(arm, records, [left(arm, records[0], following)], deviations)
-    found = remaining_shapes(residuals, feedback_share=following)
+    residuals = Residuals(arm, records, [left(arm, records[0], following)], deviations, feedback_share=following)
+    found = remaining_shapes(residuals)
     first = found[0]
     assert (first.joint, first.against, first.torque_unit) == (JOINT, "position", "N·m")
     assert first.explained > 0.5
     pairs = [(x, t) for x, t in zip(first.centres, first.torque, strict=True) if t is not None]
     slope = np.polyfit(*np.array(pairs).T, 1)[0]
     assert slope == pytest.approx(-STIFFNESS, rel=0.25)
-    torque = torque_of(residuals, feedback_share=following)[0][records[0].runs[0], JOINT - 1]
-    true = -STIFFNESS * (asked_motion(arm, records[0])[records[0].runs[0], JOINT - 1] + 0.4)
+    torque = torque_of(residuals)[0][records[0].runs[0], JOINT - 1]
+    true = -STIFFNESS * (AskedMotion(arm.machine, records[0]).position[records[0].runs[0], JOINT - 1] + 0.4)
     assert np.corrcoef(torque, true)[0, 1] > 0.85
 
 

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from model.discrepancy.candidates.library import hypotheses
-from model.discrepancy.candidates.probing import probe
-from model.discrepancy.output_error.candidate_fit import diverged_from_prior, judge, refit, restart, with_evidence
+from daq.contracts.errors import SpecError
+from model.arrays import Floats
+from model.discrepancy.candidates.library import Hypothesis, hypotheses
+from model.discrepancy.candidates.probing import Probe, probe
+from model.discrepancy.output_error.calibration import Calibration
+from model.discrepancy.output_error.candidate_fit import (
+    CandidateFit,
+    diverged_from_prior,
+    judge,
+    polish,
+    refit,
+    restart,
+    with_evidence,
+)
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import converge, point_at
 from tests.model.fitting import imagined
@@ -35,8 +47,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a cost to come to that it cannot reach, a fit takes few steps, and has no second way."""
     arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     before = judge(converge(given, 4))
     (found,) = probe(before.point, hypotheses(before.point.model, ("back_emf_error",), (2,)))
     counted = counting(monkeypatch)
@@ -47,8 +58,8 @@ def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pyt
 
 
 def test_a_point_has_diverged_where_unlikely_numbers_leave_the_record_unexplained() -> None:
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)]))
+    unknowns = given.unknowns
     sound = replace(given, weighted=given.weighted / np.sqrt(given.misfit))
     far = sound.values.copy()
     k = [u.name for u in unknowns].index("joint2.motor.rotor_inertia")
@@ -63,9 +74,8 @@ def test_a_point_has_diverged_where_unlikely_numbers_leave_the_record_unexplaine
 def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
     """An inductance that has been taken for a rotor's inertia, ten of its deviations off, with the record explained."""
     arm = imagined.arm().with_effect("motor_inductance", (2,), {"inductance": 0.06})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    before = judge(point_at(observation, model, unknowns, np.array([u.start for u in unknowns])))
-    (inductance,) = probe(before.point, hypotheses(model, ("motor_inductance",), (2,)))
+    before = judge(point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])))
+    (inductance,) = probe(before.point, hypotheses(before.point.model, ("motor_inductance",), (2,)))
     fitted = refit(before, inductance)
     assert fitted is not None
     assert restart(before, fitted) is fitted, "nothing is strange here"
@@ -73,7 +83,7 @@ def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
     k = [u.name for u in point.unknowns].index("joint2.motor.rotor_inertia")
     strained = point.values.copy()
     strained[k] += 10 * (point.unknowns[k].deviation or 0.0)
-    off = point_at(observation, point.model, point.unknowns, strained, point.tangents)
+    off = point.moved_to(strained)
     again = restart(before, with_evidence(before, inductance, off))
     assert again.fit.point.cost < off.cost - 50
     assert abs(again.fit.point.values[k] - point.values[k]) < 2 * (point.unknowns[k].deviation or 0.0)
@@ -81,11 +91,35 @@ def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
 
 def test_a_delay_that_led_the_tolerance_parameters_to_instability_is_fitted_from_the_expected_numbers() -> None:
     arm = imagined.arm().with_effect("input_delay", (3,), {"time": DELAY})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     before = judge(converge(given, 4))
     (found,) = probe(before.point, hypotheses(before.point.model, ("input_delay",), (3,)))
     fitted = refit(before, found)
     assert fitted is not None
     assert fitted.fit.point.cost < 0.6 * before.point.cost
     assert fitted.fit.point.value("joint3.input_delay.time") > 0.7 * DELAY
+
+
+@dataclass(frozen=True)
+class Asked(Observation):
+    """An observation that notes the names of the unknowns by which it is differentiated, and then gives up."""
+
+    names: list[str] = field(default_factory=list)
+
+    def tangents(self, tried: Calibration, which: Sequence[int] | None = None) -> Floats:
+        self.names.extend(tried.unknowns[k].name for k in which or ())
+        raise SpecError("the simulation does not stay finite: the loop is unstable")
+
+
+def test_a_polished_fit_gets_new_derivatives_by_all_numbers_that_act_on_its_joints() -> None:
+    """A number that joint 2 shares with joint 1 is one of them, and so is one of the whole machine."""
+    shared = imagined.arm().with_effect("dead_zone", (1, 2), {"width": 0.1}, shared=True)
+    observation, given = observe(shared, [imagined.trace(shared, seconds=2.0)])
+    point = point_at(observation, given, np.zeros((len(given.unknowns), observation.samples)))
+    asked = Asked(observation.machine, observation.records, observation.deviations, observation.unit, ())
+    hypothesis = Hypothesis("stiction", (2,), given.model, (), (), proportional=True)
+    probed = Probe(hypothesis, 20.0, {}, np.zeros(len(given.values)), np.zeros_like(point.weighted))
+    found = CandidateFit(probed, judge(replace(point, observation=asked)), evidence=20.0)
+    assert polish(judge(point), found) is found, "its simulations fail"
+    assert {"joints1+2.dead_zone.width", "load.mass", "joint2.motor.resistance"} <= set(asked.names)
+    assert not any(name.startswith(("joint1.", "joint3.")) for name in asked.names)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from tests.model.fitting import imagined
 
-Floats = NDArray[np.float64]
 UNSTABLE = "the simulation does not stay finite: the loop is unstable"
 
 
@@ -27,10 +25,10 @@ class Unstable(Observation):
 
     fails: Callable[[float, Floats], bool] = lambda _share, _values: False
 
-    def residuals(self, model: Any, unknowns: Any, values: Floats) -> Signals:
-        if self.fails(self.prepared[0].following, values):
+    def residuals(self, tried: Calibration) -> Signals:
+        if self.fails(self.prepared[0].following, tried.values):
             raise SpecError(UNSTABLE)
-        return super().residuals(model, unknowns, values)
+        return super().residuals(tried)
 
 
 def given() -> Point:

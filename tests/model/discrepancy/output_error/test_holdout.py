@@ -9,6 +9,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import Point, point_at
 from model.machine_model.model import Model
+from model.machine_model.parameter import Kind
 from tests.model.fitting import imagined
 
 COUNT = 1 / 3000
@@ -19,9 +20,9 @@ HERTZ, SIZE = 1.7, 4.0
 
 def begun(traces: int, start: float) -> Point:
     """The arm's own model on that many fitted traces, each said to begin `start` rad off."""
-    observation, model, unknowns = observe(imagined.arm(), imagined.traces(imagined.arm(), traces, seconds=3.0))
-    values = np.array([start if u.name.startswith("initial.") else u.start for u in unknowns])
-    return point_at(observation, model, unknowns, values)
+    observation, given = observe(imagined.arm(), imagined.traces(imagined.arm(), traces, seconds=3.0))
+    values = [start if u.kind is Kind.INITIAL_POSITION else u.start for u in given.unknowns]
+    return point_at(observation, given.at(np.array(values)))
 
 
 @pytest.mark.parametrize("fitted", [1, 3])
@@ -41,9 +42,7 @@ def humming(phase: float, size: float = SIZE) -> Model:
 
 def found(model: Model) -> Point:
     """What a fit to a record of that very arm would lead to."""
-    observation, wider, unknowns = observe(model, [imagined.trace(model, seconds=6.0)])
-    values = np.array([u.start for u in unknowns])
-    return point_at(observation, wider, unknowns, values)
+    return point_at(*observe(model, [imagined.trace(model, seconds=6.0)]))
 
 
 def left_on(point: Point, *phases: float, size: float = SIZE) -> list[np.ndarray]:

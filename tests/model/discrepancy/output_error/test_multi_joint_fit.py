@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
-
 from daq.contracts.progress import Never
 from model.discrepancy.candidates.library import hypotheses
 from model.discrepancy.candidates.probing import Probe, probe
@@ -24,8 +22,7 @@ LOSS = 0.2
 def before(joints: tuple[int, ...]) -> tuple[Fit, tuple[Probe, ...]]:
     """A record of an arm whose gears lose so much on these joints, its tolerance fit, and gear loss probed there."""
     arm = imagined.arm().with_effect("gear_loss", joints, {"loss": LOSS})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     fitted = judge(converge(given, 4))
     probes = probe(fitted.point, hypotheses(fitted.point.model, ("gear_loss",), (1, 2, 3)))
     return fitted, tuple(probes)

@@ -23,9 +23,7 @@ TRUTH = {"joint2.viscous_friction.coefficient": 2.2e-4, "load.mass": 1.4, "joint
 def given() -> Point:
     """A record of an arm whose numbers differ from the model's, and the model as it was given."""
     record = imagined.trace(imagined.arm().with_values(TRUTH), seconds=8.0)
-    observation, model, unknowns = observe(imagined.arm(), [record])
-    values = np.array([u.start for u in unknowns])
-    return point_at(observation, model, unknowns, values)
+    return point_at(*observe(imagined.arm(), [record]))
 
 
 def test_a_search_ends_at_the_noise_of_the_record(given: Point) -> None:

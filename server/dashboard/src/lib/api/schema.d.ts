@@ -175,12 +175,12 @@ export interface paths {
         };
         /**
          * Get Gains
-         * @description The gains P, I and D of every joint, read from the controller.
+         * @description Reads the gains P, I and D of every joint from the controller.
          */
         get: operations["get_gains"];
         /**
          * Set Gains
-         * @description Writes gains of the named joints and reads all back. Refused for a joint off its set point, which would jump.
+         * @description Writes gains of the named joints and reads all back. Refused for a joint that would jump to its set point.
          */
         put: operations["set_gains"];
         post?: never;
@@ -199,7 +199,7 @@ export interface paths {
         };
         /**
          * Get Process
-         * @description The process inputs and outputs, and the gripper.
+         * @description Reads the process inputs and outputs, and the gripper.
          */
         get: operations["get_process"];
         put?: never;
@@ -684,7 +684,7 @@ export interface paths {
         put?: never;
         /**
          * Resume Queue
-         * @description Resumes the queue: the operator's consent that it may move the robot. A real arm needs `moves_real_arm`.
+         * @description Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`.
          */
         post: operations["resume_queue"];
         delete?: never;
@@ -779,7 +779,7 @@ export interface paths {
         get: operations["get_control"];
         /**
          * Renew Control
-         * @description Renews the control: the heartbeat of the client that has it.
+         * @description Renews control. The client that has it sends this as its heartbeat.
          */
         put: operations["renew_control"];
         /**
@@ -789,7 +789,7 @@ export interface paths {
         post: operations["take_control"];
         /**
          * Give Control Back
-         * @description Gives the control back. The arm holds its posture; a program that still runs is stopped.
+         * @description Gives control back. The arm holds its posture; a program that still runs is stopped.
          *
          *     If experiments are waiting, the queue is paused until somebody resumes it.
          */
@@ -1406,7 +1406,7 @@ export interface components {
         };
         /**
          * CalibrationRequest
-         * @description Joints whose actual proportional gain is to be found, by small steps at several postures (section 6.5).
+         * @description Joints whose actual proportional gain is measured by small steps at several postures (section 6.5).
          */
         CalibrationRequest: {
             /**
@@ -1490,7 +1490,7 @@ export interface components {
         };
         /**
          * CompareRequest
-         * @description Simulates the same traces with one model or several, beside what was measured.
+         * @description Compares one model or several with the same traces, by simulation.
          */
         CompareRequest: {
             /**
@@ -1514,6 +1514,10 @@ export interface components {
             signals: components["schemas"]["Overlay"][];
             /** Differences */
             differences: components["schemas"]["ParameterDifference"][];
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
         };
         /**
          * ComparisonJobResult
@@ -1548,8 +1552,8 @@ export interface components {
         };
         /**
          * ControlLease
-         * @description The control of the robot, for one client. `lease` is its secret: it goes with every motion and heartbeat in the
-         *     header `Control-Lease`.
+         * @description Control of the robot for one client. `lease` is its secret, which the client sends with every motion and
+         *     heartbeat in the header `Control-Lease`.
          */
         ControlLease: {
             /** Lease */
@@ -1566,7 +1570,7 @@ export interface components {
         };
         /**
          * ControlRequest
-         * @description Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`.
+         * @description Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`.
          */
         ControlRequest: {
             /**
@@ -1587,7 +1591,7 @@ export interface components {
         };
         /**
          * Correlation
-         * @description Pearson's correlation with one regressor of one joint. `noise` is what independent signals would show (1σ).
+         * @description Pearson's correlation with one regressor of one joint. `noise` is that of independent signals (1σ).
          */
         Correlation: {
             /** Regressor */
@@ -1696,7 +1700,8 @@ export interface components {
         };
         /**
          * DiagnoseRequest
-         * @description Where a model and traces disagree, which effect is missing, what adding it brings; as `daq diagnose`.
+         * @description Finds where a model and traces disagree, which effect is missing, and what adding it improves, as `daq diagnose`
+         *     does.
          */
         DiagnoseRequest: {
             /**
@@ -1730,9 +1735,9 @@ export interface components {
         };
         /**
          * DiagnosisData
-         * @description A diagnosis (docs/diagnosis-json.md), and the models before and after it beside the traces where those can be
-         *     simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
-         *     model disagreed with the traces as it was given, before anything was fitted.
+         * @description A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
+         *     these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
+         *     where the given model disagreed with the traces before anything was fitted.
          */
         DiagnosisData: {
             /**
@@ -1833,6 +1838,10 @@ export interface components {
              */
             differences?: components["schemas"]["ParameterDifference"][];
             given?: components["schemas"]["GivenWhere"] | null;
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
         };
         /**
          * DiagnosisJobResult
@@ -1926,7 +1935,7 @@ export interface components {
         };
         /**
          * EffectChoice
-         * @description An effect to be in the model; on all joints where none are named.
+         * @description An effect of the model; on all joints if none are named.
          */
         EffectChoice: {
             /** Name */
@@ -1976,7 +1985,7 @@ export interface components {
         };
         /**
          * Experiment
-         * @description One experiment and what became of it. `progress` is a fraction from 0 to 1, only while it runs.
+         * @description One experiment with its state and outcome. `progress` is a fraction from 0 to 1, only while it runs.
          */
         Experiment: {
             /** Id */
@@ -2025,7 +2034,7 @@ export interface components {
         };
         /**
          * ExperimentChange
-         * @description A new priority of an experiment that still waits.
+         * @description A new priority for a waiting experiment.
          */
         ExperimentChange: {
             /** Priority */
@@ -2033,7 +2042,7 @@ export interface components {
         };
         /**
          * ExperimentPreset
-         * @description An experiment that has a name, and one line that says what it is for.
+         * @description A named experiment with one line about its purpose.
          */
         ExperimentPreset: {
             /** Name */
@@ -2044,7 +2053,7 @@ export interface components {
         };
         /**
          * ExperimentRequest
-         * @description What is to be run. `at`: not before this moment (with its time zone); None for as soon as possible.
+         * @description An experiment to run, not before the time `at` (with its time zone); None for as soon as possible.
          */
         ExperimentRequest: {
             /**
@@ -2200,7 +2209,8 @@ export interface components {
         };
         /**
          * FitData
-         * @description A fit, and the models before and after it beside the traces.
+         * @description A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces
+         *     cannot determine, a sentence each, with the parameters as people write them.
          */
         FitData: {
             /**
@@ -2239,6 +2249,11 @@ export interface components {
             models: components["schemas"]["ModelAgreement"][];
             /** Signals */
             signals: components["schemas"]["Overlay"][];
+            /**
+             * Undetermined
+             * @default []
+             */
+            undetermined?: string[];
         };
         /**
          * FitJobResult
@@ -2484,6 +2499,9 @@ export interface components {
         /**
          * FoundValue
          * @description One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it.
+         *
+         *     `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine). Both
+         *     are empty in older answers.
          */
         FoundValue: {
             /** Value */
@@ -2494,11 +2512,22 @@ export interface components {
             high: number | null;
             /** Unit */
             unit: string;
+            /**
+             * Part
+             * @default
+             */
+            part?: string;
+            /**
+             * Joints
+             * @default []
+             */
+            joints?: number[];
         };
         /**
          * Friction
-         * @description Friction known beforehand. Viscous as in (7.30), on the motor's side, times the motor's speed; `coulomb_arm` is
-         *     μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` a plain torque at the joint.
+         * @description Friction that is known beforehand. `viscous` is that of (7.30), on the motor's side, and multiplies the motor's
+         *     speed; `coulomb_arm` is μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` is a plain
+         *     torque at the joint.
          */
         Friction: {
             viscous_motor_side?: components["schemas"]["Quantity"] | null;
@@ -2553,7 +2582,7 @@ export interface components {
         };
         /**
          * Health
-         * @description Whether it answers, and whether it can take experiments. `checks`: one line each; empty where all is well.
+         * @description Whether the service answers, and can take experiments. `checks`: one line each; empty if the check succeeded.
          */
         Health: {
             /**
@@ -2570,7 +2599,7 @@ export interface components {
         };
         /**
          * HistoryMessage
-         * @description The last minutes, thinned so that no peak is lost. A signal has one row a joint; None where there is none.
+         * @description The last minutes, thinned so that no peak is lost. A signal has one row per joint; a missing value is None.
          */
         HistoryMessage: {
             /**
@@ -2614,7 +2643,7 @@ export interface components {
         };
         /**
          * Job
-         * @description One computation and what became of it. `progress` is a fraction from 0 to 1.
+         * @description One computation with its state and result. `progress` is a fraction from 0 to 1.
          */
         Job: {
             /** Id */
@@ -2682,7 +2711,7 @@ export interface components {
         /**
          * JogRequest
          * @description Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
-         *     Empty: hold.
+         *     No velocities: hold.
          */
         JogRequest: {
             /** Velocities */
@@ -2716,8 +2745,8 @@ export interface components {
          * @description One joint over one or more traces.
          *
          *     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-         *     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of what is left over that of
-         *     the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+         *     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of the residual divided by
+         *     that of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
          */
         JointAgreement: {
             /** Joint */
@@ -2828,7 +2857,7 @@ export interface components {
         };
         /**
          * KnownEffect
-         * @description An effect of the library: what a fit may add and a diagnosis looks for.
+         * @description An effect of the library, which a fit may add and a diagnosis considers.
          */
         KnownEffect: {
             /** Name */
@@ -2906,7 +2935,7 @@ export interface components {
         };
         /**
          * LinkMessage
-         * @description The link and its counters, once a second.
+         * @description The link and its counters; sent once a second.
          */
         LinkMessage: {
             /**
@@ -3013,7 +3042,7 @@ export interface components {
         /**
          * MeasuredGain
          * @description The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-         *     the reason why the trace does not tell it. Gains between `lowest` and `highest` agree with every sample.
+         *     the reason why the trace does not determine it. Gains between `lowest` and `highest` agree with every sample.
          */
         MeasuredGain: {
             /** Joint */
@@ -3114,7 +3143,7 @@ export interface components {
         };
         /**
          * ModelChange
-         * @description A new name or notes; what is None stays.
+         * @description A new name or notes; a field that is None stays as it is.
          */
         ModelChange: {
             /** Name */
@@ -3124,7 +3153,7 @@ export interface components {
         };
         /**
          * ModelDetails
-         * @description A model: its effects, its parameters, and the models that it comes from, the nearest first.
+         * @description A model: its effects, its parameters, and the models from which it was made, the nearest first.
          */
         ModelDetails: {
             entry: components["schemas"]["ModelEntry"];
@@ -3137,7 +3166,7 @@ export interface components {
         };
         /**
          * ModelEntry
-         * @description A model of the service, and where it comes from.
+         * @description A model of the service, and how it was made.
          */
         ModelEntry: {
             /** Id */
@@ -3170,10 +3199,10 @@ export interface components {
         };
         /**
          * ModelLineage
-         * @description Where a robot's models come from, and what was made of them.
+         * @description The models of a robot, and the jobs that made or used them.
          *
-         *     A model's parent is another of these models, the one that the machine file describes, or one that is not here any
-         *     more. A job leads from the models and traces of its request to the model that it made, if it made one.
+         *     A model's parent is another of these models, the one that the machine file describes, or one that has been
+         *     deleted. A job leads from the models and traces of its request to the model that it made, if it made one.
          */
         ModelLineage: {
             /** Machine */
@@ -3185,12 +3214,13 @@ export interface components {
         };
         /**
          * ModelParameter
-         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
-         *     nothing is claimed.
+         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None if
+         *     none is stated.
          */
         ModelParameter: {
             /** Name */
             name: string;
+            words: components["schemas"]["ParameterWords"];
             /** Unit */
             unit: string;
             /** Value */
@@ -3219,8 +3249,8 @@ export interface components {
         };
         /**
          * MotionPreview
-         * @description The motion of an experiment, worked out and checked without a robot. Columns of `set_points` are the machine's
-         *     joints, in rad; `violations` is what speaks against it, empty when it may run.
+         * @description The motion of an experiment, computed and checked without a robot. Columns of `set_points` are the machine's
+         *     joints, in rad; `violations` lists the limits that it violates, and is empty if it may run.
          */
         MotionPreview: {
             /** Time */
@@ -3241,8 +3271,8 @@ export interface components {
         };
         /**
          * MotionViolation
-         * @description One limit that a motion breaks: the worst place of one rule and joint (or link, for `floor` and `reach`). `time`
-         *     in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units.
+         * @description One limit that a motion violates: the worst place of one rule and joint (or link, for `floor` and `reach`).
+         *     `time` in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units.
          */
         MotionViolation: {
             /**
@@ -3362,7 +3392,7 @@ export interface components {
         };
         /**
          * NoController
-         * @description No controller in the loop, or none that is known: the recorded drive is the input.
+         * @description No controller in the loop, or an unknown one: the recorded drive is the input.
          */
         NoController: {
             /**
@@ -3409,10 +3439,10 @@ export interface components {
         };
         /**
          * Overlay
-         * @description One trace beside its simulations, thinned so that no peak is lost: of every stretch the extremes are kept.
+         * @description One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
          *
-         *     `time` is in s; signals have one row a joint, in the order of `joints`, in `units`. `simulated` and `residual`
-         *     (measured − simulated, thinned by itself) have such rows for every model, in the order of the result's `models`.
+         *     `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
+         *     (measured − simulated, thinned separately) have such rows for every model, in the order of the result's `models`.
          */
         Overlay: {
             /** Trace */
@@ -3482,7 +3512,8 @@ export interface components {
          * ParameterDifference
          * @description One parameter with its value in each model, None where a model does not have it.
          *
-         *     `deviations` is the spread of the values in expected deviations; None where one lacks it or none is expected.
+         *     `deviations` is the spread of the values in expected deviations; None where a model lacks the
+         *     parameter or no deviation is expected.
          */
         ParameterDifference: {
             /** Name */
@@ -3550,6 +3581,20 @@ export interface components {
             alone: number | null;
             /** Expected Deviation */
             expected_deviation: number | null;
+        };
+        /**
+         * ParameterWords
+         * @description A parameter as people write it. `joint`: the one that it, or its link, belongs to; None where it is not one.
+         */
+        ParameterWords: {
+            /** Joint */
+            joint: number | null;
+            /** Group */
+            group: string;
+            /** Short */
+            short: string;
+            /** Label */
+            label: string;
         };
         /**
          * Path
@@ -3874,8 +3919,8 @@ export interface components {
          * QueueStatus
          * @description Whether experiments are taken from the queue, and if not, why.
          *
-         *     `waiting_for` says in one line why nothing runs although the queue is not paused; empty when something runs or
-         *     nothing waits.
+         *     `waiting_for` says in one line why nothing runs although the queue is not paused; it is empty if an experiment runs
+         *     or none waits.
          */
         QueueStatus: {
             /** Paused */
@@ -3976,7 +4021,7 @@ export interface components {
         };
         /**
          * RecordEventMessage
-         * @description Something in the record of the experiment that runs: a ramp that begins, a limit, a retry.
+         * @description An event in the record of the running experiment, such as the beginning of a ramp, a limit or a retry.
          */
         RecordEventMessage: {
             /**
@@ -4004,7 +4049,7 @@ export interface components {
         };
         /**
          * RecordedPath
-         * @description Measured angles (rad), one row a control period, one column a joint; times (s) from the first row.
+         * @description Measured angles (rad), one row per control period, one column per joint; times (s) from the first row.
          */
         RecordedPath: {
             /** Joints */
@@ -4039,7 +4084,7 @@ export interface components {
         };
         /**
          * RefusedMessage
-         * @description What the client sent cannot be carried out.
+         * @description The client's message cannot be carried out.
          */
         RefusedMessage: {
             /**
@@ -4103,7 +4148,7 @@ export interface components {
         };
         /**
          * ResetRequest
-         * @description `here`: first make the posture measured now the set points.
+         * @description Ends a stop. `here`: first make the measured posture the set points.
          */
         ResetRequest: {
             /**
@@ -4251,7 +4296,7 @@ export interface components {
         /**
          * Sample
          * @description One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
-         *     since 1970) when it arrived, `age` the s that have passed since.
+         *     since 1970) when it arrived, `age` the time (s) since then.
          */
         Sample: {
             /** Tick */
@@ -4306,7 +4351,7 @@ export interface components {
         };
         /**
          * SampledPid
-         * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) a joint. `velocity_gains` closes
+         * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
          *     an inner loop (cascade): the outer output is then a speed set point for it.
          */
         SampledPid: {
@@ -4332,8 +4377,8 @@ export interface components {
         };
         /**
          * Schedule
-         * @description A schedule and how far it is. Runs that were due while the service was off, or while the run before still waited,
-         *     are left out, not made up for.
+         * @description A schedule and its progress. Runs that were due while the service was off, or while the previous run still
+         *     waited, are skipped.
          */
         Schedule: {
             /** Id */
@@ -4376,7 +4421,7 @@ export interface components {
         };
         /**
          * ScheduleRequest
-         * @description An experiment to be run every so often: studies of wear and drift.
+         * @description An experiment to run at regular intervals, for studies of wear and drift.
          */
         ScheduleRequest: {
             /**
@@ -4461,7 +4506,7 @@ export interface components {
         };
         /**
          * ServiceEvent
-         * @description One thing that happened. `number` grows with every event, whatever the clock does.
+         * @description Something that happened. `number` grows with every event, even if the clock is set back.
          */
         ServiceEvent: {
             /** Number */
@@ -4625,8 +4670,8 @@ export interface components {
         };
         /**
          * StepRequest
-         * @description One off-line step to absolute angles (`to`), or by relative ones (`by`), in rad; `speed` of the fastest joint in
-         *     rad/s. Give one of the two.
+         * @description One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed` is
+         *     that of the fastest joint, in rad/s.
          */
         StepRequest: {
             /** To */
@@ -4661,12 +4706,17 @@ export interface components {
              * @default
              */
             note?: string;
+            /**
+             * Detail
+             * @default
+             */
+            detail?: string;
             /** Text */
             text: string;
         };
         /**
          * StorageStatus
-         * @description Where things are kept, and how much room there is (bytes).
+         * @description Where data are stored, and how much space is free (bytes).
          */
         StorageStatus: {
             /** Traces Folder */
@@ -4684,7 +4734,7 @@ export interface components {
         };
         /**
          * StoredProgram
-         * @description A program with what is known about it.
+         * @description A program with its entry in the list.
          */
         StoredProgram: {
             entry: components["schemas"]["ProgramEntry"];
@@ -4692,7 +4742,7 @@ export interface components {
         };
         /**
          * SystemStatus
-         * @description The service: version, since when it runs, storage, watchers.
+         * @description The service: version, uptime, storage, clients.
          */
         SystemStatus: {
             /** Version */
@@ -4715,8 +4765,8 @@ export interface components {
         };
         /**
          * TaughtPath
-         * @description Measured angles (rad), one row a control period, one column a joint; times (s) from the first row. As the `path`
-         *     of an experiment it is played back.
+         * @description Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. An
+         *     experiment with this as its `path` plays it back.
          */
         TaughtPath: {
             /** Joints */
@@ -4728,7 +4778,7 @@ export interface components {
         };
         /**
          * TeachingLine
-         * @description A line for the operator who teaches: a joint that is refused, an instruction that begins.
+         * @description A line for the operator who teaches, such as a refused joint, or the beginning of an instruction.
          */
         TeachingLine: {
             /** Number */
@@ -4756,7 +4806,7 @@ export interface components {
         };
         /**
          * TeachingStatus
-         * @description What is being taught now, and how the last one ended.
+         * @description The teaching activity under way, and how the last one ended.
          */
         TeachingStatus: {
             /**
@@ -4783,7 +4833,7 @@ export interface components {
         };
         /**
          * ThinnedMessage
-         * @description This client reads too slowly: so many samples were left out for it. It is dropped if that goes on.
+         * @description This client reads too slowly, and samples were left out. It is disconnected if that goes on.
          */
         ThinnedMessage: {
             /**
@@ -4796,7 +4846,7 @@ export interface components {
         };
         /**
          * Ticket
-         * @description Good for one WebSocket, once, for `seconds`: browsers cannot send a token with it.
+         * @description A ticket, valid once within `seconds` for a WebSocket, with which browsers cannot send a token.
          */
         Ticket: {
             /** Ticket */
@@ -4848,7 +4898,7 @@ export interface components {
         };
         /**
          * TraceAgreement
-         * @description One trace; `held_out` tells whether the model was fitted to it, None where that is not the question.
+         * @description One trace; `held_out` tells whether the model was fitted to it, None where nothing was fitted.
          */
         TraceAgreement: {
             /** Trace */
@@ -4862,7 +4912,7 @@ export interface components {
         };
         /**
          * TraceChange
-         * @description New tags or notes; what is None stays.
+         * @description New tags or notes; a field that is None stays as it is.
          */
         TraceChange: {
             /** Tags */
@@ -4872,7 +4922,7 @@ export interface components {
         };
         /**
          * TraceDetails
-         * @description One trace: what it says about itself, its figures and events.
+         * @description One trace: its record, figures and events.
          */
         TraceDetails: {
             entry: components["schemas"]["CatalogueEntry"];
@@ -4976,10 +5026,10 @@ export interface components {
         };
         /**
          * TraceSignals
-         * @description Signals of a trace for a plot, thinned so that no peak is lost: of every stretch the extremes are kept.
+         * @description Signals of a trace for a plot, thinned to the extremes of short stretches, so that no peak is lost.
          *
-         *     `time` is in s; a signal has one row a joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
-         *     `drive_unit`. A signal that the trace has not is None.
+         *     `time` is in s; a signal has one row per joint, in the order of `joints`, in rad, or in m for a prismatic joint; the
+         *     drive is in `drive_unit`. A signal that the trace does not have is None.
          */
         TraceSignals: {
             /** Id */
@@ -5059,14 +5109,18 @@ export interface components {
         };
         /**
          * ValidationData
-         * @description A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other (its curves
-         *     are the same), and what would have to move with time, a trace each, thinned.
+         * @description A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
+         *     same curves), and for each trace, thinned, how parameters would have to vary with time.
          */
         ValidationData: {
             fidelity: components["schemas"]["Fidelity"];
             three_sigma: components["schemas"]["Fidelity"];
             /** Time Domain */
             time_domain: components["schemas"]["TimeDomain"][];
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
         };
         /**
          * ValidationJobResult
@@ -5122,8 +5176,8 @@ export interface components {
          * Via
          * @description Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
          *
-         *     `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
-         *     passed, the last being the end. Position, velocity and acceleration are continuous.
+         *     `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
+         *     last is the end. Position, velocity and acceleration are continuous.
          */
         Via: {
             /**
@@ -5153,7 +5207,7 @@ export interface components {
         };
         /**
          * WaitsBehind
-         * @description What a queued job waits for: the first of the jobs of its lane that come before it.
+         * @description The job that a queued job waits for: the first of those before it in its lane.
          */
         WaitsBehind: {
             /** Job */
@@ -5321,7 +5375,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5370,7 +5424,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5402,7 +5456,7 @@ export interface operations {
                 experiment?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -5452,7 +5506,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5505,7 +5559,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5536,7 +5590,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5589,7 +5643,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5619,7 +5673,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5649,7 +5703,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5679,7 +5733,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5709,7 +5763,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5735,7 +5789,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Sent again with the same request, it is carried out once. */
+                /** @description A request sent again with the same key is carried out once. */
                 "idempotency-key"?: string | null;
             };
             path: {
@@ -5901,7 +5955,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5935,7 +5989,7 @@ export interface operations {
                 order?: "submitted" | "ended";
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -5962,7 +6016,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Sent again with the same request, it is carried out once. */
+                /** @description A request sent again with the same key is carried out once. */
                 "idempotency-key"?: string | null;
             };
             path: {
@@ -6275,7 +6329,7 @@ export interface operations {
             query?: {
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -6426,7 +6480,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -6479,7 +6533,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -6512,7 +6566,7 @@ export interface operations {
                 until?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -6724,7 +6778,7 @@ export interface operations {
                 model?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -6751,7 +6805,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Sent again with the same request, it is carried out once. */
+                /** @description A request sent again with the same key is carried out once. */
                 "idempotency-key"?: string | null;
             };
             path: {
@@ -6912,7 +6966,7 @@ export interface operations {
             query?: {
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;

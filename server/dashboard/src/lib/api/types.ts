@@ -43,6 +43,7 @@ export type ModelParameter = Told<Schemas['ModelParameter']>;
 export type MotionPreview = Told<Schemas['MotionPreview']>;
 export type NextExperiment = Told<Schemas['NextExperiment']>;
 export type Overlay = Told<Schemas['Overlay']>;
+export type ParameterWords = Told<Schemas['ParameterWords']>;
 export type PhaseCell = Told<Schemas['PhaseCell']>;
 export type ProcessState = Told<Schemas['ProcessState']>;
 export type QueueStatus = Told<Schemas['QueueStatus']>;

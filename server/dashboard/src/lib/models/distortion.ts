@@ -1,6 +1,7 @@
 /** The distortion method in pictures: Σλ² as a bar of contributions, and curves of the error against a parameter. */
 
 import type { Fidelity } from '../api/types';
+import type { Words } from './parameters';
 
 export type Distortion = Fidelity['parameters'][number];
 export type Curve = Fidelity['curves'][number];
@@ -25,7 +26,11 @@ export interface ContributionBar {
 }
 
 /** The largest contributions one after the other, the rest as one part. */
-export function contributionBar(parameters: readonly Distortion[], most: number): ContributionBar {
+export function contributionBar(
+  parameters: readonly Distortion[],
+  words: Words,
+  most: number,
+): ContributionBar {
   const ranked = parameters
     .filter((one) => one.contribution > 0)
     .sort((one, other) => other.contribution - one.contribution);
@@ -33,7 +38,7 @@ export function contributionBar(parameters: readonly Distortion[], most: number)
   const scale = Math.max(1, total);
   const shown = ranked.slice(0, most).map((one) => ({
     name: one.name,
-    joint: jointOf(one.name),
+    joint: words[one.name]?.joint ?? null,
     value: one.contribution,
   }));
   const left = ranked.slice(most);
@@ -51,12 +56,6 @@ export function contributionBar(parameters: readonly Distortion[], most: number)
     return { ...one, begin, end: place };
   });
   return { parts, total, scale, one: 1 / scale };
-}
-
-/** `joint2.motor.resistance` and `link2.mass` belong to joint 2. */
-export function jointOf(name: string): number | null {
-  const found = /^(?:joint|link)(\d+)\b/.exec(name);
-  return found === null ? null : Number(found[1]);
 }
 
 /** A curve is drawn up to so many times its least error. */

@@ -1,20 +1,22 @@
 import { describe, expect, it } from 'vitest';
-import type { Fidelity, FittedParameter, ModelParameter } from '../api/types';
-import { contributionBar, curvePicture, jointOf, pathOf, type Distortion } from './distortion';
-import { shortLabels } from './labels';
-import {
-  grouped,
-  groupName,
-  ofDiagnosis,
-  ofFit,
-  inWords,
-  parameterName,
-  parameterRows,
-  whisker,
-} from './parameters';
+import type { Fidelity, FittedParameter, ModelParameter, ParameterWords } from '../api/types';
+import { contributionBar, curvePicture, pathOf, type Distortion } from './distortion';
+import { grouped, ofDiagnosis, ofFit, parameterName, parameterRows, whisker } from './parameters';
 
-const parameter = (name: string, value: number, deviation: number | null): ModelParameter => ({
+const said = (joint: number | null, group: string, short: string): ParameterWords => ({
+  joint,
+  group,
+  short,
+  label: `${group} ${short}`,
+});
+const WORDS = {
+  'joint2.motor.resistance': said(2, 'joint 2', 'motor resistance'),
+  'link1.mass': said(1, 'link 1', 'mass'),
+  'load.mass': said(null, 'load', 'mass'),
+};
+const parameter = (name: keyof typeof WORDS, value: number, deviation: number | null): ModelParameter => ({
   name,
+  words: WORDS[name],
   unit: 'kg',
   value,
   low: 0,
@@ -37,26 +39,23 @@ describe('parameters', () => {
     [
       parameter('joint2.motor.resistance', 1.1, 0.1),
       parameter('link1.mass', 3, 0.2),
-      parameter('g', 9.81, null),
+      parameter('load.mass', 0.5, null),
     ],
     ofFit([fitted('joint2.motor.resistance', 1.0, 1.5), fitted('link1.mass', null, null)]),
   );
 
-  it('are called as people write them where no heading says whose they are', () => {
-    expect(
-      ['joint2.motor.back_emf_constant', 'joint3.load_dependent_friction.arm', 'link1.mass', 'load.mass'].map(
-        parameterName,
-      ),
-    ).toEqual(['J2 motor back-EMF constant', 'J3 load-dependent friction arm', 'link 1 mass', 'load mass']);
+  it('are called as the service writes them for people, and by their names where it does not say', () => {
+    expect(parameterName('link1.mass', WORDS)).toBe('link 1 mass');
+    expect(parameterName('link9.mass', WORDS)).toBe('link9.mass');
   });
 
   it('carry what a fit found of them', () => {
     expect(rows.map((one) => [one.group, one.short, one.known])).toEqual([
-      ['joint2', 'motor resistance', 'known'],
-      ['link1', 'mass', 'unknown'],
-      ['g', 'g', 'given'],
+      ['joint 2', 'motor resistance', 'known'],
+      ['link 1', 'mass', 'unknown'],
+      ['load', 'mass', 'given'],
     ]);
-    expect(grouped(rows).map(([name]) => groupName(name))).toEqual(['joint 2', 'link 1', 'g']);
+    expect(grouped(rows).map(([group]) => group)).toEqual(['joint 2', 'link 1', 'load']);
   });
 
   it('lie on one scale: deviations from what was expected', () => {
@@ -82,23 +81,24 @@ const distortion = (name: string, contribution: number, required: number | null 
 
 describe('Σλ²', () => {
   it('is a bar whose parts add up, against 1', () => {
-    const bar = contributionBar([distortion('a', 0.1), distortion('b', 0.3), distortion('c', 0)], 5);
+    const bar = contributionBar([distortion('a', 0.1), distortion('b', 0.3), distortion('c', 0)], {}, 5);
     expect(bar.parts.map((one) => one.name)).toEqual(['b', 'a']);
     expect(bar.parts.at(-1)?.end).toBeCloseTo(0.4);
     expect([bar.scale, bar.one]).toEqual([1, 1]);
   });
 
   it('knows whose parameters they are', () => {
-    expect(['joint2.motor.resistance', 'link3.mass', 'load.mass', '4 more'].map(jointOf)).toEqual([
-      2,
-      3,
-      null,
-      null,
-    ]);
+    const names = ['joint2.motor.resistance', 'link1.mass', 'load.mass', 'other', 'more'];
+    const bar = contributionBar(
+      names.map((name, index) => distortion(name, 5 - index)),
+      WORDS,
+      4,
+    );
+    expect(bar.parts.map((one) => one.joint)).toEqual([2, 1, null, null, null]);
   });
 
   it('beyond 1 fills the bar, and small parts become one', () => {
-    const bar = contributionBar([distortion('a', 3), distortion('b', 0.5), distortion('c', 0.5)], 1);
+    const bar = contributionBar([distortion('a', 3), distortion('b', 0.5), distortion('c', 0.5)], {}, 1);
     expect(bar.parts.map((one) => one.name)).toEqual(['a', '2 more']);
     expect(bar.parts.at(-1)?.end).toBeCloseTo(1);
     expect(bar.one).toBe(0.25);
@@ -144,24 +144,5 @@ describe('curves of the error', () => {
         40,
       ),
     ).toBe('M0.0 20.0L100.0 0.0');
-  });
-});
-
-describe('models beside each other', () => {
-  it('are called by their names, and by their numbers where these are alike', () => {
-    expect(shortLabels(['ma2000 (machine)', 'first fit (d9770bd3fec5)'])).toEqual([
-      'ma2000 (machine)',
-      'first fit',
-    ]);
-    const alike = ['fit (d9770bd3fec5)', 'fit (a9770bd3fec5)'];
-    expect(shortLabels(alike)).toEqual(alike);
-  });
-});
-
-describe('what a fit cannot tell', () => {
-  it('names its parameters as people do', () => {
-    expect(inWords('together joint2.viscous_friction.coefficient -0.066 %, link1.mass +1 %')).toBe(
-      'together J2 viscous friction coefficient −0.066 %, link 1 mass +1 %',
-    );
   });
 });

@@ -3,7 +3,13 @@ import { Problem } from '../api/problem';
 import type { ModelDetails, ModelParameter } from '../api/types';
 import { OpenedModel, type ModelRequests } from './opened_model.svelte';
 
-const parameter = { name: 'joint2.motor.resistance', unit: 'Ω', value: 5, deviation: 0.5 } as ModelParameter;
+const parameter = {
+  name: 'joint2.motor.resistance',
+  words: { joint: 2, group: 'joint 2', short: 'motor resistance', label: 'J2 motor resistance' },
+  unit: 'Ω',
+  value: 5,
+  deviation: 0.5,
+} as ModelParameter;
 const details = (job: string | null): ModelDetails =>
   ({
     entry: { id: 'a', name: 'first fit', job },

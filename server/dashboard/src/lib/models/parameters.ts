@@ -1,15 +1,15 @@
 /** Parameters of a model as dots with whiskers, on a scale that all of them share. */
 
-import type { DiagnosisData, FittedParameter, ModelParameter } from '../api/types';
+import type { DiagnosisData, FittedParameter, ModelParameter, ParameterWords } from '../api/types';
 
 /** What the data say: an interval; only a combination with others; nothing. `given`: it was not asked. */
 export type Known = 'known' | 'combination' | 'unknown' | 'given';
 
 export interface ParameterRow {
   name: string;
-  /** The part before the first dot: `joint2`, `link1`, `base`. */
+  /** Whose it is: joint 2, link 1, load. */
   group: string;
-  /** What is left of the name. */
+  /** What it is, beneath its group. */
   short: string;
   unit: string;
   value: number;
@@ -69,27 +69,12 @@ export function ofDiagnosis(found: Pick<DiagnosisData, 'steps'>): Map<string, Fo
   return intervals;
 }
 
-/** `joint2.motor.torque_constant` as people write it where no heading says whose it is: J2 motor torque constant. */
-export function parameterName(name: string): string {
-  const [group = '', ...rest] = name.split('.');
-  const joint = /^joint(\d+)$/.exec(group);
-  const whose = joint === null ? groupName(group) : `J${joint[1]}`;
-  return [whose, ...rest.map(words)].join(' ');
-}
+/** How people write the parameters that a result names. Results of earlier versions have none. */
+export type Words = Readonly<Record<string, ParameterWords>>;
 
-/** A sentence of a fit with its parameters' names as people write them. */
-export function inWords(text: string): string {
-  return text.replace(/\b[a-z]+\d*(\.[a-z_\d]*[a-z][a-z_\d]*)+/g, parameterName).replace(/ -(?=\d)/g, ' −');
-}
-
-/** Words of one part of a parameter's name. */
-function words(part: string): string {
-  return part
-    .replaceAll('_dependent', '-dependent')
-    .replace('back_emf', 'back-EMF')
-    .replace(/^coulomb/, 'Coulomb')
-    .replace(/^stribeck/, 'Stribeck')
-    .replaceAll('_', ' ');
+/** A parameter where no heading says whose it is: J2 motor torque constant. */
+export function parameterName(name: string, words: Words): string {
+  return words[name]?.label ?? name;
 }
 
 /** One row a parameter of the model, with what was found of it. */
@@ -98,12 +83,11 @@ export function parameterRows(
   found: ReadonlyMap<string, FoundInterval>,
 ): ParameterRow[] {
   return parameters.map((one) => {
-    const [group = '', ...rest] = one.name.split('.');
     const own = found.get(one.name);
     return {
       name: one.name,
-      group,
-      short: rest.length === 0 ? one.name : rest.map(words).join(' '),
+      group: one.words.group,
+      short: one.words.short,
       unit: one.unit,
       value: one.value,
       low: own?.low ?? null,
@@ -152,12 +136,4 @@ export function grouped(rows: readonly ParameterRow[]): [string, ParameterRow[]]
   const groups = new Map<string, ParameterRow[]>();
   for (const row of rows) groups.set(row.group, [...(groups.get(row.group) ?? []), row]);
   return [...groups];
-}
-
-const GROUP_WORD = /^([a-z]+?)(\d+)$/;
-
-/** `joint2` as people write it. */
-export function groupName(group: string): string {
-  const found = GROUP_WORD.exec(group);
-  return found === null ? group.replaceAll('_', ' ') : `${found[1]} ${found[2]}`;
 }

@@ -3,7 +3,7 @@ import { queueBadge, queueState, whatGoesOn } from './words';
 
 const robot = { connection: 'connected', arm: 'idle', activity: 'none' } as const;
 const queue = { paused: false, reason: 'resumed by anna', running: null, waiting_for: '' };
-const paused = { ...queue, paused: true, reason: 'paused by anna' };
+const paused = { ...queue, paused: true, reason: 'by anna' };
 
 describe('what goes on', () => {
   it('is nothing only where something could be started at once', () => {
@@ -20,14 +20,14 @@ describe('what goes on', () => {
       isFree: false,
     });
     expect(whatGoesOn(robot, paused, 0)).toEqual({
-      text: 'The queue is paused by anna.',
+      text: 'The queue is paused: by anna.',
       isFree: false,
     });
   });
 
   it('is what the arm does, also while the queue is paused', () => {
     expect(whatGoesOn({ ...robot, activity: 'experiment' }, paused, 0).text).toBe(
-      'An experiment is running. The queue is paused by anna.',
+      'An experiment is running. The queue is paused: by anna.',
     );
   });
 });

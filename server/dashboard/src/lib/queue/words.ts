@@ -25,24 +25,18 @@ export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: nu
   const activity = ACTIVITIES[robot?.activity ?? 'none'];
   const isHeld = robot?.arm === 'stopped' || robot?.arm === 'fault';
   const held = isHeld ? 'Nothing moves until the arm is reset.' : '';
-  const paused = queue?.paused ? `The queue is ${pausedWhy(queue.reason)}.` : '';
+  const paused = queue?.paused ? `The queue is paused: ${queue.reason}.` : '';
   const said = [activity || held, paused].filter((part) => part !== '').join(' ');
   if (said !== '' || waiting > 0 || robot === null || queue === null) return { text: said, isFree: false };
   if (robot.connection !== 'connected') return { text: '', isFree: false };
   return { text: 'Nothing is running or waiting.', isFree: true };
 }
 
-/** `paused by anna`, `paused: the arm is stopped`: the reason may say itself that it is paused. */
-function pausedWhy(reason: string): string {
-  return reason.startsWith('paused') ? reason : `paused: ${reason}`;
-}
-
 /** Why the queue does what it does. `isConnected`: whether there is an arm to move. */
 export function queueState(queue: Queue, isConnected: boolean): { head: string; text: string } {
   if (queue.paused) {
     const goesOn = queue.running ? ' The experiment that is running goes on to its end.' : '';
-    const [, colon = '', why = ''] = /^paused(:?) (.*)$/.exec(pausedWhy(queue.reason)) ?? [];
-    return { head: `Paused${colon}`, text: `${why}.${goesOn}` };
+    return { head: 'Paused:', text: `${queue.reason}.${goesOn}` };
   }
   if (queue.waiting_for) return { head: 'Waiting:', text: `${queue.waiting_for}.` };
   if (queue.running) return { head: '', text: 'One experiment is running.' };

@@ -8,7 +8,8 @@ const CONFIRMED: StopResult = {
   tick: 7,
   seconds: 0.03,
   note: '',
-  text: 'frozen at tick 7',
+  detail: 'frozen at tick 7',
+  text: 'stopped, confirmed by the board: frozen at tick 7',
 };
 const never = (): Promise<StopResult> => new Promise(() => {});
 const refused = (why: string) => (): Promise<StopResult> => Promise.reject(new Error(why));

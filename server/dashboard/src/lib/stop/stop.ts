@@ -16,6 +16,7 @@ export const AGAIN_AFTER = 0.25;
 export const ATTEMPTS = 12;
 export const EMERGENCY = 'Use the emergency stop.';
 
+/** `text`: what is known beyond the kind. */
 export type StopState =
   | { kind: 'none' }
   | { kind: 'sending' }
@@ -34,7 +35,7 @@ export interface StopParts {
 
 /** What an answer of the service means. */
 export function stateOf(result: StopResult): StopState {
-  const { text, seconds } = result;
+  const { detail: text, seconds } = result;
   if (result.confirmed) return { kind: 'confirmed', text, seconds };
   return result.delivered ? { kind: 'delivered', text, seconds } : { kind: 'not delivered', text };
 }

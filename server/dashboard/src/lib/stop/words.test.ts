@@ -1,8 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import { sentence } from '../format';
-import { detailOf, whyStopped, wordsOf } from './words';
+import { wordsOf } from './words';
 
-const confirmed = { kind: 'confirmed', text: 'stopped, confirmed: frozen at tick 7', seconds: 0.03 } as const;
+const confirmed = { kind: 'confirmed', text: 'frozen at tick 7', seconds: 0.03 } as const;
 const lost = { kind: 'not delivered', text: 'nobody answers' } as const;
 
 describe('the message about a stop', () => {
@@ -40,19 +40,6 @@ describe('the message about a stop', () => {
   });
 });
 
-it.each([
-  [
-    'stopped on request, by daq stop or through the service',
-    'On request, by daq stop or through the service.',
-  ],
-  ['the arm has been stopped: nobody is there', 'Nobody is there.'],
-  ['stopped', ''],
-  ['a limit of joint 2', 'A limit of joint 2.'],
-])('why it is stopped: %s', (cause, said) => {
-  expect(whyStopped(cause)).toBe(said);
-});
-
-it('says nothing twice, and ends sentences', () => {
-  expect(detailOf('stop NOT DELIVERED: no robot is connected')).toBe('No robot is connected.');
+it('ends sentences', () => {
   expect(sentence('is it on?')).toBe('Is it on?');
 });

@@ -1,4 +1,4 @@
-/** A stop in words: what became of it, whether that still holds, and why an arm is stopped. Pure. */
+/** A stop in words: what became of it, and whether that still holds. Pure. */
 
 import { sentence } from '../format';
 import type { ArmNow, Standing } from './standing';
@@ -17,7 +17,7 @@ export function wordsOf(state: StopState, standing: Standing, arm: ArmNow, time:
   if (state.kind === 'none') return null;
   if (state.kind === 'sending') return { look: 'sending', sign: '◐', head: 'Stop is being sent', text: '' };
   if (standing === 'past') return pastOf(state.kind, arm, time);
-  const text = detailOf(state.text);
+  const text = sentence(state.text);
   if (state.kind === 'not delivered') {
     return { look: 'not-delivered', sign: '✕', head: 'Stop NOT DELIVERED', text };
   }
@@ -49,14 +49,4 @@ function pastOf(kind: 'confirmed' | 'delivered' | 'not delivered', arm: ArmNow, 
     head: `Past: the stop of ${time} ${what}`,
     text: now,
   };
-}
-
-/** What the service says beyond what the head of the message says already. */
-export function detailOf(text: string): string {
-  return sentence(text.replace(/^stop[^:]*: /i, ''));
-}
-
-/** Why the arm is stopped, behind words that say that it is: "stopped by a signal" becomes "By a signal." */
-export function whyStopped(cause: string): string {
-  return sentence(cause.replace(/^(the arm )?(is |was |has been )?stopped\b[\s:,.]*/i, ''));
 }

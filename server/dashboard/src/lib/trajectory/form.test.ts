@@ -163,7 +163,7 @@ describe('what is wrong with what is typed', () => {
 
   it('is put where it belongs when the service finds it', () => {
     expect(formField('spec.trajectory.ramp.duration')).toBe('trajectory.duration');
-    expect(formField('spec.trajectory.ramp.amplitude.constrained-float')).toBe('trajectory.amplitude');
+    expect(formField('spec.trajectory.ramp.amplitude')).toBe('trajectory.amplitude');
     expect(formField('spec.gains.1.0')).toBe('gains.1.0');
     expect(formField('at')).toBe('at');
   });

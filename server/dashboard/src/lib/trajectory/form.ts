@@ -173,9 +173,7 @@ export function specOf(form: SpecForm, rules: SpecRules): FormResult {
 
 /** Where a problem that the service found belongs in the form: `spec.trajectory.ramp.duration` is `trajectory.duration`. */
 export function formField(field: string): string {
-  const parts = field
-    .split('.')
-    .filter((part) => !part.startsWith('constrained-') && !part.startsWith('dict['));
+  const parts = field.split('.');
   if (parts[0] === 'spec') parts.shift();
   if (parts[0] === 'trajectory' && parts.length > 2) parts.splice(1, 1);
   return parts.join('.');

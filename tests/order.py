@@ -1,0 +1,66 @@
+"""In which order the test files run, and which of them stay with one worker."""
+
+from pathlib import Path
+
+import pytest
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
+
+TESTS = Path(__file__).parent
+AGAINST_THE_CLOCK = (
+    "contract",
+    "daq/acquisition",
+    "daq_cli",
+    "daq/client",
+    "daq/transport",
+    "mock/process",
+    "server",
+)
+"""Folders of tests with processes in real time. A machine that gives them no processor for half a second makes them
+fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. They
+are tried again, and the summary names each that was: one that comes up again and again is a race, not a busy machine.
+What runs on a real arm is never repeated by itself."""
+ONE_WORKER = ("server/dashboard", "server/jobs", "server")
+"""Folders whose tests share a service, and a browser, that are costly to start: one worker runs the whole folder."""
+
+
+def is_against_the_clock(test: pytest.Item) -> bool:
+    """Whether the test starts processes that run in real time."""
+    return any(test.path.is_relative_to(TESTS / folder) for folder in AGAINST_THE_CLOCK)
+
+
+def unit_of(path: Path) -> str:
+    """The unit of work, all of which one worker runs, that a test file belongs to: a folder's name, or its own."""
+    for folder in ONE_WORKER:
+        if path.is_relative_to(TESTS / folder):
+            return folder
+    return path.relative_to(TESTS).as_posix()
+
+
+def alternate(items: list[pytest.Item]) -> None:
+    """Put units that wait for processes in real time between units that compute, the largest first: run one kind after
+    the other, the cores would be idle during the first and short during the second."""
+    units: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        unit = unit_of(item.path) if item.path.is_relative_to(TESTS) else str(item.path)
+        units.setdefault(unit, []).append(item)
+    waiting = [unit for unit, tests in units.items() if is_against_the_clock(tests[0])]
+    waiting.sort(key=lambda unit: (unit not in ONE_WORKER, -len(units[unit]) if unit in ONE_WORKER else 0))
+    computing = [unit for unit in units if unit not in waiting]
+    mixed = sorted(_places(waiting) + _places(computing))
+    items[:] = [item for _, unit in mixed for item in units[unit]]
+
+
+def _places(units: list[str]) -> list[tuple[float, str]]:
+    """Each unit with its place between 0 (first) and 1 (last) of its kind."""
+    return [((number + 0.5) / len(units), unit) for number, unit in enumerate(units)]
+
+
+class UnitScheduling(LoadScopeScheduling):
+    """Hands whole units of work to the workers of pytest-xdist, in the order of the collected tests."""
+
+    def __init__(self, config: pytest.Config, log: Producer | None = None) -> None:
+        super().__init__(config, log)
+
+    def _split_scope(self, nodeid: str) -> str:
+        return unit_of(TESTS.parent / nodeid.split("::", 1)[0])
