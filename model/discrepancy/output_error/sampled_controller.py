@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine, SampledPid, of_joint
 from daq.contracts.trace import Trace
@@ -38,7 +39,7 @@ class ControllerNumbers:
     used: Floats
     formed: Floats
     drive: Floats
-    free: Floats
+    free: NDArray[np.bool_]
     factor: float
 
 
@@ -101,7 +102,7 @@ class _Law:
         self.period = period
 
     def follow(
-        self, sent: Floats, position: Floats, drive: Floats, limited: Floats, factor: float, line: float
+        self, sent: Floats, position: Floats, drive: Floats, limited: NDArray[np.bool_], factor: float, line: float
     ) -> tuple[Floats, Floats]:
         """Set points in use, and the drive that the gains make of them. A set point counts as lost where the drive is
         further than `line` from what it would make, and nearer to what the one before makes."""
