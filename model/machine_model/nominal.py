@@ -13,6 +13,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import (
     BoardPid,
     Body,
+    CurrentDrive,
     Cylinder,
     DcMotor,
     Joint,
@@ -140,7 +141,7 @@ def _of_sensor(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, fl
     yield "sensor", Kind.GEOMETRY, "zero", zero, column, -math.inf
 
 
-def _of_drive(drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+def _of_drive(drive: DcMotor | CurrentDrive | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
         yield "motor", Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
@@ -151,6 +152,12 @@ def _of_drive(drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quan
             yield "motor", Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
         if drive.supply_limit is not None and drive.supply_limit.deviation is not None:
             yield "motor", Kind.DRIVE, "supply_limit", drive.supply_limit, at.SUPPLY, 0.0
+    elif isinstance(drive, CurrentDrive):
+        yield "motor", Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
+        if drive.rotor_inertia is not None:
+            yield "motor", Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
+        if drive.gear_ratio.deviation is not None:
+            yield "motor", Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
     else:
         yield "drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
         if drive.inertia is not None:
@@ -199,7 +206,7 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
         row[at.VOLTS_PER_COUNT] *= sensor.direction
 
 
-def _fill_drive(row: NDArray[np.float64], drive: DcMotor | PlainGain) -> None:
+def _fill_drive(row: NDArray[np.float64], drive: DcMotor | CurrentDrive | PlainGain) -> None:
     if isinstance(drive, DcMotor):
         row[at.RESISTANCE], row[at.INDUCTANCE] = drive.resistance.value, drive.inductance.value
         row[at.TORQUE_CONSTANT], row[at.BACK_EMF] = drive.torque_constant.value, drive.back_emf_constant.value
@@ -209,9 +216,13 @@ def _fill_drive(row: NDArray[np.float64], drive: DcMotor | PlainGain) -> None:
     else:
         row[at.RESISTANCE] = row[at.GEAR] = row[at.VOLTS_PER_COUNT] = 1.0
         row[at.INDUCTANCE] = 1e-3
-        row[at.TORQUE_CONSTANT] = drive.gain.value
-        row[at.ROTOR_INERTIA] = 0.0 if drive.inertia is None else drive.inertia.value
         row[at.SUPPLY] = NO_LIMIT
+        if isinstance(drive, CurrentDrive):
+            row[at.TORQUE_CONSTANT], row[at.GEAR] = drive.torque_constant.value, drive.gear_ratio.value
+            row[at.ROTOR_INERTIA] = 0.0 if drive.rotor_inertia is None else drive.rotor_inertia.value
+        else:
+            row[at.TORQUE_CONSTANT] = drive.gain.value
+            row[at.ROTOR_INERTIA] = 0.0 if drive.inertia is None else drive.inertia.value
 
 
 def joint_scale(machine: Machine, number: int) -> JointScale:
@@ -229,7 +240,9 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
             speed = volts / (drive.back_emf_constant.value * drive.gear_ratio.value)
         gear = drive.gear_ratio.value
     else:
-        supply, volts, torque, gear = NO_LIMIT, 10.0, abs(drive.gain.value) * 10.0, 1.0
+        gear = drive.gear_ratio.value if isinstance(drive, CurrentDrive) else 1.0
+        gain = gear * drive.torque_constant.value if isinstance(drive, CurrentDrive) else drive.gain.value
+        supply, volts, torque = NO_LIMIT, 10.0, abs(gain) * 10.0
     bounded = isinstance(drive, DcMotor)
     friction = joint.friction.viscous_motor_side or joint.friction.viscous
     controller = machine.controller
@@ -280,11 +293,10 @@ def _transmission_inertia(machine: Machine, number: int) -> float:
     if number == machine.modelled_joints[-1] and machine.load is not None:
         own += machine.load.value * (joint.geometry.a.value**2 if joint.kind == "revolute" else 1.0)
     drive = joint.drive
-    rotor = (
-        drive.rotor_inertia.value * drive.gear_ratio.value**2
-        if isinstance(drive, DcMotor)
-        else (0.0 if drive.inertia is None else drive.inertia.value)
-    )
+    if isinstance(drive, PlainGain):
+        rotor = 0.0 if drive.inertia is None else drive.inertia.value
+    else:
+        rotor = 0.0 if drive.rotor_inertia is None else drive.rotor_inertia.value * drive.gear_ratio.value**2
     both = [i for i in (own, rotor) if i > 0]
     if not both:
         raise SpecError(f"machine {machine.name}: joint {number} has no inertia: neither its link nor its drive")

@@ -36,11 +36,11 @@ VISCOUS, COULOMB = (2.4e-4, 2.2e-4, 1.8e-4), (1.1, 1.4, 0.7)
 """Motor side, N·m·s/rad; at the joint, N·m."""
 
 
-def machine(*, rounded: bool = True) -> Machine:
-    """The machine file as its lab would write it. Without `rounded`, it does not speak of rounding and limit."""
+def machine(*, rounded: bool = True, limit: float = LIMIT) -> Machine:
+    """The machine file as its lab would write it. Without `rounded`, it does not speak of rounding and limit (V)."""
     lines = (Path(__file__).parent / "outside_arm.toml").read_text("utf-8").splitlines()
     kept = [line for line in lines if rounded or not line.startswith(("drive_resolution", "output_limit"))]
-    return parse_machine("\n".join(kept))
+    return parse_machine("\n".join(kept).replace(f"value = {LIMIT}", f"value = {limit}"))
 
 
 @dataclass(frozen=True)
