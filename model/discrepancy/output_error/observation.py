@@ -11,7 +11,6 @@ closed loop.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -20,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import BoardPid, Machine, SampledPid
+from daq.contracts.machine import Machine, SampledPid
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
@@ -296,9 +295,11 @@ def observe(
 
 
 def _drive_is_input(machine: Machine, record: Record) -> bool:
-    """Whether the record says what moved the arm in every period: its drive, however the controller came to it."""
-    kind = {BoardPid: "board", SampledPid: "pid"}.get(type(machine.controller), "")
-    return kind in os.environ.get("EXACT", "pid") and record.inputs.drive_of_every_period
+    """Whether the record says what moved the arm in every period: its drive, however the controller came to it.
+
+    The board's own arithmetic is simulated as it is: that its drive is recorded brings nothing (docs/decisions/0033).
+    """
+    return isinstance(machine.controller, SampledPid) and record.inputs.drive_of_every_period
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
