@@ -36,11 +36,12 @@ VISCOUS, COULOMB = (2.4e-4, 2.2e-4, 1.8e-4), (1.1, 1.4, 0.7)
 """Motor side, N·m·s/rad; at the joint, N·m."""
 
 
-def machine(*, rounded: bool = True, limit: float = LIMIT) -> Machine:
+def machine(*, rounded: bool = True, limit: float = LIMIT, period: float = PERIOD) -> Machine:
     """The machine file as its lab would write it. Without `rounded`, it does not speak of rounding and limit (V)."""
     lines = (Path(__file__).parent / "outside_arm.toml").read_text("utf-8").splitlines()
     kept = [line for line in lines if rounded or not line.startswith(("drive_resolution", "output_limit"))]
-    return parse_machine("\n".join(kept).replace(f"value = {LIMIT}", f"value = {limit}"))
+    text = "\n".join(kept).replace(f"value = {LIMIT}", f"value = {limit}")
+    return parse_machine(text.replace(f"period = {{ value = {PERIOD}", f"period = {{ value = {period}"))
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ class OutsideArm:
     limit: float = LIMIT
     factor: Floats = field(default_factory=lambda: np.ones(3))
     lost: Floats = field(default_factory=lambda: np.zeros(3))
+    period: float = PERIOD
 
     def changed(self, name: str, joint: int, value: float) -> OutsideArm:
         """The arm with one number of one joint (from 1) changed."""
@@ -89,23 +91,23 @@ def drawn(seed: int) -> OutsideArm:
     )
 
 
-def wanted(seed: int, duration: float) -> Floats:
+def wanted(seed: int, duration: float, period: float = PERIOD) -> Floats:
     """Set points (k, 3), rad: ramps between drawn postures with rests between them."""
     rng = np.random.default_rng(seed)
-    count = round(duration / PERIOD)
+    count = round(duration / period)
     found = np.zeros((count, 3))
     posture = np.array([0.0, 0.6, -0.9])
     low, high = np.array([-0.9, 0.1, -1.6]), np.array([0.9, 1.2, -0.3])
-    k = 60
+    k = round(0.6 / period)
     found[:k] = posture
     while k < count:
         target = low + (high - low) * rng.random(3)
         speed = 0.15 + 0.85 * rng.random()
-        moving = min(count - k, round(float(np.abs(target - posture).max()) / speed / PERIOD) + 1)
+        moving = min(count - k, round(float(np.abs(target - posture).max()) / speed / period) + 1)
         share = np.arange(1, moving + 1)[:, None] / moving
         found[k : k + moving] = posture + share * (target - posture)
         posture, k = found[k + moving - 1].copy(), k + moving
-        rest = min(count - k, int(rng.integers(5, 40)))
+        rest = min(count - k, round(int(rng.integers(5, 40)) * PERIOD / period))
         found[k : k + rest] = posture
         k += rest
     return found
@@ -113,7 +115,7 @@ def wanted(seed: int, duration: float) -> Floats:
 
 def record(arm: OutsideArm, seed: int, duration: float = 17.0) -> Trace:
     """A record of the arm, with noise of its readings."""
-    set_points = wanted(seed, duration)
+    set_points = wanted(seed, duration, arm.period)
     rng = np.random.default_rng(seed + 1000)
     noise = 0.3 * rng.standard_normal(set_points.shape)
     used = set_points.copy()
@@ -128,7 +130,7 @@ def record(arm: OutsideArm, seed: int, duration: float = 17.0) -> Trace:
         used,
         noise,
         dynamics.reshape(8, 3),
-        np.array([arm.delay, arm.load, arm.resolution, arm.limit]),
+        np.array([arm.delay, arm.load, arm.resolution, arm.limit, arm.period]),
         arm.factor,
         position,
         drive,
@@ -139,10 +141,10 @@ def record(arm: OutsideArm, seed: int, duration: float = 17.0) -> Trace:
         software="-",
         source="imported",
         robot="outside",
-        period=PERIOD,
+        period=arm.period,
         drive_unit="V",
     )
-    time = PERIOD * np.arange(len(used))
+    time = arm.period * np.arange(len(used))
     return Trace(made, (1, 2, 3), time, position, set_point=set_points, drive=drive)
 
 
@@ -239,9 +241,9 @@ def _rates(q: Floats, v: Floats, volts: Floats, p: Floats, load: float, stuck: F
 def _run(
     used: Floats, noise: Floats, p: Floats, shared: Floats, factor: Floats, position: Floats, drive: Floats
 ) -> None:
-    period, step, count = 0.01, 0.00025, 2 * np.pi / 2**14
+    step, count = 0.00025, 2 * np.pi / 2**14
     gains_p, gains_d = (90.0, 110.0, 70.0), (4.0, 5.0, 2.5)
-    delay, load, resolution, limit = shared
+    delay, load, resolution, limit, period = shared
     q, v = used[0].copy(), np.zeros(3)
     inertia, bias, weight = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     _balance(q, v, p, load, inertia, bias, weight)
