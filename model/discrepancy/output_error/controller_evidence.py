@@ -150,6 +150,9 @@ class _JointRecords:
             column = trace.column(self.joint)
             used = trace.position[:, column] + trace.error[:, column]
             changed = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) > 2 * tolerance
+            numbers = controller_numbers(trace, self.machine, self.joint)
+            if numbers is not None:
+                changed &= ~numbers.limited
             wrong = np.abs(trace.set_point[:, column] - used) > tolerance
             moved, lost, total = (
                 moved + int(changed.sum()),

@@ -32,13 +32,15 @@ class ControllerNumbers:
     """What a record tells of one joint's controller.
 
     used: (k,) rad, set points that it worked with. formed: (k,) drive that the gains of the file make of them. drive:
-    (k,) as recorded. free: (k,) whether the drive is away from its limit and large enough to measure a gain. factor: by
-    which the drive is larger than the gains of the file make it.
+    (k,) as recorded. limited: (k,) whether the drive is at its limit, where it tells nothing. free: (k,) whether it is
+    away from it and large enough to measure a gain. factor: by which the drive is larger than the gains of the file
+    make it.
     """
 
     used: Floats
     formed: Floats
     drive: Floats
+    limited: NDArray[np.bool_]
     free: NDArray[np.bool_]
     factor: float
 
@@ -72,7 +74,7 @@ def controller_numbers(trace: Trace, machine: Machine, joint: int) -> Controller
     if np.mean(agreed) < LEAST_AGREEMENT:
         return None
     large = ~limited & (np.abs(formed) > LEAST_STEPS * resolution)
-    return ControllerNumbers(used, formed, drive, large & agreed, factor)
+    return ControllerNumbers(used, formed, drive, limited, large & agreed, factor)
 
 
 def with_errors(traces: Sequence[Trace], machine: Machine) -> tuple[Trace, ...]:
