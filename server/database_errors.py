@@ -50,7 +50,7 @@ def advice_of(line: str) -> str:
 
     A restored backup loses everything written after it, so only SQLite's own messages about damage lead to this advice.
     """
-    if "full" in line:
+    if "database or disk is full" in line:
         return "make room on its disk"
     return BRING_BACK if any(words in line for words in _DAMAGE) else TRY_AGAIN
 

@@ -23,7 +23,7 @@ from daq.acquisition.stop_socket import StopAnswer
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CLOSE = b"\0"
-"""In the wake-up pipe, beside the numbers of signals."""
+"""Byte in the wake-up pipe that ends the guardian's thread; every other byte is the number of a signal."""
 CANCEL = b"cancel\n"
 """What a parent says that is a service; anything else is a stop too."""
 CLIENT_PATIENCE = 0.1

@@ -25,7 +25,7 @@ class OwnedRobot:
         return self.session.controller
 
     def ended(self) -> str | None:
-        """Why somebody wants the end of the work: `daq stop`, a signal; None while nobody does."""
+        """Returns the cause of a requested end (`daq stop`, a signal), or None."""
         return self.session.ended()
 
 

@@ -42,7 +42,7 @@ class Acquisition:
 
     @property
     def pid(self) -> int:
-        """Of the acquisition process."""
+        """Process identifier of the acquisition process."""
         return self._process.pid
 
     def __enter__(self) -> Self:

@@ -46,7 +46,7 @@ class StopAnswer:
         return asdict(self)
 
     def to_json(self) -> bytes:
-        """As it travels through the socket: one line."""
+        """The answer encoded as one line of JSON, as the socket carries it."""
         return json.dumps(self.as_data()).encode() + b"\n"
 
     @classmethod

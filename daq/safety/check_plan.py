@@ -28,8 +28,8 @@ def check_plan(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
 
 
 def check_move_to_start(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """As `check_plan`, but an arm that stands outside its limits, led there by hand perhaps, may come back: only what
-    lies further outside than where it stands is a violation."""
+    """Checks a move to the start. An arm that stands outside its limits, perhaps led there by hand, may move back: only
+    points further outside than its present position are violations."""
     if not np.isfinite(plan.angles).all():
         return _not_finite(plan)
     return check_plan(plan, machine, _widened(limits, plan, machine))

@@ -94,8 +94,7 @@ class LocalRobot:
         """Raises SafetyError, and writes nothing, for a joint off its set point, which would jump there."""
         from daq.contracts.limp import limp_line, require_no_jump
 
-        with self._connected() as controller:
-            consent.require(self.call.port, simulated=controller.identity.simulated)
+        with self._consented(consent) as controller:
             readings = controller.next_snapshot().joints
             require_no_jump({joint: reading.error for joint, reading in readings}, wanted)
             for joint, gain in wanted.items():
@@ -127,15 +126,24 @@ class LocalRobot:
         Raises SafetyError without the operator's consent on a real arm, and if the arm is stopped, also if this happens
         while the operator is asked: the port is free meanwhile, so that a stop gets through.
         """
+        with self._consented(consent, lambda controller: _require_switchable(controller, while_stopped)) as controller:
+            yield controller
+
+    @contextmanager
+    def _consented(
+        self, consent: Consent, check: Callable[[Controller], None] = lambda _controller: None
+    ) -> Iterator[Controller]:
+        """The controller, with the operator's consent on a real arm. `check` runs before the operator is asked, and
+        again afterwards. The port is free while the operator is asked, so that a stop gets through."""
         with self._connected() as controller:
-            _require_switchable(controller, while_stopped)
+            check(controller)
             simulated = controller.identity.simulated
             if simulated or consent.given:
                 yield controller
                 return
         consent.require(self.call.port, simulated=simulated)
         with self._connected() as controller:
-            _require_switchable(controller, while_stopped)
+            check(controller)
             yield controller
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:

@@ -27,7 +27,7 @@ class IntegerPid:
         self.reset()
 
     def reset(self) -> None:
-        """As after power-up: nothing summed, no previous error."""
+        """Clears the integral and the previous error, as at power-up."""
         self._sum = 0
         self._previous: int | None = None
         self._last_power = 0

@@ -77,10 +77,6 @@ class TorqueAnalysis(_Part):
         """D_ij, i ≤ j, from 1."""
         return next(e for e in self.inertia if (e.row, e.column) == (row, column))
 
-    def inertial_torque(self, joint: int, of: int) -> InertialTorque:
-        """D_ij q̈_j."""
-        return next(t for t in self.inertial if (t.at, t.of) == (joint, of))
-
 
 def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
     """Torques along the model's own motion for the set points of a trace, with accelerations of its exact speeds."""

@@ -246,9 +246,9 @@ class Diagnosis(_Part):
     """Evidence from which a first effect is named; None in older answers."""
     steps: tuple[Step, ...]
     rmse_fit: tuple[SignalError, ...] = ()
-    """From the model as it was given to the model that comes out, on the traces it was fitted to."""
+    """Errors on the fitted traces, of the model as given and of the resulting model."""
     rmse_holdout: tuple[SignalError, ...] = ()
-    """The same on the held-out traces."""
+    """Errors on the held-out traces, likewise."""
     where: Where | None = None
     """What is left in the end: the map and dependences of the model that comes out; None in older answers."""
     candidates: tuple[Candidate, ...] = ()

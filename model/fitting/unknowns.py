@@ -47,7 +47,7 @@ class Unknown:
 
     @property
     def name(self) -> str:
-        """Full name of the parameter, for people and files; what it is stands in `parameter`."""
+        """Full name of the parameter, for people and files. Code reads `parameter` instead."""
         return self.parameter.name
 
     @property

@@ -137,10 +137,6 @@ class Model(_Part):
             raise SpecError(f"parameter {name!r}: not in this model; it has {', '.join(near or self.by_name)}")
         return self.by_name[name]
 
-    def of_effect(self, effect: str, joint: int | None = None) -> dict[str, Parameter]:
-        """Parameters of an effect on one joint, or (None) of the whole machine, by the last part of their names."""
-        return {p.part: p for p in self.parameters if p.effect == effect and (joint is None or joint in p.joints)}
-
     @cached_property
     def joint_count(self) -> int:
         """Number of joints that the model moves."""
@@ -223,10 +219,6 @@ class Model(_Part):
             self.parameter(member)
         values = {n: v for n, v in self.values.items() if n not in members} | {name: value}
         return self._changed(ties={**self.ties, name: members}, values=values)
-
-    def with_published_inertia(self, published: bool = True) -> Model:
-        """The model with link 3's inertia as published (7.28), or exact."""
-        return self._changed(published_inertia=published)
 
     def with_lineage(self, lineage: Lineage) -> Model:
         """The model with another lineage."""

@@ -37,7 +37,7 @@ def of_validation(found: Fidelity) -> str:
 
 def of_comparison(found: Comparison) -> str:
     """Says the error of each model over all traces."""
-    errors = [f"{m.label.partition(' (')[0]} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
+    errors = [f"{m.label} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
     return f"error {'; '.join(errors)}"
 
 

@@ -30,7 +30,7 @@ AT_REST_COUNTS = 12
 """Counts by which two readings of an arm at rest may differ: noise of its potentiometers, and what it still creeps."""
 
 
-def test_it_says_who_it_is(controller: Controller) -> None:
+def test_a_controller_identifies_itself(controller: Controller) -> None:
     identity = controller.identity
     assert identity.version == PROTOCOL_VERSION
     assert 0.001 <= identity.period_s <= 1.0
@@ -115,7 +115,7 @@ def test_gains_are_reported_for_every_joint(controller: Controller) -> None:
     assert controller.link.request(ReportGains(), Gains).gains == tuple(gains.values())
 
 
-def test_what_it_cannot_do_it_refuses(controller: Controller) -> None:
+def test_requests_beyond_a_controllers_capabilities_are_refused(controller: Controller) -> None:
     link, capabilities = controller.link, controller.identity.capabilities
     with pytest.raises(RequestRefusedError) as caught:
         link.request(ReadBlock(0x0000, 48), Block)

@@ -169,7 +169,7 @@ def test_more_arms_than_a_trial_can_have_are_refused(daq: CommandLine) -> None:
         ("", ()),
         ("postgresql://anna:secret@db/arm", ("anna:***@db", "its driver psycopg", "is not installed", "pip install")),
         ("postgresql+psycopg://db/arm", ("driver psycopg is not installed", "pip install 'psycopg[binary]'")),
-        ("oracle9://db", ("no address of a database",)),
+        ("oracle9://db", ("is not the address of a database",)),
         ("sqlite:////proc/nothing/service.sqlite", ("/proc/nothing", "cannot be made")),
     ],
 )

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from daq.acquisition.port_stop import stop_at_port
 from daq.driver import Controller
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
@@ -55,6 +56,19 @@ def test_a_real_arm_gets_no_gains_without_consent(
     daq("--port", port, "gains", "set", "3=4/0/0").complains(4, "is a real arm", "--yes")
     assert held(mock) == before
     assert daq("--port", port, "gains", "set", "3=2/0/0", "--yes").code == 0
+
+
+def test_a_stop_gets_through_while_a_person_is_asked_for_consent_to_gains(
+    daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped_meanwhile(_question: str) -> bool:
+        assert stop_at_port("arm", port).confirmed
+        return True
+
+    asked_operator(monkeypatch, stopped_meanwhile)
+    assert daq("--port", port, "gains", "set", "3=2/0/0").code == 0
+    assert ask(mock, "state")["frozen"]
+    assert daq("--port", port, "reset").code == 0
 
 
 @pytest.mark.parametrize("says", [True, False])

@@ -170,7 +170,7 @@ READING = c.JointReading(0, 0, 0, 0)
         (lambda: c.Stopped(1, (1, 2, 3, 4, 5, 1000)), "posture of joint 6 of 1000: allowed are 0 to 999"),
     ],
 )
-def test_what_cannot_be_sent_cannot_be_made(make: object, says: str) -> None:
+def test_a_message_with_values_out_of_range_cannot_be_made(make: object, says: str) -> None:
     with pytest.raises(ProtocolError, match=says):
         make()  # type: ignore[operator]
 

@@ -154,7 +154,7 @@ WRONG = SecondBridge.__subclasses__()
 
 
 @pytest.mark.parametrize("kind", WRONG, ids=lambda kind: kind.__name__)
-def test_some_dialogue_finds_it(kind: type[SecondBridge]) -> None:
+def test_some_dialogue_finds_every_wrong_bridge(kind: type[SecondBridge]) -> None:
     found = [dialogue.rule for dialogue in DIALOGUES if _goes_wrong(kind, dialogue.steps)]
     assert found
 

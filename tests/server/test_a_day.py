@@ -21,7 +21,7 @@ DIAGNOSIS = {"kind": "diagnose", "joints": [2], "most_steps": 1, "effects": ["co
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_day(tmp_path: Path) -> None:
+def test_a_day_of_work_survives_the_end_of_the_service(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:
         service.until_connected()
         with watching(service, subscribe=["samples", "events", "queue", "jobs"]) as live:

@@ -134,8 +134,8 @@ def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
 
 
 def most_information(point: Point, asker: Asker, done: Sequence[ExperimentSpec]) -> Asked:
-    """Of the general experiments that were not made yet, the most informative one; of the others, if those
-    take too long. None when a general one was made."""
+    """Returns the most informative general experiment that was not made yet, or another one if all of those take too
+    long. Returns none if a general experiment was made already."""
     if any(_same_motion(e.spec, s) for e in asker.experiments if e.general for s in done):
         return Asked(None)
     new = [e for e in asker.experiments if not any(_same_motion(e.spec, s) for s in done)]

@@ -89,7 +89,7 @@ class _Map:
 
     @cached_property
     def correlations(self) -> list[Correlation]:
-        """Of every joint's weighted residual."""
+        """Autocorrelation of each joint's weighted residual."""
         records = self.residuals.records
         return [
             correlation_of([w[run, j] for w, r in zip(self.weighted, records, strict=True) for run in r.runs], LEAST)
@@ -98,7 +98,7 @@ class _Map:
 
     @cached_property
     def shares(self) -> list[list[_Share]]:
-        """Of every joint, its phases."""
+        """Shares of each phase in the residual, by joint."""
         return [self._shares(j) for j in range(len(self.joints))]
 
     def cells(self) -> list[PhaseCell]:

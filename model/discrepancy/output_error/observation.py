@@ -51,7 +51,7 @@ STEP, COARSE_STEP = 2e-3, 7e-3
 """Longest step of integration, s: ten steps per control period of 20 ms, and three for derivatives and probes, which
 are differences and need no more. With steps longer than the first, a delay explains an inductance as well."""
 HALVINGS = 2
-"""Times that the step is halved for runs that do not stay finite with it."""
+"""How often the step of integration is halved at most, for runs that do not stay finite."""
 DIFFERENCE = 0.05
 """Step of a finite difference, as a share of the parameter's expected deviation."""
 TONE_DIFFERENCE = 0.02

@@ -39,7 +39,7 @@ def test_what_changes_nothing_is_asked_again_after_growing_pauses() -> None:
     assert network.pauses == list(PAUSES[:2])
 
 
-def test_it_is_not_asked_for_ever() -> None:
+def test_a_request_is_tried_again_a_limited_number_of_times() -> None:
     network = StandIn([BROKEN] * 10)
     with pytest.raises(ServiceNotReachedError, match=r"http://127.0.0.1:8300: not reached: connection refused"):
         network.connection().get(Me, "me")

@@ -23,5 +23,5 @@ def test_what_is_like_it_is_refused_before_anything_is_asked(word: object) -> No
                 say()
 
 
-def test_both_words_are_taken() -> None:
+def test_only_given_consent_moves_a_real_arm() -> None:
     assert (Consent(True).moves_real_arm, Consent().moves_real_arm) == (True, False)

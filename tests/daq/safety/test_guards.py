@@ -137,7 +137,7 @@ def test_ticks_must_go_on(ticks: tuple[int, ...], trips: tuple[str, ...]) -> Non
     assert sum((verdict.trips for verdict in verdicts), ()) == trips
 
 
-def test_a_gap_is_told() -> None:
+def test_missing_control_periods_are_reported() -> None:
     guards = running()
     guards.check(row(5), {})
     (finding,) = guards.check(row(9), {}).findings

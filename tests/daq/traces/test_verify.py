@@ -120,7 +120,7 @@ def test_damage_is_an_error_and_an_unfinished_trace_a_warning(tmp_path: Path) ->
     assert set(findings(path)) == {("warning", "outcome")}
 
 
-def test_what_cannot_be_read_at_all(tmp_path: Path) -> None:
+def test_an_empty_or_absent_trace_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"")
     assert findings(tmp_path / "a.mcap")["error", "trace"].endswith("is empty")
     with pytest.raises(TraceError, match="cannot be read"):

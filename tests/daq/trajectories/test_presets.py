@@ -78,7 +78,7 @@ def test_part_a_moves_one_joint_at_a_time() -> None:
     assert speeds.sum(axis=1).max() == 1
 
 
-def test_part_b_is_slow() -> None:
+def test_diagnostic_b_moves_at_five_degrees_a_second() -> None:
     speeds = np.abs(np.diff(made("diagnostic-b").angles, axis=0)) / 0.02
     assert math.degrees(speeds.max()) == pytest.approx(5)
 

@@ -41,7 +41,7 @@ def one_joint(link: Link = BODY, joint: Joint = Joint(), **more: object) -> Chai
         (lambda: Chain((Joint(), Joint(a=0.3)), (BODY, Link(0.0))), "joint 2 has zero inertia"),
     ],
 )
-def test_refused(build: object, message: str) -> None:
+def test_an_impossible_chain_is_refused_in_one_line(build: object, message: str) -> None:
     with pytest.raises(ChainError, match=message) as caught:
         build()  # type: ignore[operator]
     assert "\n" not in str(caught.value)

@@ -88,7 +88,7 @@ def test_a_torque_written_as_the_librarys_gives_the_librarys_motion(tmp_path: Pa
     )
 
 
-def test_what_it_may_depend_on_arrives(tmp_path: Path) -> None:
+def test_an_own_effect_sees_drive_load_position_and_time(tmp_path: Path) -> None:
     """Drive, load, position and time as the run itself has them, seen through the acceleration they make."""
     load_effect_file(written(tmp_path, torque="def torque(drive, load, position, time, k):\n    return k * load\n"))
     rest = trace_of(np.full((200, 1), 0.8), period=0.005)

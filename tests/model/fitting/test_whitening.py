@@ -51,7 +51,7 @@ def test_runs_are_not_joined_across_a_gap() -> None:
     assert autocovariance(runs, 1)[1] == pytest.approx(18 / 20)
 
 
-def test_white_only_scales() -> None:
+def test_whitening_white_noise_only_scales_it() -> None:
     np.testing.assert_allclose(white(2.0).whitened(np.array([2.0, -4.0])), [1.0, -2.0])
 
 

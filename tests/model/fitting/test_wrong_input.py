@@ -39,24 +39,24 @@ def test_the_same_trace_twice(good: Trace) -> None:
     assert "more than once" in refused([good, good])
 
 
-def test_no_motion() -> None:
+def test_a_trace_without_motion_is_refused() -> None:
     still = trace(arm(), points=np.tile(set_points(0, 0.02), (150, 1)))
     assert "no motion" in refused([still])
 
 
-def test_not_a_number(good: Trace) -> None:
+def test_a_value_that_is_not_finite_is_refused(good: Trace) -> None:
     position = good.position.copy()
     position[17, 1] = np.nan
     with pytest.raises(TraceError, match="not finite at sample 17"):
         fit(arm(), [changed(good, position=position)], SOME)
 
 
-def test_two_samples(good: Trace) -> None:
+def test_a_trace_of_two_samples_is_refused(good: Trace) -> None:
     names = ("time", "position", "set_point", "error", "drive", "tick")
     assert "2 samples" in refused([changed(good, **{n: getattr(good, n)[:2] for n in names})])
 
 
-def test_a_joint_missing(good: Trace) -> None:
+def test_a_trace_without_one_joint_is_refused(good: Trace) -> None:
     columns = {n: getattr(good, n)[:, :2] for n in ("position", "set_point", "error", "drive")}
     assert "joint 3 is not in it" in refused([changed(good, joints=(1, 2), **columns)])
 
@@ -100,7 +100,7 @@ def test_a_start_outside_the_bounds(good: Trace) -> None:
         FitOptions(priors={"load.weight": Prior(expected=1, deviation=1)}),
     ],
 )
-def test_a_name_that_is_none(good: Trace, options: FitOptions) -> None:
+def test_an_unknown_parameter_name_is_refused(good: Trace, options: FitOptions) -> None:
     assert "not in this model" in refused([good], options)
 
 

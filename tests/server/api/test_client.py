@@ -86,7 +86,7 @@ def test_a_stop_a_reset_and_the_queue(robot: Robot, service: Service) -> None:
     assert texts[-1] == "queued"
 
 
-def test_schedules(robot: Robot) -> None:
+def test_a_schedule_is_made_switched_off_and_deleted(robot: Robot) -> None:
     made = robot.schedules.create(SHORT, every=86400, count=2)
     assert made.id in [one.id for one in robot.schedules.list()]
     assert not robot.schedules.switch(made.id, active=False).active
@@ -152,7 +152,7 @@ def test_what_the_service_is_and_who_calls(client: Client, robot: Robot) -> None
         client.robot("other").status()
 
 
-def test_nobody_there() -> None:
+def test_a_service_that_does_not_answer_is_said_to_be_unreachable() -> None:
     with Client("http://127.0.0.1:1") as client:
         with pytest.raises(ServiceNotReachedError):
             client.robot()

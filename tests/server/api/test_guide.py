@@ -61,7 +61,7 @@ def test_what_the_guide_says_to_type_works(block: str, service: Service, at_the_
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_its_programs_run(program: str, service: Service, tmp_path: Path) -> None:
+def test_the_programs_of_the_guide_run(program: str, service: Service, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", _here(program, service)],
         cwd=tmp_path,

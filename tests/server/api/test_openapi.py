@@ -77,7 +77,7 @@ def test_the_types_of_the_live_stream_are_in_it(described: dict[str, Any]) -> No
     )
 
 
-def test_nobody_waits_while_it_is_put_together() -> None:
+def test_no_request_waits_while_the_api_description_is_built() -> None:
     app, asked, answered, times = bare_app(None), threading.Event(), threading.Event(), 0
 
     def slow() -> dict[str, Any]:

@@ -106,7 +106,9 @@ def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked_and_while_the_wh
         assert (ended["state"], ended["outcome"]) == ("cancelled", "stopped")
         texts = [event["text"] for event in service.robot.get("/events").json()["items"] if event["kind"] == "stop"]
         assert any("confirmed by the board" in text for text in texts)
-        assert service.robot.post("/reset", json={}).status_code == 200
+        service.until_arm("stopped")
+        answer = service.robot.post("/reset", json={})
+        assert answer.status_code == 200, answer.text
         assert service.robot.post("/queue/resume", json={}).status_code == 200
         experiment = _running(service)
         _stopped_while_the_service_hangs(service, daq)

@@ -1,0 +1,123 @@
+"""The kinds of world: what an arm, its controller, its sensors and its records may be.
+
+TUNING and REPORTING are apart for good. **No reporting kind is to be looked at while the diagnosis is being tuned**:
+not its records, not its answers, not its rates. A kind that was looked at moves to TUNING and another takes its place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from tests.worlds.parameters import BOARD, BRISTLE, CASCADE, PID, SWITCH, TANH
+
+VOLTS, CURRENT = "volts", "current"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of world; every range is drawn from, every tuple chosen from.
+
+    Args:
+        joints: number of joints. controller, rate: of the loop, Hz. drive: what the controller commands.
+        bits: of encoders over their range. noise: rms in counts of white noise. coloured: rms in counts of noise with
+            a corner at 3 Hz. outliers: share of readings. rounding: share of the largest drive that it is rounded to.
+        limit: share of the supply that the controller may ask for, None for all of it.
+        contacts: laws of dry friction. laws: which of the three laws an effect takes, drawn from these.
+        rubs: whether sound arms have Coulomb friction, which the file then states.
+        motions: kinds of motion. duration: s of a record. recorded: columns beside the position.
+        known_loop: whether the machine file tells the controller. body: links are stated as bodies, not as rods.
+        horizontal: gravity along the axes of a planar arm, as on a table.
+    """
+
+    joints: int
+    controller: int
+    rate: tuple[float, ...]
+    drive: str = VOLTS
+    bits: tuple[int, ...] = (14,)
+    noise: float = 0.3
+    coloured: float = 0.0
+    outliers: float = 0.0
+    rounding: float = 0.0
+    limit: float | None = None
+    contacts: tuple[int, ...] = (SWITCH,)
+    laws: tuple[int, ...] = (0, 1, 2)
+    rubs: bool = True
+    motions: tuple[str, ...] = ("ramps",)
+    duration: float = 12.0
+    recorded: tuple[str, ...] = ("set_point", "drive")
+    known_loop: bool = True
+    body: bool = False
+    horizontal: bool = False
+
+
+_AXIS = Kind(1, PID, (200.0,))
+_PLANAR = Kind(2, PID, (200.0,), bits=(14, 16))
+_ANTHROPOMORPHIC = Kind(3, PID, (100.0,), bits=(12, 14))
+
+TUNING: dict[str, Kind] = {
+    "axis-pid": replace(_AXIS, contacts=(TANH, SWITCH), motions=("ramps", "sines")),
+    "axis-rounded": replace(_AXIS, rounding=0.004, limit=0.6, rate=(100.0, 200.0), motions=("ramps", "via points")),
+    "axis-current": replace(
+        _AXIS, drive=CURRENT, rate=(500.0,), bits=(18,), contacts=(BRISTLE,), motions=("sines",), known_loop=False
+    ),
+    "planar-pid": replace(_PLANAR, contacts=(SWITCH, BRISTLE), motions=("ramps", "via points")),
+    "planar-board": replace(_PLANAR, controller=BOARD, rate=(50.0,), bits=(12,), motions=("ramps",)),
+    "planar-torques": replace(
+        _PLANAR,
+        drive=CURRENT,
+        known_loop=False,
+        recorded=("drive", "velocity"),
+        bits=(16,),
+        body=True,
+        contacts=(TANH,),
+        motions=("sines", "via points"),
+        rate=(250.0,),
+    ),
+    "arm-rounded": replace(
+        _ANTHROPOMORPHIC, rounding=0.004, limit=0.5, contacts=(TANH,), laws=(1,), noise=0.0, motions=("ramps",)
+    ),
+}
+"""Kinds that the diagnosis may be tuned with."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-cascade": replace(
+        _AXIS, controller=CASCADE, rate=(400.0,), bits=(17,), contacts=(BRISTLE,), motions=("via points", "steps")
+    ),
+    "axis-board-table": replace(
+        _AXIS, controller=BOARD, rate=(50.0,), bits=(10, 11), horizontal=True, motions=("ramps", "sweep")
+    ),
+    "axis-outliers": replace(_AXIS, outliers=0.003, coloured=0.5, bits=(13,), motions=("sines", "via points")),
+    "planar-cascade": replace(
+        _PLANAR, controller=CASCADE, rate=(500.0,), bits=(18, 20), rounding=0.001, motions=("sweep", "via points")
+    ),
+    "planar-coloured": replace(_PLANAR, coloured=0.8, noise=0.2, contacts=(TANH,), motions=("random steps", "sines")),
+    "arm-current": replace(
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(250.0,),
+        bits=(16,),
+        contacts=(BRISTLE,),
+        motions=("via points",),
+        recorded=("drive",),
+        known_loop=False,
+        body=True,
+    ),
+    "six-volts": replace(
+        _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
+    ),
+    "six-torques": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        drive=CURRENT,
+        rate=(1000.0,),
+        bits=(19,),
+        contacts=(TANH, BRISTLE),
+        recorded=("drive", "velocity"),
+        known_loop=False,
+        body=True,
+        motions=("sines",),
+    ),
+}
+"""Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
+
+KINDS = TUNING | REPORTING

@@ -1,0 +1,219 @@
+"""Which laws of a library the training record of a rig can tell apart, worked out from the truth on the world's side.
+
+A rival is the sound arm with another effect, in its plainest law. Its sizes and everything that the file states with a
+deviation are refitted by least squares to the readings of the true arm, in the worlds' own simulation without noise or
+rounding. χ² is what remains, over the variance of the noise, and what the tolerances cost in their deviations. d′ of a
+rival is √(χ² of the rival − χ² of the effect's own plainest law), and that of `none` is √χ² of the sound arm. Below 5
+the record does not tell.
+
+What this first version leaves out:
+- arms of three and six joints, and pairs: no answer;
+- rivals on other joints than the effect's; held-out records; recorded speeds;
+- the closed loop hides a part of what a recorded drive shows: d′ is rather too small; coloured noise counts as white
+  with its density at low frequencies, outliers do not count;
+- tolerances answer linearly (repeated where the outcome is near 5), sizes are sought from a few starts: for ripple,
+  disturbance and the gears that give d′ may be too large.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from tests.worlds.bodies import Bodies
+from tests.worlds.drawing import generator
+from tests.worlds.engine import Floats, simulate
+from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, hide, joints_of
+from tests.worlds.parameters import Records
+from tests.worlds.rig import Rig, Tolerance
+from tests.worlds.world import COLOURED_CORNER, TRAINING, wanted, without_settling
+
+STEP = 2e-4
+"""s of the simulations here."""
+DECIDES = 15.0
+"""d′ above which an exact value decides nothing."""
+EVALUATIONS = 6
+"""Of sizes, at most, after the starts."""
+STARTS = (0.2, 0.6, 1.6)
+"""Sizes to begin with, over one that is drawn as for a hidden effect."""
+SIGNED = (
+    "ripple",
+    "disturbance",
+    "direction",
+    "sensor_gain",
+    "sensor_offset",
+    "bend",
+    "spring",
+    "shift",
+    "gain_error",
+    "load",
+    "mass",
+)
+"""Sizes that may have either sign."""
+SHIFTED = ("ripple_phase", "disturbance_phase", "spring_rest", "about_x", "about_y")
+"""Sizes that are moved, not multiplied: by `MOVED` rad a unit."""
+MOVED = 0.5
+KEPT = ("current", "duration", "cooling_time")
+"""Sizes that are not refitted: little depends on them. Nor is the stiffness of a contact behind a gap."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """`none` is the sound arm, `own` the effect itself in its plainest law."""
+
+    name: str
+    d_prime: float
+
+
+def sharpness(rig: Rig, names: Collection[str] | None = None) -> list[Rival]:
+    """Rivals (all, or those of `names`) of the one effect hidden in a rig of one or two joints; empty for others."""
+    if len(rig.hidden) != 1 or rig.kind.joints > 2:
+        return []
+    return _Comparison(rig).rivals(effects_of(rig) if names is None else names)
+
+
+class _Comparison:
+    """The true arm's readings, and what tolerances can do about a difference from them."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.sound = replace(rig, joints=rig.sound_joints.copy(), bodies=rig.sound, hidden=())
+        self.asked = wanted(rig, TRAINING)
+        self.sigma = _noise(rig)
+        self.true = self._readings(rig.bodies, rig.joints, rig.loop)
+        self.motion = simulate(self.sound.bodies, self.sound.joints, _loop(rig.loop), self.asked)
+        # Tolerances answer about the true arm: the sound arm's own numbers move in it.
+        columns = []
+        for tolerance in rig.tolerances:
+            ends = [self._readings(*moved(rig, {tolerance: sign * 0.5 * tolerance.share})) for sign in (1.0, -1.0)]
+            columns.append(ends[0] - ends[1])
+        self.answers = np.column_stack(columns) if columns else np.zeros((self.true.size, 0))
+        count = self.answers.shape[1]
+        self.basis, self.triangle = np.linalg.qr(np.vstack([self.answers, np.eye(count)]))
+
+    def rivals(self, names: Collection[str]) -> list[Rival]:
+        hidden = self.rig.hidden[0]
+        none = self._least(lambda _: self.sound, 0, ())
+        own = 0.0
+        if hidden.law != 0 and hidden.in_library:
+            own = self._fitted(hidden.name, hidden.joint)
+        found = [Rival("none", math.sqrt(none)), Rival("own", math.sqrt(own))]
+        for name in names:
+            if name in OPEN or name == hidden.name:
+                continue
+            places = joints_of(self.rig, name)
+            if name not in WHOLE_MACHINE and hidden.joint is not None:
+                places = tuple(place for place in places if place == hidden.joint)
+            least = min([none, *(self._fitted(name, place) for place in places)])
+            found.append(Rival(name, math.sqrt(max(0.0, least - own))))
+        return found
+
+    def _fitted(self, name: str, joint: int | None) -> float:
+        """Least χ² of the sound arm with an effect in its plainest law."""
+        draw = generator(self.rig.kind_name, self.rig.seed, f"rival {name} {joint}")
+        _, size = drawn(self.sound, self.motion, name, joint, draw)
+        if joint is not None and self.rig.hidden[0].name == name:
+            size = {field: self.rig.hidden[0].sizes.get(field, value) for field, value in size.items()}
+        free = tuple(field for field in size if field not in KEPT and not (field == "rate" and "gap" in size))
+
+        def rival(factors: Floats) -> Rig:
+            changed = dict(size)
+            for field, factor in zip(free, factors, strict=True):
+                changed[field] = size[field] + MOVED * (factor - 1) if field in SHIFTED else size[field] * factor
+            return hide(self.sound, name, joint, 0, changed)
+
+        return self._least(rival, len(free), free)
+
+    def _least(self, rival: Callable[[Floats], Rig], count: int, free: tuple[str, ...]) -> float:
+        """Least χ² over sizes and tolerances."""
+
+        def left(factors: Floats) -> Floats:
+            try:
+                made = rival(factors)
+                return self._less_tolerances(self._readings(made.bodies, made.joints, made.loop) - self.true)
+            except (ValueError, ArithmeticError):
+                return np.full(self.true.size + self.answers.shape[1], 1e3)
+
+        if count == 0:
+            best = np.ones(0)
+        else:
+            either = any(field in SIGNED for field in free)
+            starts = [np.array([s, *[1.0] * (count - 1)]) for s in (*STARTS, *([-s for s in STARTS] if either else []))]
+            best = min(starts, key=lambda start: _square(left(start)))
+            low = [-30.0 if field in SIGNED or field in SHIFTED else 1e-6 for field in free]
+            fit = least_squares(
+                *(left, best), bounds=(low, [30.0] * count), diff_step=1e-2, max_nfev=EVALUATIONS, method="trf"
+            )
+            best = fit.x
+        linear = _square(left(best))
+        if linear >= DECIDES**2:
+            return linear
+        return self._checked(rival(best), linear)
+
+    def _checked(self, made: Rig, linear: float) -> float:
+        """χ² with the tolerances really moved, and moved again."""
+        steps, found = np.zeros(self.answers.shape[1]), math.inf
+        for _ in range(3):
+            by = {t: float(s) * t.share for t, s in zip(self.rig.tolerances, steps, strict=True)}
+            residual = self._readings(*moved(made, by)) - self.true
+            found = min(found, _square(residual) + _square(steps))
+            both = np.concatenate([residual - self.answers @ steps, np.zeros(steps.size)])
+            steps = -np.linalg.solve(self.triangle, self.basis.T @ both)
+        return max(found, 0.0) if math.isfinite(found) else linear
+
+    def _less_tolerances(self, difference: Floats) -> Floats:
+        """What of a difference the tolerances cannot take away, with what they cost."""
+        both = np.concatenate([difference, np.zeros(self.answers.shape[1])])
+        return np.asarray(both - self.basis @ (self.basis.T @ both))
+
+    def _readings(self, bodies: Bodies, joints: Records, loop: Records) -> Floats:
+        """All readings of the smooth loop, over their noise."""
+        motion = without_settling(self.rig, simulate(bodies, joints, _loop(loop), self.asked))
+        readings = np.nan_to_num(motion.position, nan=1e3, posinf=1e3, neginf=-1e3)
+        return np.asarray((np.clip(readings, -1e3, 1e3) / self.sigma).ravel())
+
+
+def moved(rig: Rig, by: dict[Tolerance, float]) -> tuple[Bodies, Records, Records]:
+    """The rig with numbers of its tolerances moved by shares of themselves."""
+    bodies, joints, loop = rig.bodies, rig.joints.copy(), rig.loop.copy()
+    links = list(bodies.links)
+    for tolerance, share in by.items():
+        factor, j = 1.0 + share, tolerance.joint
+        if j is None:
+            loop[tolerance.name] *= factor
+        elif tolerance.name == "magnet":
+            joints["torque_constant"][j] *= factor
+            joints["back_emf"][j] *= factor
+        elif tolerance.name == "mass":
+            about = links[j].inertia
+            links[j] = links[j].heavier(links[j].mass * factor)
+            links[j] = replace(links[j], inertia=about) if rig.kind.body else links[j]
+        elif tolerance.name == "centre":
+            links[j] = links[j].shifted(links[j].centre[0] * share)
+        elif tolerance.name == "inertia":
+            x, y, z = links[j].inertia
+            links[j] = replace(links[j], inertia=(x * factor, y * factor, z * factor))
+        else:
+            joints[tolerance.name][j] *= factor
+    return replace(bodies, links=tuple(links)), joints, loop
+
+
+def _noise(rig: Rig) -> Floats:
+    """Noise of a reading (rad, by joint): white, of rounding, and coloured at its density at low frequencies."""
+    pole = math.exp(-2 * math.pi * COLOURED_CORNER * float(rig.loop["period"][0]))
+    slow = rig.kind.coloured**2 * (1 + pole) / (1 - pole)
+    return np.asarray(rig.joints["count"] * math.sqrt(rig.kind.noise**2 + 1 / 12 + slow))
+
+
+def _loop(loop: Records) -> Records:
+    coarse = loop.copy()
+    coarse["step"] = STEP
+    return coarse
+
+
+def _square(values: Floats) -> float:
+    return float(values @ values)
