@@ -132,8 +132,8 @@ def _check_same_unit(trace: Trace, machine: Machine) -> None:
 
     What counts is the travel of the record's motion, whatever an encoder's count is.
     """
-    if trace.set_point is None:
-        return
+    if trace.set_point is None or not np.ptp(trace.set_point, axis=0).any():
+        return  # nothing is asked for, so nothing says how far it should have gone
     kinds = {j: machine.joint(j).kind for j in machine.modelled_joints}
     signals = (trace.set_point, trace.position)
     travels = {j: max(float(np.ptp(s[:, trace.column(j)])) for s in signals) for j in kinds}

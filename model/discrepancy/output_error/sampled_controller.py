@@ -64,7 +64,7 @@ def controller_numbers(trace: Trace, machine: Machine, joint: int) -> Controller
     sent, position = _rounded(trace.set_point[:, column], controller, joint), trace.position[:, column]
     plain = law.follow(sent, position, drive, limited, 1.0, np.inf)[1]
     free = ~limited & (np.abs(plain) > LEAST_STEPS * resolution)
-    factor = 1.0 if int(free.sum()) < LEAST_SAMPLES else float(np.median(drive[free] / plain[free]))
+    factor = 1.0 if int(free.sum()) < LEAST_SAMPLES else _ratio(drive[free], plain[free], resolution)
     if not factor > 0.0:
         return None
     factor = 1.0 if abs(factor - 1.0) < FINEST else factor
@@ -73,8 +73,21 @@ def controller_numbers(trace: Trace, machine: Machine, joint: int) -> Controller
     agreed = limited | (apart <= 0.75 * resolution + 2 * FINEST * np.abs(drive))
     if np.mean(agreed) < LEAST_AGREEMENT:
         return None
-    large = ~limited & (np.abs(formed) > LEAST_STEPS * resolution)
-    return ControllerNumbers(used, formed, drive, limited, large & agreed, factor)
+    near = apart <= _farthest(drive, resolution)
+    large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
+    return ControllerNumbers(used, formed, drive, limited, large, factor)
+
+
+def _ratio(drive: Floats, formed: Floats, resolution: float) -> float:
+    """By which the drive is larger than the formed one, but for samples whose set points were lost."""
+    near = np.abs(drive - np.median(drive / formed) * formed) <= _farthest(drive, resolution)
+    return float(drive[near] @ formed[near] / (formed[near] @ formed[near]))
+
+
+def _farthest(drive: Floats, resolution: float) -> Floats:
+    """Distance from the formed drive that rounding and a nearly right factor leave: a closer cut would choose those
+    samples whose rounding suits it."""
+    return 2 * resolution + 0.03 * np.abs(drive)
 
 
 def with_errors(traces: Sequence[Trace], machine: Machine) -> tuple[Trace, ...]:
