@@ -106,9 +106,13 @@ def test_a_fast_record_is_thinned_and_its_drive_averaged(sound: outside_arm.Outs
     made = outside_arm.record(sound, 11)
     assert made.drive is not None
     assert thinned(made) is made
-    fast = replace(made, time=made.time / 10, record=made.record.model_copy(update={"period": outside_arm.PERIOD / 10}))
-    few = thinned(fast)
+    record = made.record.model_copy(update={"period": outside_arm.PERIOD / 10})
+    rough = 5.0 + np.arange(len(made))[:, None] % 2 * np.ones(3)
+    shaking = replace(made, time=made.time / 10, record=record, drive=rough)
+    assert thinned(shaking) is shaking, "what such a drive does to friction, its mean does not"
+    calm = 5.0 + np.sin(0.02 * np.arange(len(made)))[:, None] * np.ones(3)
+    few = thinned(replace(shaking, drive=calm))
     assert few.record.period == pytest.approx(0.005)
     assert few.drive is not None
     assert np.array_equal(few.position, made.position[::5])
-    assert np.allclose(few.drive[3], made.drive[15:20].mean(axis=0))
+    assert np.allclose(few.drive[3], calm[15:20].mean(axis=0))
