@@ -11,7 +11,7 @@ from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.experiment_design.next_experiment import Asker
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.discrepancy.output_error.diagnose import diagnose_by_simulation
+from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
 
 

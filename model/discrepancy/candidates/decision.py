@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from model.discrepancy.candidates.candidate_fit import CandidateFit, same_answer
 from model.discrepancy.candidates.ranking import Ranking
-from model.discrepancy.output_error.candidate_fit import CandidateFit, same_answer
 from model.discrepancy.thresholds import Thresholds
 
 Kind = Literal["nothing", "named", "group"]

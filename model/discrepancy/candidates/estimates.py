@@ -8,9 +8,9 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from model.arrays import Floats
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, price_of, says_no_more
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import Candidate, FoundValue
-from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, price_of, says_no_more
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, descend
 from model.fitting.fit import INTERVAL

@@ -8,10 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from daq.contracts.progress import Cancel, Progress, stop_if
-from model.discrepancy.candidates.library import FLEXIBLE, TONES, hypotheses
-from model.discrepancy.candidates.probing import Probe, keep_promising, probe
-from model.discrepancy.candidates.tones import propose_tones
-from model.discrepancy.output_error.candidate_fit import (
+from model.discrepancy.candidates.candidate_fit import (
     STRANGE,
     CandidateFit,
     Fit,
@@ -23,8 +20,11 @@ from model.discrepancy.output_error.candidate_fit import (
     restart,
     same_answer,
 )
+from model.discrepancy.candidates.library import FLEXIBLE, TONES, hypotheses
+from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
+from model.discrepancy.candidates.probing import Probe, keep_promising, probe
+from model.discrepancy.candidates.tones import propose_tones
 from model.discrepancy.output_error.case import Case
-from model.discrepancy.output_error.multi_joint_fit import fit_several_joints
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
 from model.effects.names import effect_on

@@ -19,13 +19,13 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, same_answer
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
 from model.discrepancy.experiment_design.signals import Imagined, Planner, Prediction, imagine
 from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
-from model.discrepancy.output_error.candidate_fit import CandidateFit, judge, same_answer
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge
 from model.effects.names import effect_on

@@ -15,7 +15,6 @@ from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.candidate_fit import CandidateFit
 from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
@@ -79,13 +78,14 @@ class Case:
         return () if self.held is None else self.held.observation.errors(before, after, self.floor_held)
 
     def refused(
-        self, found: CandidateFit, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
+        self, fitted: Point, evidence: float, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
     ) -> Refusal | None:
         """Why an effect is refused; None unless the held-out traces speak against it.
 
         Args:
-            current: the point without it. held: residuals of these traces without and with it. own: their errors on its
-                joints; on others, something else may be missing, for which the tolerance parameters bend.
+            fitted: the point with it. evidence: of the effect. current: the point without it. held: residuals of these
+                traces without and with it. own: their errors on its joints; on others, something else may be missing,
+                for which the tolerance parameters bend.
         """
         if self.held is None:
             return None
@@ -94,8 +94,8 @@ class Case:
             return Refusal(kind="error-grows", numbers={"share": -removed})
         rise, deviation = self.held.rise(*held)
         share = self.held.observation.samples / self.scoring.samples
-        fall = self._square(current) - self._square(found.fit.point)
-        if rises_too_much(rise, deviation, fall * share, found.evidence, lines):
+        fall = self._square(current) - self._square(fitted)
+        if rises_too_much(rise, deviation, fall * share, evidence, lines):
             if not np.isfinite(rise):
                 return Refusal(kind="diverges")
             return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})

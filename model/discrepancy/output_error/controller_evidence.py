@@ -185,7 +185,7 @@ class _JointRecords:
         controller, sensor = self.machine.controller, self.machine.joint(self.joint).sensor
         if isinstance(controller, SampledPid):
             numbers = controller_numbers(trace, self.machine, self.joint)
-            return None if numbers is None else (numbers.formed[numbers.free], numbers.drive[numbers.free])
+            return None if numbers is None else (np.round(numbers.formed[numbers.free], 6), numbers.drive[numbers.free])
         if not isinstance(controller, BoardPid) or sensor is None or trace.power_raw is None or trace.error is None:
             return None
         gains = (trace.record.gains or {}).get(self.joint, controller.gains[self.joint - 1])

@@ -6,9 +6,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from model.discrepancy.candidates.candidate_fit import CandidateFit
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.output_error.candidate_fit import CandidateFit
 from tests.model.fitting import imagined
 
 

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from model.discrepancy.candidates.candidate_fit import Fit, judge
 from model.discrepancy.candidates.estimates import found_values, shift_by_noise, standard_deviations
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.candidate_fit import Fit, judge
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import converge, point_at

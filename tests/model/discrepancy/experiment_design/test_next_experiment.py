@@ -15,6 +15,7 @@ from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
 from daq_cli.trial.experiments import trial_experiment
+from model.discrepancy.candidates.candidate_fit import CandidateFit, judge
 from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
@@ -29,7 +30,6 @@ from model.discrepancy.experiment_design.next_experiment import (
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.candidate_fit import CandidateFit, judge
 from model.discrepancy.output_error.case import build_case
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import Point, converge, descend, point_at

@@ -8,10 +8,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from model.discrepancy.candidates.candidate_fit import CandidateFit, improved_baseline, judge
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe, projection
 from model.discrepancy.output_error import search
-from model.discrepancy.output_error.candidate_fit import CandidateFit, improved_baseline, judge
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import Point, _corrected, converge, descend, point_at
 from tests.model.fitting import imagined

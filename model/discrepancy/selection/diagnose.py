@@ -12,6 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import SampledPid
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
 from model.discrepancy.candidates.decision import Added, decide
 from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
@@ -24,7 +25,6 @@ from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, improved_baseline, judge
 from model.discrepancy.output_error.case import Case, build_case, errors_of_fit
 from model.discrepancy.output_error.controller_evidence import (
     check_controller,
@@ -34,12 +34,12 @@ from model.discrepancy.output_error.controller_evidence import (
     with_used_set_points,
 )
 from model.discrepancy.output_error.holdout import hold_out
-from model.discrepancy.output_error.last_fit import update_to_last_fit
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
-from model.discrepancy.output_error.step import LAST_STEPS, make_step
 from model.discrepancy.output_error.thinning import thinned
+from model.discrepancy.selection.last_fit import update_to_last_fit
+from model.discrepancy.selection.step import LAST_STEPS, make_step
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown

@@ -13,9 +13,9 @@ from itertools import groupby
 import numpy as np
 
 from daq.contracts.progress import Cancel, stop_if
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, nearest, refit, restart
 from model.discrepancy.candidates.library import TONES, Hypothesis, on_joints
 from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, nearest, refit, restart
 from model.discrepancy.thresholds import Thresholds
 
 WORTH_A_FIT = 0.7

@@ -10,9 +10,9 @@ import pytest
 from daq.contracts.errors import SpecError
 from model.arrays import Floats
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
+from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from tests.model.fitting import imagined
 

@@ -11,10 +11,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from model.arrays import Floats
-from model.discrepancy.candidates.library import Hypothesis, hypotheses
-from model.discrepancy.candidates.probing import Probe, probe
-from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.candidate_fit import (
+from model.discrepancy.candidates.candidate_fit import (
     CandidateFit,
     diverged_from_prior,
     judge,
@@ -23,6 +20,9 @@ from model.discrepancy.output_error.candidate_fit import (
     restart,
     with_evidence,
 )
+from model.discrepancy.candidates.library import Hypothesis, hypotheses
+from model.discrepancy.candidates.probing import Probe, probe
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import converge, point_at
 from tests.model.fitting import imagined

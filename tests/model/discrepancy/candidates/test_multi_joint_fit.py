@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import cache
 
 from daq.contracts.progress import Never
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, judge, nearest, refit
 from model.discrepancy.candidates.library import hypotheses
+from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, probe
-from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, judge, nearest, refit
-from model.discrepancy.output_error.multi_joint_fit import fit_several_joints
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import converge, point_at
 from model.discrepancy.thresholds import THRESHOLDS

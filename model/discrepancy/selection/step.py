@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, same_answer, with_evidence
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, SignalError, Step
 from model.discrepancy.explanation import reasons
 from model.discrepancy.explanation.samples import Left
-from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, same_answer, with_evidence
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.distortion import sum_of_contributions
 from model.discrepancy.output_error.search import Point, converge
@@ -30,7 +30,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     before, after = current.point, best.fit.point
     held = case.held_residuals(before, after)
     held_errors = case.held_errors(*held)
-    refused = case.refused(best, before, held, _on(joints, held_errors))
+    refused = case.refused(best.fit.point, best.evidence, before, held, _on(joints, held_errors))
     values = found_values(best.fit, best.hypothesis.free)
     margin = decision.margin + best.evidence - chosen.evidence
     candidates = tuple(listed(best if r is chosen else r) for r in ranking.fitted)

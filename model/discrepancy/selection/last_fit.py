@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from model.discrepancy.candidates.candidate_fit import Fit, judge
 from model.discrepancy.candidates.estimates import found_values, shift_by_noise
 from model.discrepancy.diagnosis import FoundValue, Step
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.output_error.candidate_fit import Fit, judge
 from model.discrepancy.output_error.search import Point, converge, point_at
-from model.discrepancy.output_error.step import LAST_STEPS
+from model.discrepancy.selection.step import LAST_STEPS
 from model.machine_model.parameter import Parameter
 
 

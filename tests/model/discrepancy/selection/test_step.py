@@ -8,12 +8,12 @@ from typing import Any, cast
 import pytest
 
 from daq.contracts.progress import Never, silent
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import FoundValue, Step, Where
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.output_error import diagnose, last_fit
-from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit
-from model.discrepancy.output_error.last_fit import _is_nothing, update_to_last_fit
+from model.discrepancy.selection import diagnose, last_fit
+from model.discrepancy.selection.last_fit import _is_nothing, update_to_last_fit
 from model.discrepancy.thresholds import Thresholds
 from tests.model.discrepancy.candidate_fits import candidate_fit
 
