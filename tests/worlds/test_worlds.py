@@ -181,6 +181,7 @@ def test_an_answer_about_a_sound_arm_is_a_false_alarm() -> None:
     assert score(truth("sound"), answered("nothing-significant")).alarm is False
 
 
+@pytest.mark.slow
 def test_sharpness_sees_an_effect_of_some_size_and_none_of_hardly_any() -> None:
     rig = sound_rig("axis-current", KINDS["axis-current"], 1)
     assert sharpness(rig) == []
