@@ -88,10 +88,11 @@ SHARED = 10
     GAIN_ERROR,  # relative, of the controller
     EXTRA_DELAY,  # s
     LOST,  # share of set points
+    OUTPUT_LIMIT,  # largest output of a sampled controller, unit of the drive
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(70)
+) = range(71)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS
@@ -103,8 +104,10 @@ HAS_INDUCTANCE, HAS_FLEXIBILITY, HAS_STICTION, HAS_EXTRA_TORQUE, HAS_USER_EFFECT
 """HAS_USER_EFFECT: at least one effect of the user's own."""
 
 # Settings of a run, in this order.
-(CONTROLLER, QUANTISE, PUBLISHED_LOADS) = range(3)
-SETTINGS = 3
+(CONTROLLER, QUANTISE, PUBLISHED_LOADS, DRIVE_RECORDED) = range(4)
+SETTINGS = 4
+# Values of the setting QUANTISE. DRIVE_ROUNDED: what a sampled controller gives out, and no reading.
+NOTHING_ROUNDED, ALL_ROUNDED, DRIVE_ROUNDED = 0, 1, 2
 NO_CONTROLLER, BOARD_PID, SAMPLED_PID, CASCADE = 0, 1, 2, 3
 
 

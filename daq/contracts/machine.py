@@ -1,4 +1,4 @@
-"""A machine as data: a serial chain of one to six joints with drives, sensors, a controller and limits.
+"""A machine as data: a serial chain of joints with drives, sensors, a controller and limits.
 
 Every number carries its unit and its source, and says where it is an assumption. The file that ships is
 `machines/ma2000.toml`; another rig is another file.
@@ -7,12 +7,13 @@ Every number carries its unit and its source, and says where it is an assumption
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
@@ -35,6 +36,17 @@ from firmware_protocol.units import DriveScale, JointCalibration
 Unitful = Annotated[Quantity, Field()]
 
 
+def _positive(quantity: Quantity) -> Quantity:
+    if not quantity.value > 0.0:
+        raise ValueError(f"value {quantity.value} {quantity.unit} must be above 0")
+    return quantity
+
+
+Size = Annotated[Quantity, AfterValidator(_positive)]
+Sizes = Size | tuple[Size, ...]
+"""A number for all joints, or one a joint."""
+
+
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -43,9 +55,13 @@ class Geometry(_Part):
     """Standard Denavit–Hartenberg parameters (section 3.2 of the source): a, α, d, and the offset of θ (or d)."""
 
     a: Metre
+    """Length along the link's x axis, the common normal."""
     alpha: Radian
+    """Twist about x, from this joint's axis to the next one."""
     d: Metre
+    """Offset along the joint's axis; added to the position of a prismatic joint."""
     theta: Radian
+    """Angle about the joint's axis; added to the position of a revolute joint."""
 
 
 class Cylinder(_Part):
@@ -53,7 +69,9 @@ class Cylinder(_Part):
 
     shape: Literal["cylinder"]
     mass: Kilogram
+    """Mass of the link."""
     radius: Metre
+    """Radius about the joint's own axis."""
 
 
 class Rod(_Part):
@@ -61,6 +79,7 @@ class Rod(_Part):
 
     shape: Literal["rod"]
     mass: Kilogram
+    """Mass of the link, spread evenly over its length `a`."""
 
 
 class Body(_Part):
@@ -68,8 +87,11 @@ class Body(_Part):
 
     shape: Literal["body"]
     mass: Kilogram
+    """Mass of the link."""
     centre: tuple[Metre, Metre, Metre]
+    """Centre of mass in the link's own frame: x, y, z."""
     inertia: tuple[Inertia, Inertia, Inertia, Quantity, Quantity, Quantity]
+    """About the centre of mass: xx, yy, zz, xy, xz, yz."""
 
 
 class DcMotor(_Part):
@@ -80,14 +102,23 @@ class DcMotor(_Part):
 
     kind: Literal["dc_motor"]
     resistance: Annotated[Quantity, in_unit("Ω", above=0.0)]
+    """Of the winding."""
     inductance: Annotated[Quantity, in_unit("H", at_least=0.0)]
+    """Of the winding; used by the effect `motor_inductance` alone."""
     torque_constant: Annotated[Quantity, in_unit("N·m/A", above=0.0)]
+    """Torque of the motor for a current."""
     back_emf_constant: Annotated[Quantity, in_unit("V·s/rad", at_least=0.0)]
+    """Voltage for a speed of the motor."""
     rotor_inertia: Inertia
+    """On the motor's side."""
     gear_ratio: Plain
+    """Motor turns per joint turn."""
     amplifier_gain: Plain
+    """Volts at the motor for a volt of the board's output."""
     dac_full_scale: Volt
+    """The board's output at 127 counts; of other controllers, with the gain, the largest voltage."""
     supply_limit: Volt | None = None
+    """Largest voltage at the motor, behind the amplifier; none: no limit."""
 
     @property
     def scale(self) -> DriveScale:
@@ -100,7 +131,21 @@ class PlainGain(_Part):
 
     kind: Literal["gain"]
     gain: Quantity
+    """Torque or force at the joint for a unit of the recorded drive (`N·m/V`, `N/N`)."""
     inertia: Inertia | None = None
+    """Of the drive, at the joint; kg on a sliding joint."""
+
+
+class CurrentDrive(_Part):
+    """Motor whose recorded input is its current, in A: torque at the joint = torque_constant · gear_ratio · current."""
+
+    kind: Literal["current"]
+    torque_constant: Annotated[Quantity, in_unit("N·m/A", above=0.0)]
+    """Torque of the motor for an ampere."""
+    gear_ratio: Plain
+    """Motor turns per joint turn."""
+    rotor_inertia: Inertia | None = None
+    """On the motor's side."""
 
 
 class Friction(_Part):
@@ -109,39 +154,57 @@ class Friction(_Part):
     torque at the joint."""
 
     viscous_motor_side: Annotated[Quantity, in_unit("N·m·s/rad", at_least=0.0)] | None = None
+    """Per speed of the motor, on the motor's side."""
     viscous: Quantity | None = None
+    """Per speed of the joint, at the joint (N·m·s/rad, N·s/m)."""
     coulomb_arm: Annotated[Quantity, in_unit("m", at_least=0.0)] | None = None
+    """Lever of the friction that grows with the load."""
     coulomb: Quantity | None = None
+    """Constant friction at the joint (N·m, N)."""
 
 
 class Sensor(_Part):
     """Position sensor: `range` of the joint over 2^bits counts, the joint's value at count 0, the sign of counting."""
 
     bits: Annotated[int, Field(ge=1, le=32)]
+    """Its range has 2^bits counts."""
     range: JointValue
+    """Of the joint, over all counts."""
     at_zero: JointValue
+    """Position of the joint at count 0; a deviation turns the link against what the sensor shows."""
     direction: Literal[-1, 1] = 1
+    """1: counts grow with the position; −1: they fall."""
     linearity: Plain | None = None
+    """Largest bend, as a share of the range, that a sound sensor may have."""
     noise: Annotated[Quantity, in_unit("count", at_least=0.0)] | None = None
+    """Standard deviation before rounding."""
     measures: Literal["position", "velocity"] = "position"
+    """A tachometer measures velocity, which is integrated from 0."""
 
 
 class Joint(_Part):
     """One joint with everything that belongs to it."""
 
     name: str
+    """For people."""
     kind: Literal["revolute", "prismatic"]
+    """Turns about its z axis, or slides along it."""
     geometry: Geometry
+    """See Geometry."""
     link: Annotated[Cylinder | Rod | Body, Field(discriminator="shape")]
-    drive: Annotated[DcMotor | PlainGain, Field(discriminator="kind")]
+    """See Cylinder, Rod and Body."""
+    drive: Annotated[DcMotor | CurrentDrive | PlainGain, Field(discriminator="kind")]
+    """See DcMotor, CurrentDrive and PlainGain."""
     friction: Friction = Friction()
+    """See Friction."""
     sensor: Sensor | None = None
+    """See Sensor; none: exact positions."""
 
     @property
     def dc_motor(self) -> DcMotor:
-        """The motor. Raises SpecError when the drive is a plain gain."""
+        """The motor. Raises SpecError when the drive is none."""
         if not isinstance(self.drive, DcMotor):
-            raise SpecError(f"joint {self.name!r}: its drive is a plain gain, a dc_motor is needed here")
+            raise SpecError(f"joint {self.name!r}: its drive is a {self.drive.kind}, a dc_motor is needed here")
         return self.drive
 
 
@@ -150,20 +213,54 @@ class BoardPid(_Part):
 
     kind: Literal["board_pid"]
     period: Second
+    """Of control."""
     delay: Second
+    """From reading a position to the change of the drive."""
     dac_counts_per_adc_count: Plain
+    """Output for an error of one count, per unit of P; a deviation is one of the gains."""
     gains: tuple[tuple[int, int, int], ...]
+    """P, I, D per joint; a record's own gains come before these."""
 
 
 class SampledPid(_Part):
     """PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
-    an inner loop (cascade): the outer output is then a speed set point for it."""
+    an inner loop (cascade): the outer output is then a speed set point for it.
+
+    The output is in the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to
+    ± `output_limit` ahead of the amplifier, whose dead zone and supply limit come after; at that limit the error is not
+    integrated further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the
+    output is 1 + `gain_error` times what the gains say. One number for all joints, or one a joint.
+    """
 
     kind: Literal["pid"]
     period: Second
+    """Of control."""
     delay: Second
+    """From reading a position to the change of the drive."""
     gains: tuple[tuple[float, float, float], ...]
+    """P (drive's unit per rad or m), I (per rad·s), D (s/rad) per joint."""
     velocity_gains: tuple[tuple[float, float, float], ...] | None = None
+    """P, I, D per joint of an inner loop on speed; none: no such loop."""
+    drive_resolution: Sizes | None = None
+    """Step of the output, unit of the drive; none: not rounded."""
+    output_limit: Sizes | None = None
+    """Largest output, unit of the drive, ahead of the amplifier; none: no limit."""
+    set_point_resolution: Sizes | None = None
+    """Step to which set points are rounded before use, rad or m; none: not rounded."""
+    gain_error: Annotated[Quantity, in_unit("1", above=-1.0)] | tuple[Plain, ...] | None = None
+    """Relative: the output is 1 + this times what the gains say; its deviation is that of the gains."""
+
+
+def of_joint(sizes: Quantity | tuple[Quantity, ...] | None, joint: int) -> Quantity | None:
+    """The number of joint `joint` (from 1), where one is stated for all joints or one a joint."""
+    return sizes[joint - 1] if isinstance(sizes, tuple) else sizes
+
+
+DEVIATIONS_ARE_USED_OF = (
+    "lengths that are not 0, masses, centres, inertias, motor constants, gear ratio, supply and output limits, "
+    "friction, at_zero, gains and delay"
+)
+"""Numbers of a machine file whose deviation becomes a tolerance parameter."""
 
 
 class NoController(_Part):
@@ -177,16 +274,27 @@ class Machine(_Part):
     and their mass is part of `load`, a point mass at the end of the last modelled link."""
 
     version: Literal[1]
+    """Of the format."""
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    """For files and commands."""
     title: str
+    """For people."""
     notes: str = ""
+    """For people."""
     gravity: tuple[float, float, float]
-    joints: Annotated[tuple[Joint, ...], Field(min_length=1, max_length=6)]
+    """In the base's axes, m/s²."""
+    joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
+    """From the base on; see Joint."""
     modelled_joints: tuple[int, ...]
+    """1, 2, … up to the last joint that moves in the model; the others are held."""
     load: Kilogram | None = None
+    """A point at the end of the last modelled link, the held joints' mass included."""
     controller: Annotated[BoardPid | SampledPid | NoController, Field(discriminator="kind")]
+    """See BoardPid, SampledPid and NoController."""
     limits: Limits = Limits()
+    """What the arm may do ([safety](safety.md)): experiments are planned within it."""
     rest_posture: tuple[float, ...] | None = None
+    """Position of every joint at rest, rad or m: where springs are expected to be slack."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -199,7 +307,46 @@ class Machine(_Part):
             raise ValueError(f"rest_posture has {len(self.rest_posture)} values for {count} joints")
         if not isinstance(self.controller, NoController) and len(self.controller.gains) != count:
             raise ValueError(f"controller.gains has {len(self.controller.gains)} rows for {count} joints")
+        if isinstance(self.controller, SampledPid):
+            for name in ("drive_resolution", "output_limit", "set_point_resolution", "gain_error"):
+                stated = getattr(self.controller, name)
+                if isinstance(stated, tuple) and len(stated) != count:
+                    raise ValueError(f"controller.{name} has {len(stated)} numbers for {count} joints")
+            rows = self.controller.velocity_gains
+            if rows is not None and len(rows) != count:
+                raise ValueError(f"controller.velocity_gains has {len(rows)} rows for {count} joints")
+        for place, quantity in self._quantities():
+            if quantity.deviation is not None and not self._takes_deviation(place):
+                raise ValueError(f"{place}: no method can use a deviation here, but of {DEVIATIONS_ARE_USED_OF}")
         return self
+
+    def _quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Every number of the whole machine and of the modelled joints, with its place in the file."""
+        parts: list[tuple[str, object]] = [("controller", self.controller)]
+        parts += [(f"joints.{j}", self.joints[j - 1]) for j in self.modelled_joints]
+        while parts:
+            place, part = parts.pop(0)
+            if isinstance(part, Quantity):
+                yield place, part
+            elif isinstance(part, BaseModel):
+                parts += [(f"{place}.{name}", getattr(part, name)) for name in type(part).model_fields]
+            elif isinstance(part, tuple):
+                parts += [(f"{place}.{k + 1}", one) for k, one in enumerate(part)]
+
+    def _takes_deviation(self, place: str) -> bool:
+        """Whether a model has a parameter for the deviation of the number at a place."""
+        words = place.split(".")
+        if words[0] == "controller":
+            return words[1] in ("delay", "gain_error", "output_limit", "dac_counts_per_adc_count")
+        joint, part = self.joint(int(words[1])), words[2]
+        if part == "geometry":
+            return words[3] in ("a", "d") and getattr(joint.geometry, words[3]).value != 0.0
+        if part == "drive":
+            return words[3] not in ("inductance", "amplifier_gain", "dac_full_scale")
+        if part == "sensor":
+            slides = joint.kind == "prismatic" and joint.geometry.d.value != 0.0  # its zero is link's `d` itself
+            return words[3] == "at_zero" and not slides
+        return True
 
     def calibration(self, joint: int) -> JointCalibration:
         """Counts and posture units ↔ rad of joint `joint` (from 1). Raises SpecError when it has no sensor."""

@@ -50,6 +50,7 @@ def in_unit(unit: str, *, above: float | None = None, at_least: float | None = N
             raise ValueError(f"value {quantity.value} {unit} must be at least {at_least}")
         return quantity
 
+    check.unit = unit  # type: ignore[attr-defined]  # for the page that is made from the schema
     return AfterValidator(check)
 
 
@@ -59,6 +60,7 @@ def _joint_unit(quantity: Quantity) -> Quantity:
     return quantity
 
 
+_joint_unit.unit = "rad or m"  # type: ignore[attr-defined]
 Metre = Annotated[Quantity, in_unit("m")]
 Radian = Annotated[Quantity, in_unit("rad")]
 JointValue = Annotated[Quantity, AfterValidator(_joint_unit)]

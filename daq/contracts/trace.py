@@ -90,7 +90,7 @@ class TraceRecord(BaseModel):
     gains: dict[int, Gain] | None = None
     period: float | None = None
     """Control period (s); None where the record was not made tick by tick."""
-    drive_unit: Literal["V", "N·m", "N"] | None = None
+    drive_unit: Literal["V", "A", "N·m", "N"] | None = None
     clock: dict[str, float] = {}
     """Offsets between the board's ticks, the host's monotonic clock and UTC, in s."""
     notes: str = ""
@@ -107,7 +107,7 @@ class Trace:
     position:  (n, j) rad (m on a prismatic joint)
     set_point: (n, j) rad, as the controller took it in that period; None where the record has none
     error:     (n, j) rad, set point − position as the controller formed it
-    drive:     (n, j) motor volts after the amplifier, or N·m / N where `record.drive_unit` says so
+    drive:     (n, j) motor volts after the amplifier, or A, N·m, N where `record.drive_unit` says so
     velocity:  (n, j) rad/s
     power_raw: (n, j) the controller's output before the amplifier, DAC counts
     tick:      (n,)   number of the control period; a gap is a sample that is missing

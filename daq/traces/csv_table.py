@@ -34,7 +34,7 @@ SIGNALS = ("set_point", "position", "drive", "velocity")
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 """Note in a trace whose positions were integrated."""
 
-_COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-6])")
+_COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
 
 
 class CsvDescription(BaseModel):
@@ -45,9 +45,9 @@ class CsvDescription(BaseModel):
     source: Literal["mock", "real", "imported"] = "imported"
     machine: str | None = None
     robot: str | None = None
-    joints: tuple[Annotated[int, Field(ge=1, le=6)], ...] | None = None
+    joints: tuple[Annotated[int, Field(ge=1, le=99)], ...] | None = None
     """Joints to take from the columns; all of them when None."""
-    drive_unit: Literal["V", "N·m", "N"] | None = None
+    drive_unit: Literal["V", "A", "N·m", "N"] | None = None
     period: Annotated[float, Field(gt=0)] | None = None
     created: Moment | None = None
     outcome: Outcome | None = None
@@ -176,7 +176,7 @@ def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str]
 
 
 def _check_header(path: Path, header: list[str]) -> None:
-    allowed = f"allowed are time and {', '.join(f'{name}_N' for name in SIGNALS)} with N from 1 to 6"
+    allowed = f"allowed are time and {', '.join(f'{name}_N' for name in SIGNALS)} with N from 1 to 99"
     if not header or header == [""]:
         raise TraceError(f"{path}: row 1: no column names; {allowed}")
     if len(header) == 1 and re.search(r"[;\t]", header[0]):

@@ -20,9 +20,10 @@ INTEGRAL_SHARE = 64.0
 SUM, LAST_ERROR, INNER_SUM, LAST_INNER_ERROR, LAST_READING = range(5)
 MEMORY = 5
 
-# Columns of the gains: the (outer) controller, then the inner one of a cascade, then DAC counts per ADC count.
-P, I, D, INNER_P, INNER_I, INNER_D, SCALE = range(7)  # noqa: E741
-GAINS = 7
+# Columns of the gains: the (outer) controller, then the inner one of a cascade, then DAC counts per ADC count, and the
+# resolution of a sampled controller's output (0: none).
+P, I, D, INNER_P, INNER_I, INNER_D, SCALE, RESOLUTION = range(8)  # noqa: E741
+GAINS = 8
 
 
 @compiled
@@ -47,6 +48,15 @@ def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise
 
 
 @compiled
+def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
+    """The same without rounding, limit and wrong gain."""
+    power = gains[SCALE] * (gains[P] * error + memory[SUM] / INTEGRAL_SHARE + gains[D] * (error - memory[LAST_ERROR]))
+    memory[SUM] += gains[I] * error
+    memory[LAST_ERROR] = error
+    return power
+
+
+@compiled
 def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
     """P e + I ∫e dt + D de/dt in SI units, rectangles for the integral and a backward difference."""
     memory[SUM] += error * period
@@ -63,3 +73,24 @@ def cascade(error: complex, speed: complex, period: complex, gains: NDArray[Any]
     slope = (inner_error - memory[LAST_INNER_ERROR]) / period
     memory[LAST_INNER_ERROR] = inner_error
     return gains[INNER_P] * inner_error + gains[INNER_I] * memory[INNER_SUM] + gains[INNER_D] * slope
+
+
+@compiled
+def given_out(
+    output: complex,
+    error: complex,
+    period: complex,
+    gains: NDArray[Any],
+    joint: NDArray[Any],
+    quantise: bool,
+    memory: NDArray[Any],
+) -> Any:
+    """The drive for a sampled controller's output: rounded to its resolution, then limited. At the limit the error is
+    not integrated further into it."""
+    resolution = gains[RESOLUTION]
+    if quantise and resolution > 0.0:
+        output = resolution * rounded_half_up(output / resolution)
+    limit = joint[at.OUTPUT_LIMIT]
+    if abs(output.real) > limit.real and output.real * error.real > 0.0:
+        memory[SUM] -= error * period
+    return clamped(output, limit)

@@ -24,8 +24,9 @@ SETTLING = 0.4
 and the small jump of a simulation that finds its own balance would be taken for inertia."""
 LEAST_MOTION_COUNTS = 4.0
 """Least motion, in counts of the sensor, of at least one joint in at least one trace: less is rounding and noise."""
-WILD_COUNTS = 400.0
-"""Distance between set point and position, in counts, that no controller within ±127 leaves for a whole record."""
+WILD_SHARE = 0.5
+"""Distance between set point and position, as a share of the largest travel of any joint, that no controller leaves for
+half of a record. A joint that is held may sag by more than its own travel."""
 
 
 @dataclass(frozen=True)
@@ -127,16 +128,22 @@ def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInput
 
 
 def _check_same_unit(trace: Trace, machine: Machine) -> None:
-    """Refuses set points and positions in different units: they differ by a factor or an offset throughout."""
-    if trace.set_point is None:
-        return
-    for joint in machine.modelled_joints:
+    """Refuses set points and positions in different units: they differ by a factor or an offset throughout.
+
+    What counts is the travel of the record's motion, whatever an encoder's count is.
+    """
+    if trace.set_point is None or not np.ptp(trace.set_point, axis=0).any():
+        return  # nothing is asked for, so nothing says how far it should have gone
+    kinds = {j: machine.joint(j).kind for j in machine.modelled_joints}
+    signals = (trace.set_point, trace.position)
+    travels = {j: max(float(np.ptp(s[:, trace.column(j)])) for s in signals) for j in kinds}
+    for joint, kind in kinds.items():
         sensor = machine.joint(joint).sensor
-        if sensor is None or sensor.measures != "position":
+        if sensor is not None and sensor.measures != "position":
             continue
         column = trace.column(joint)
         apart = float(np.median(np.abs(trace.set_point[:, column] - trace.position[:, column])))
-        if apart > WILD_COUNTS * resolution(sensor):
+        if apart > WILD_SHARE * max(travels[j] for j in kinds if kinds[j] == kind):
             larger = float(np.abs(trace.set_point[:, column]).max()), float(np.abs(trace.position[:, column]).max())
             raise TraceError(
                 f"trace {trace.record.trace_id}: joint {joint}: set points (to {larger[0]:.4g}) and positions "

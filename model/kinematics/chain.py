@@ -1,4 +1,4 @@
-"""A serial chain of 1 to 6 revolute or prismatic joints, as data.
+"""A serial chain of revolute or prismatic joints, as data.
 
 The chain is what every dynamics routine starts from. It is immutable and does no more than check
 itself and pack its numbers into the arrays that compiled code reads.
@@ -15,7 +15,6 @@ from numpy.typing import DTypeLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
-MAX_JOINTS = 6
 STANDARD_GRAVITY = 9.80665
 """Magnitude of gravity, m/s² (ISO 80000-3); the source of the MA2000 data does not print the value it used."""
 
@@ -96,7 +95,7 @@ class Chain:
     """A fixed-base serial chain with its gravity and a point load at the end of the last link.
 
     Args:
-        joints: 1 to 6 joints, base first.
+        joints: base first.
         links: one per joint; link i moves with joint i.
         gravity: (3,) in the base frame, m/s². The default points along −z0; tilt it for a tilted base.
         load: point mass fixed to the last frame, kg.
@@ -171,8 +170,8 @@ def _read_only(values: FloatArray) -> FloatArray:
 
 def _check_shape(chain: Chain) -> None:
     n = len(chain.joints)
-    if not 1 <= n <= MAX_JOINTS:
-        raise ChainError(f"chain has {n} joints; 1 to {MAX_JOINTS} are allowed")
+    if n < 1:
+        raise ChainError("chain has 0 joints; at least one is needed")
     if len(chain.links) != n:
         raise ChainError(f"chain has {n} joints and {len(chain.links)} links; one link per joint is needed")
     for name, vector in (("gravity", chain.gravity), ("load_position", chain.load_position)):

@@ -10,7 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import BoardPid, Body, Cylinder, DcMotor, Joint, Machine, NoController, PlainGain, Rod
+from daq.contracts.machine import (
+    BoardPid,
+    Body,
+    CurrentDrive,
+    Cylinder,
+    DcMotor,
+    Joint,
+    Machine,
+    NoController,
+    PlainGain,
+    Rod,
+    SampledPid,
+    of_joint,
+)
 from daq.contracts.quantity import Quantity
 from model import layout as at
 from model.effects.effect import JointScale
@@ -51,11 +64,48 @@ def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
         found.append(parameter("load", Kind.INERTIA, "mass", machine.load, at.LOAD, 0.0))
     if not isinstance(machine.controller, NoController):
         found.append(parameter("controller", Kind.CONTROLLER, "delay", machine.controller.delay, at.DELAY, 0.0))
-    return tuple(found)
+    return (*found, *_of_controller(machine))
+
+
+def _of_controller(machine: Machine) -> Iterator[Parameter]:
+    """Gains and limits of the controller, where the file says how far off they may be."""
+    for number in machine.modelled_joints:
+        numbers = (
+            ("gain_error", gain_error(machine, number), at.GAIN_ERROR, -0.95),
+            ("output_limit", output_limit(machine, number), at.OUTPUT_LIMIT, 0.0),
+        )
+        for part, stated, column, low in numbers:
+            if stated is not None and stated.deviation is not None:
+                own = parameter("controller", Kind.CONTROLLER, part, stated, at.slot(number, column), low)
+                yield replace(own, name=f"joint{number}.controller.{part}", joints=(number,))
+
+
+def gain_error(machine: Machine, number: int) -> Quantity | None:
+    """Relative error of the controller's gains on a joint (from 1), as far as the file states one."""
+    controller = machine.controller
+    if isinstance(controller, SampledPid):
+        return of_joint(controller.gain_error, number)
+    if not isinstance(controller, BoardPid) or controller.dac_counts_per_adc_count.deviation is None:
+        return None
+    stated = controller.dac_counts_per_adc_count
+    sides = {s: getattr(stated, s) for s in ("low", "high")}
+    relative = {s: None if v is None else v / stated.value - 1.0 for s, v in sides.items()}
+    deviation = abs((stated.deviation or 0.0) / stated.value)
+    return stated.model_copy(update={"value": 0.0, "unit": "1", "deviation": deviation, **relative})
+
+
+def output_limit(machine: Machine, number: int) -> Quantity | None:
+    """Limit of the controller's output on a joint (from 1), as far as the file states one."""
+    controller = machine.controller
+    return of_joint(controller.output_limit, number) if isinstance(controller, SampledPid) else None
 
 
 def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
-    for component, kind, part, quantity, column, low in (*_of_link(joint), *_of_drive(joint.drive)):
+    for component, kind, part, quantity, column, low in (
+        *_of_link(joint),
+        *_of_drive(joint.drive),
+        *_of_sensor(joint),
+    ):
         own = parameter(component, kind, part, quantity, at.slot(number, column), low)
         place = f"link{number}" if component == "link" else f"joint{number}.{component}"
         yield replace(own, name=f"{place}.{part}", joints=(number,))
@@ -79,13 +129,35 @@ def _of_link(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, floa
             yield "link", Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
 
 
-def _of_drive(drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+def _of_sensor(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+    """The same. A zero that is off turns (or shifts) the link against what its sensor shows."""
+    stated = None if joint.sensor is None else joint.sensor.at_zero
+    if stated is None or stated.deviation is None:
+        return
+    own, column = (joint.geometry.theta, at.THETA) if joint.kind == "revolute" else (joint.geometry.d, at.D)
+    shift = own.value - stated.value
+    moved = {s: None if (v := getattr(stated, s)) is None else v + shift for s in ("low", "high")}
+    zero = stated.model_copy(update={"value": own.value, **moved})
+    yield "sensor", Kind.GEOMETRY, "zero", zero, column, -math.inf
+
+
+def _of_drive(drive: DcMotor | CurrentDrive | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
         yield "motor", Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
         yield "motor", Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
         yield "motor", Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
         yield "motor", Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
+        if drive.gear_ratio.deviation is not None:
+            yield "motor", Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
+        if drive.supply_limit is not None and drive.supply_limit.deviation is not None:
+            yield "motor", Kind.DRIVE, "supply_limit", drive.supply_limit, at.SUPPLY, 0.0
+    elif isinstance(drive, CurrentDrive):
+        yield "motor", Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
+        if drive.rotor_inertia is not None:
+            yield "motor", Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
+        if drive.gear_ratio.deviation is not None:
+            yield "motor", Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
     else:
         yield "drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
         if drive.inertia is not None:
@@ -123,6 +195,9 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
     row[at.STRIBECK_SPEED], row[at.COOLING_TIME], row[at.RIPPLE_CYCLES] = 1.0, 1.0, 1.0
     row[at.CONTACT_COMPLIANCE] = contact_compliance(scale)
     row[at.RANGE], row[at.RAD_PER_COUNT] = scale.range, 0.0
+    limit, error = output_limit(machine, number), gain_error(machine, number)
+    row[at.OUTPUT_LIMIT] = NO_LIMIT if limit is None else limit.value
+    row[at.GAIN_ERROR] = 0.0 if error is None else error.value
     sensor = joint.sensor
     if sensor is not None:
         row[at.AT_ZERO] = sensor.at_zero.value
@@ -131,7 +206,7 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
         row[at.VOLTS_PER_COUNT] *= sensor.direction
 
 
-def _fill_drive(row: NDArray[np.float64], drive: DcMotor | PlainGain) -> None:
+def _fill_drive(row: NDArray[np.float64], drive: DcMotor | CurrentDrive | PlainGain) -> None:
     if isinstance(drive, DcMotor):
         row[at.RESISTANCE], row[at.INDUCTANCE] = drive.resistance.value, drive.inductance.value
         row[at.TORQUE_CONSTANT], row[at.BACK_EMF] = drive.torque_constant.value, drive.back_emf_constant.value
@@ -141,9 +216,13 @@ def _fill_drive(row: NDArray[np.float64], drive: DcMotor | PlainGain) -> None:
     else:
         row[at.RESISTANCE] = row[at.GEAR] = row[at.VOLTS_PER_COUNT] = 1.0
         row[at.INDUCTANCE] = 1e-3
-        row[at.TORQUE_CONSTANT] = drive.gain.value
-        row[at.ROTOR_INERTIA] = 0.0 if drive.inertia is None else drive.inertia.value
         row[at.SUPPLY] = NO_LIMIT
+        if isinstance(drive, CurrentDrive):
+            row[at.TORQUE_CONSTANT], row[at.GEAR] = drive.torque_constant.value, drive.gear_ratio.value
+            row[at.ROTOR_INERTIA] = 0.0 if drive.rotor_inertia is None else drive.rotor_inertia.value
+        else:
+            row[at.TORQUE_CONSTANT] = drive.gain.value
+            row[at.ROTOR_INERTIA] = 0.0 if drive.inertia is None else drive.inertia.value
 
 
 def joint_scale(machine: Machine, number: int) -> JointScale:
@@ -161,7 +240,9 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
             speed = volts / (drive.back_emf_constant.value * drive.gear_ratio.value)
         gear = drive.gear_ratio.value
     else:
-        supply, volts, torque, gear = NO_LIMIT, 10.0, abs(drive.gain.value) * 10.0, 1.0
+        gear = drive.gear_ratio.value if isinstance(drive, CurrentDrive) else 1.0
+        gain = gear * drive.torque_constant.value if isinstance(drive, CurrentDrive) else drive.gain.value
+        supply, volts, torque = NO_LIMIT, 10.0, abs(gain) * 10.0
     bounded = isinstance(drive, DcMotor)
     friction = joint.friction.viscous_motor_side or joint.friction.viscous
     controller = machine.controller
@@ -212,11 +293,10 @@ def _transmission_inertia(machine: Machine, number: int) -> float:
     if number == machine.modelled_joints[-1] and machine.load is not None:
         own += machine.load.value * (joint.geometry.a.value**2 if joint.kind == "revolute" else 1.0)
     drive = joint.drive
-    rotor = (
-        drive.rotor_inertia.value * drive.gear_ratio.value**2
-        if isinstance(drive, DcMotor)
-        else (0.0 if drive.inertia is None else drive.inertia.value)
-    )
+    if isinstance(drive, PlainGain):
+        rotor = 0.0 if drive.inertia is None else drive.inertia.value
+    else:
+        rotor = 0.0 if drive.rotor_inertia is None else drive.rotor_inertia.value * drive.gear_ratio.value**2
     both = [i for i in (own, rotor) if i > 0]
     if not both:
         raise SpecError(f"machine {machine.name}: joint {number} has no inertia: neither its link nor its drive")

@@ -86,7 +86,7 @@ class Parameter:
     @property
     def sets_torque_scale(self) -> bool:
         """Whether it is a data-sheet number that fixes the scale of all torques, which motion alone cannot show."""
-        return self.kind is Kind.DRIVE and self.part in ("torque_constant", "resistance", "gain")
+        return self.kind is Kind.DRIVE and self.part in ("torque_constant", "resistance", "gain", "gear_ratio")
 
 
 def initial_position(joint: int, trace: int | None = None) -> Parameter:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid
+from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.drives import controller as pid
@@ -18,6 +18,8 @@ REST_PERIODS = 25
 """Most readings that are averaged to the posture at rest."""
 NEIGHBOURS = 1.5
 """Largest distance, in periods, of samples without a gap between them."""
+MOST_SAMPLES = 0.8
+"""Least share of periods with a sample at which a record counts as made period by period."""
 NEARLY = 1e-6
 """Distance, in periods, that counts as rounding."""
 LARGEST_ANGLE = 20.0
@@ -55,6 +57,13 @@ class RunInputs:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def drive_of_every_period(self) -> bool:
+        """Whether the record holds the drive of each control period: one sample a period, but for a few that are
+        missing."""
+        whole = bool(np.all(self.rows == np.round(self.rows)))
+        return self.has_drive and whole and len(self.rows) > MOST_SAMPLES * len(self)
 
 
 def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
@@ -181,6 +190,9 @@ def _gains(machine: Machine, trace: Trace) -> Floats:
             gains[k, pid.SCALE] = controller.dac_counts_per_adc_count.value
             if trace.record.gains and joint in trace.record.gains:
                 gains[k, pid.P : pid.D + 1] = trace.record.gains[joint]
-        elif isinstance(controller, SampledPid) and controller.velocity_gains is not None:
-            gains[k, pid.INNER_P : pid.INNER_D + 1] = controller.velocity_gains[joint - 1]
+        elif isinstance(controller, SampledPid):
+            if controller.velocity_gains is not None:
+                gains[k, pid.INNER_P : pid.INNER_D + 1] = controller.velocity_gains[joint - 1]
+            resolution = of_joint(controller.drive_resolution, joint)
+            gains[k, pid.RESOLUTION] = 0.0 if resolution is None else resolution.value
     return gains

@@ -76,7 +76,7 @@ def batch(kind: Any, first: int, last: int, records: RecordArrays, runs: RunArra
     """Runs first … last − 1; `kind` is a tag that chooses the dynamics."""
     n = runs.initial.shape[1]
     state = np.zeros((n, STATE), dtype=runs.parts.dtype)
-    memory = np.zeros((n, MEMORY), dtype=runs.parts.dtype)
+    memory = np.zeros((n, 2 * MEMORY), dtype=runs.parts.dtype)
     queue = np.zeros((QUEUE, n), dtype=runs.parts.dtype)
     volts = np.zeros(n, dtype=runs.parts.dtype)
     order = np.zeros(n, dtype=np.int64)
@@ -93,7 +93,7 @@ def batch(kind: Any, first: int, last: int, records: RecordArrays, runs: RunArra
         posture = work[general_motion.Q]
         for j in range(n):
             posture[j] = runs.initial[r, j, 0]
-            for i in range(MEMORY):
+            for i in range(2 * MEMORY):
                 memory[j, i] = 0.0 * posture[j]
             for i in range(STATE):
                 state[j, i] = 0.0 * posture[j]

@@ -9,7 +9,16 @@ import numpy as np
 from model import layout as at
 from model.arrays import Array
 from model.drives.amplifier import warmed
-from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pid
+from model.drives.controller import (
+    LAST_ERROR,
+    LAST_READING,
+    MEMORY,
+    board_pid,
+    cascade,
+    given_out,
+    linear_board_pid,
+    sampled_pid,
+)
 from model.drives.sensor import reading
 from model.dynamics.compilation import internal
 from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR_SPEED, SPEED
@@ -39,12 +48,14 @@ OUTPUTS = 6
 def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Array, out: Array) -> Any:
     """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts.
 
-    The controller reads `following` of the way from the model's reading to the recorded one, where there is one.
+    The controller reads `following` of the way from the model's reading to the recorded one, where there is one. Where
+    the recorded drive is the input, the controller forms no drive but a correction of it (`corrected`).
     """
     joint, period, set_points = arm.joints[j], arm.shared[at.PERIOD], record.set_points
-    kind, quantise = record.settings[at.CONTROLLER], record.settings[at.QUANTISE] != 0
+    kind, quantise = record.settings[at.CONTROLLER], record.settings[at.QUANTISE] == at.ALL_ROUNDED
+    rounds = record.settings[at.QUANTISE] != at.NOTHING_ROUNDED
     has_sensor = joint[at.RAD_PER_COUNT].real != 0.0
-    read = reading(state[j, POSITION], record.noise[k, j], quantise, joint)
+    read = own = reading(state[j, POSITION], record.noise[k, j], quantise, joint)
     wanted = set_points[k, j] - joint[at.LOST] * (set_points[k, j] - set_points[max(k - 1, 0), j])
     unit = joint[at.RAD_PER_COUNT] if has_sensor else 1.0 + 0.0 * joint[at.RAD_PER_COUNT]
     zero = joint[at.AT_ZERO] if has_sensor else 0.0 * joint[at.AT_ZERO]
@@ -65,12 +76,19 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
         scale = 1.0 + joint[at.GAIN_ERROR]
         if kind == at.SAMPLED_PID:
             drive = scale * sampled_pid(error, period, record.gains[j], memory[j])
+            drive = given_out(drive, error, period, record.gains[j], joint, rounds, memory[j])
         elif kind == at.CASCADE:
             speed = unit * (read - memory[j, LAST_READING]) / period
             drive = scale * cascade(error, speed, period, record.gains[j], memory[j])
+            drive = given_out(drive, error, period, record.gains[j], joint, rounds, memory[j])
             memory[j, LAST_READING] = read
         else:
             drive = record.recorded[k, j] + 0.0 * error
+        power = drive / joint[at.VOLTS_PER_COUNT]
+    if record.settings[at.DRIVE_RECORDED] != 0:
+        shown = (record.readings[k, j] - zero) / unit
+        apart = (1.0 - record.following) * (shown - own)
+        drive = corrected(k, apart, unit, period, record, arm, j, memory[j, MEMORY:], drive)
         power = drive / joint[at.VOLTS_PER_COUNT]
     out[OUT_POSITION, k, j] = state[j, POSITION]
     out[OUT_SPEED, k, j] = state[j, SPEED]
@@ -78,6 +96,38 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
     out[OUT_POWER, k, j] = power
     out[OUT_DRIVE, k, j] = drive
     return drive
+
+
+@internal
+def corrected(
+    k: int,
+    apart: complex,
+    unit: complex,
+    period: complex,
+    record: RecordRow,
+    arm: Arm,
+    j: int,
+    memory: Array,
+    drive: complex,
+) -> Any:
+    """The recorded drive, and what the controller without rounding, limits or wrong gain makes of the distance (counts)
+    by which the recorded reading is ahead of the simulated one. Where the sample is missing: `drive`, the model's own.
+    """
+    if np.isnan(apart.real):
+        return drive
+    kind, gains = record.settings[at.CONTROLLER], record.gains[j]
+    if k == 0:
+        memory[LAST_ERROR] = apart if kind == at.BOARD_PID else unit * apart
+        memory[LAST_READING] = apart
+    if kind == at.BOARD_PID:
+        correction = linear_board_pid(apart, gains, memory) * arm.joints[j, at.VOLTS_PER_COUNT]
+    elif kind == at.SAMPLED_PID:
+        correction = sampled_pid(unit * apart, period, gains, memory)
+    else:
+        speed = unit * (memory[LAST_READING] - apart) / period
+        correction = cascade(unit * apart, speed, period, gains, memory)
+        memory[LAST_READING] = apart
+    return record.recorded[k, j] + correction
 
 
 @internal

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError, TraceError
-from daq.contracts.machine import BoardPid, NoController, SampledPid
+from daq.contracts.machine import BoardPid, NoController, SampledPid, of_joint
 from model import layout as at
 from model.arrays import Floats
 from model.machine_model.model import Model
@@ -35,6 +35,9 @@ class Options:
         following: share of the difference between recorded and simulated reading that the simulated controller is
             given, where a reading was recorded. At 0 it reads the model alone: an output error in closed loop. At 1 it
             reads the record, noise and all: the recorded drive moves the model, and nothing brings it back.
+        recorded_drive: in closed loop, the recorded drive is the input, and the controller, without rounding, limits
+            or a wrong gain, adds what it makes of 1 − `following` of the distance between recorded and simulated
+            reading. Where a sample is missing the controller forms the drive.
         initial: (n, 2) position (rad) and speed (rad/s) at the start; None: as estimated from the record.
         general: use the recursive dynamics even where there is a closed form.
     """
@@ -44,6 +47,7 @@ class Options:
     step: float = LONGEST_STEP
     noise: Floats | None = None
     following: float = 0.0
+    recorded_drive: bool = False
     initial: Floats | None = None
     general: bool = False
 
@@ -62,6 +66,12 @@ class Prepared:
     gains: Floats
     settings: NDArray[np.int64]
     period: float
+
+    def with_setting(self, setting: int, value: int) -> Prepared:
+        """The record with another whole number of its settings (`model.layout`)."""
+        settings = self.settings.copy()
+        settings[setting] = value
+        return replace(self, settings=settings)
 
 
 def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
@@ -86,8 +96,13 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
         set_points = _counts(model, set_points)
     elif options.loop == "closed" and isinstance(controller, SampledPid):
         settings[at.CONTROLLER] = at.SAMPLED_PID if controller.velocity_gains is None else at.CASCADE
+        set_points = _rounded(controller, machine.modelled_joints, set_points)
     elif options.loop == "closed" and not isinstance(controller, NoController):
         raise SpecError(f"controller {controller.kind!r} cannot be simulated")
+    if options.recorded_drive and settings[at.CONTROLLER] != at.NO_CONTROLLER:
+        if not inputs.has_drive:
+            raise TraceError(f"trace {inputs.name}: has no drive, which is to be the input")
+        settings[at.DRIVE_RECORDED] = 1
     noise = inputs.noise if options.noise is None else np.ascontiguousarray(options.noise)
     initial = inputs.initial if options.initial is None else np.ascontiguousarray(options.initial)
     if noise.shape != set_points.shape:
@@ -104,6 +119,16 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
         settings=settings,
         period=inputs.period,
     )
+
+
+def _rounded(controller: SampledPid, joints: tuple[int, ...], set_points: Floats) -> Floats:
+    """Set points as a sampled controller takes them."""
+    found = set_points.copy()
+    for column, joint in enumerate(joints):
+        resolution = of_joint(controller.set_point_resolution, joint)
+        if resolution is not None:
+            found[:, column] = resolution.value * np.floor(found[:, column] / resolution.value + 0.5)
+    return found
 
 
 def _counts(model: Model, set_points: Floats) -> Floats:

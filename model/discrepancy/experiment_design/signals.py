@@ -58,6 +58,7 @@ def imagine(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | Non
         return None
     counts = observation.deviations / observation.unit
     drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.prepared[0].noise.shape)
+    observation = observation.with_drive_as_input(False)  # nothing has been recorded yet
     return Imagined(observation, tuple(u for u in given.unknowns if u.trace is not None), (drawn * counts,))
 
 
@@ -89,9 +90,9 @@ class Prediction:
     def recorded(self) -> Prediction:
         """The same on the record that an arm like the point's model would leave. Not finite where its simulation is
         not."""
-        noisy = self.there.observation.with_noise(self.there.noise)
-        readings = noisy.shown(self.begun)
-        return replace(self, there=replace(self.there, observation=self.there.observation.with_readings(readings)))
+        own = self.there.observation.imagined(self.begun, self.there.noise)
+        observation = own.with_drive_as_input(self.point.observation.drive_is_input)
+        return replace(self, there=replace(self.there, observation=observation))
 
     def shown(self, values: Floats | None = None) -> Floats:
         """The simulation that is given the record, (N,) in deviations of a reading; at other values (p,) than the

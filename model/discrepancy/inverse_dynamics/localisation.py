@@ -144,7 +144,8 @@ def _bins(now: BalanceFit, case: Case, j: int) -> list[tuple[AgainstWhat, Bins, 
     model, records, residual = now.balance.model, now.balance.records, now.residual
     joint = model.machine.joint(model.machine.modelled_joints[j])
     angle = "rad" if joint.kind == "revolute" else "m"
-    drive = "V" if joint.drive.kind == "dc_motor" else torque_unit(model, model.machine.modelled_joints[j])
+    torque = torque_unit(model, model.machine.modelled_joints[j])
+    drive = {"dc_motor": "V", "current": "A"}.get(joint.drive.kind, torque)
     begins = np.cumsum([0, *(len(r) for r in residual)])
     own = tuple(slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j])
     count = residual[0].shape[1]

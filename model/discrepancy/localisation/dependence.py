@@ -65,7 +65,7 @@ def drive_units(machine: Machine) -> tuple[str, ...]:
     for joint in machine.modelled_joints:
         own = machine.joint(joint)
         torque = "N·m" if own.kind == "revolute" else "N"
-        units.append("V" if own.drive.kind == "dc_motor" else torque)
+        units.append({"dc_motor": "V", "current": "A"}.get(own.drive.kind, torque))
     return tuple(units)
 
 

@@ -1,5 +1,6 @@
 """Evidence from the recorded controller's own numbers, which needs no model of the arm.
 
+Of a sampled PID the record holds no error; its drive tells it (`sampled_controller`).
 The board's record holds the set point that was sent, the position it read, the error it formed and the power it gave.
 Up to rounding, the error must be set point − position and the power the gain times the error. A violation proves lost
 set points or a wrong gain by itself, and its absence excludes them.
@@ -13,13 +14,14 @@ from functools import cached_property
 
 import numpy as np
 
-from daq.contracts.machine import BoardPid, Machine
+from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerProof
 from model.discrepancy.output_error.observation import Observation, Signals
+from model.discrepancy.output_error.sampled_controller import controller_numbers, with_errors
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
 
@@ -57,8 +59,9 @@ def check_controller(
         model: its stated gain errors are what the power is compared with; None: the gains are as configured. A finding
             gives the whole error of a gain, the stated one included.
     """
-    if not isinstance(machine.controller, BoardPid):
+    if isinstance(machine.controller, NoController):
         return ()
+    traces = with_errors(traces, machine)
     found: list[ControllerFinding | None] = []
     for joint in machine.modelled_joints:
         stated = 0.0 if model is None else float(model.vector[at.slot(joint, at.GAIN_ERROR)])
@@ -73,8 +76,9 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
     An effect counts only where it could be checked on every modelled joint and every trace holds what that needs. A
     gain is one number for all traces, so its samples may come from any of them.
     """
-    if not traces or not isinstance(machine.controller, BoardPid):
+    if not traces or isinstance(machine.controller, NoController):
         return ()
+    traces = with_errors(traces, machine)
     joints = [_JointRecords(tuple(traces), machine, joint) for joint in machine.modelled_joints]
     checks = {
         "wrong_gain": all(own.error_and_power is not None for own in joints),
@@ -146,6 +150,9 @@ class _JointRecords:
             column = trace.column(self.joint)
             used = trace.position[:, column] + trace.error[:, column]
             changed = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) > 2 * tolerance
+            numbers = controller_numbers(trace, self.machine, self.joint)
+            if numbers is not None:
+                changed &= ~numbers.limited
             wrong = np.abs(trace.set_point[:, column] - used) > tolerance
             moved, lost, total = (
                 moved + int(changed.sum()),
@@ -164,10 +171,21 @@ class _JointRecords:
             return None
         return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
 
+    @property
+    def rounding(self) -> float:
+        """Step of what the controller gives out: DAC counts, or the drive's unit; 0 where nothing is stated."""
+        if not isinstance(self.machine.controller, SampledPid):
+            return 1.0
+        stated = of_joint(self.machine.controller.drive_resolution, self.joint)
+        return 0.0 if stated is None else stated.value
+
     def _error_and_power(self, trace: Trace) -> tuple[Floats, Floats] | None:
         """The same of one trace, in DAC counts, where neither is at its limit; None where the trace does not hold them,
-        or I or D act."""
+        or I or D act. Of a sampled PID, the drives, whatever acts."""
         controller, sensor = self.machine.controller, self.machine.joint(self.joint).sensor
+        if isinstance(controller, SampledPid):
+            numbers = controller_numbers(trace, self.machine, self.joint)
+            return None if numbers is None else (np.round(numbers.formed[numbers.free], 6), numbers.drive[numbers.free])
         if not isinstance(controller, BoardPid) or sensor is None or trace.power_raw is None or trace.error is None:
             return None
         gains = (trace.record.gains or {}).get(self.joint, controller.gains[self.joint - 1])
@@ -233,7 +251,7 @@ def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
     spread = float(np.mean((power - (1 + relative) * wanted) ** 2))
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
-    deviation = float(np.sqrt(max(spread, 1 / 12) * np.sum((counts * values) ** 2)) / squares)
+    deviation = float(np.sqrt(max(spread, own.rounding**2 / 12) * np.sum((counts * values) ** 2)) / squares)
     if abs(relative - stated) < max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation):
         return None
     half, used = 2 * deviation, len(wanted)

@@ -42,4 +42,4 @@ def _replica(observation: Observation, truth: Calibration, rng: np.random.Genera
     """The same experiments on an arm that is this model, with random noise of the stated size."""
     scale = observation.deviations / observation.unit
     noise = [scale * rng.normal(size=p.noise.shape) for p in observation.prepared]
-    return observation.with_readings(observation.with_noise(noise).shown(truth))
+    return observation.imagined(truth, noise)

@@ -19,8 +19,9 @@ from typing import TypeVar
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import Machine
+from daq.contracts.machine import Machine, SampledPid
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
@@ -34,7 +35,7 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
 from model.simulation.batch import BatchRun
 from model.simulation.inputs import readings_on_grid
-from model.simulation.period import OUT_READING, OUTPUTS
+from model.simulation.period import OUT_DRIVE, OUT_READING, OUTPUTS
 from model.simulation.prepared import Options, Prepared, prepare
 from model.simulation.simulate import at_rows
 
@@ -100,21 +101,64 @@ class Observation:
         """The same with another share of the recorded readings that the simulated controller is given."""
         return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
 
-    def with_noise(self, noise: Sequence[Floats]) -> Observation:
-        """The same, but simulations are given no recorded readings; each gets noise (k, n) of its own, in counts."""
-        prepared = zip(self.prepared, noise, strict=True)
-        return replace(self, prepared=tuple(replace(p, following=0.0, noise=own) for p, own in prepared))
+    @property
+    def drive_is_input(self) -> bool:
+        """Whether the recorded drive is the input of the simulations."""
+        return all(p.settings[at.DRIVE_RECORDED] != 0 for p in self.prepared)
 
-    def with_readings(self, measured: Sequence[Floats]) -> Observation:
-        """The same records with other readings (m, n) rad in place of the measured ones, everywhere."""
-        records = tuple(replace(r, measured=own) for r, own in zip(self.records, measured, strict=True))
-        shown = [readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)) for r in records]
-        prepared = tuple(replace(p, readings=own) for p, own in zip(self.prepared, shown, strict=True))
+    def with_drive_as_input(self, recorded: bool) -> Observation:
+        """The same with the recorded drive as the input of the simulations, or with the controller's own."""
+        prepared = tuple(p.with_setting(at.DRIVE_RECORDED, int(recorded)) for p in self.prepared)
+        return replace(self, prepared=prepared)
+
+    def imagined(self, truth: Calibration, noise: Sequence[Floats]) -> Observation:
+        """The same experiments on an arm that is the model, in closed loop, with noise (k, n) of its readings, counts.
+
+        Readings and drives take the place of the recorded ones. Not finite where the simulation is not.
+        """
+        alone = tuple(
+            replace(p, following=0.0, noise=own)
+            .with_setting(at.DRIVE_RECORDED, 0)
+            .with_setting(at.QUANTISE, at.DRIVE_ROUNDED)
+            for p, own in zip(self.prepared, noise, strict=True)
+        )
+        outputs = replace(self, prepared=alone).outputs(truth.model, [self.state(truth)])
+        shown = [at_rows(out[0, OUT_READING], r.inputs.rows) for out, r in zip(outputs, self.records, strict=True)]
+        records = tuple(replace(r, measured=own) for r, own in zip(self.records, shown, strict=True))
+        prepared = tuple(
+            replace(
+                p,
+                readings=readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)),
+                recorded=np.ascontiguousarray(out[0, OUT_DRIVE]),
+            )
+            for p, r, out in zip(self.prepared, records, outputs, strict=True)
+        )
         return replace(self, records=records, prepared=prepared)
 
     def readings(self, model: Model, states: Sequence[State], longest_step: float = STEP) -> list[Floats]:
         """Simulated readings of p states of a model, per record (p, m, n) rad, with noise where the simulation has
         some; NaN where a run diverged. longest_step: of the integration, s."""
+        found = []
+        outputs = self.outputs(model, states, longest_step, (OUT_READING,))
+        for record, out in zip(self.records, outputs, strict=True):
+            found.append(np.stack([at_rows(one, record.inputs.rows) for one in out[:, 0]]))
+        return found
+
+    def outputs(
+        self,
+        model: Model,
+        states: Sequence[State],
+        longest_step: float = STEP,
+        columns: Sequence[int] = range(OUTPUTS),
+    ) -> list[Floats]:
+        """Simulations of p states of a model, with noise where they have some; NaN where a run diverged.
+
+        Args:
+            longest_step: of the integration, s. columns: which outputs.
+
+        Returns:
+            per record (p, columns, k, n), in the order of `model.simulation.period`.
+        """
         vectors = np.stack([vector for vector, _ in states])
         initials = [np.stack([own[t] for _, own in states]) for t in range(len(self.records))]
         longest = max(len(r.inputs) for r in self.records)
@@ -136,8 +180,7 @@ class Observation:
                 step /= 2
             for t, record in enumerate(self.records):
                 rows = slice(t * len(own), (t + 1) * len(own))
-                shown = out[rows, OUT_READING, : len(record.inputs)]
-                found[t].append(np.stack([at_rows(one, record.inputs.rows) for one in shown]))
+                found[t].append(out[rows][:, list(columns), : len(record.inputs)])
         return [np.concatenate(parts) for parts in found]
 
     def state(self, tried: Calibration) -> State:
@@ -237,12 +280,26 @@ def observe(
     )
     sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
-    options = Options(quantise=False, following=feedback_share)
-    prepared = tuple(prepare(problem.model, r.inputs, options) for r in problem.records)
+    prepared = tuple(
+        prepare(
+            problem.model,
+            r.inputs,
+            Options(quantise=False, following=feedback_share, recorded_drive=_drive_is_input(model.machine, r)),
+        )
+        for r in problem.records
+    )
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
     unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
     observation = Observation(model.machine, problem.records, problem.floor, unit, prepared)
     return observation, Calibration(problem.model, unknowns, np.array([u.start for u in unknowns]))
+
+
+def _drive_is_input(machine: Machine, record: Record) -> bool:
+    """Whether the record says what moved the arm in every period: its drive, however the controller came to it.
+
+    The board's own arithmetic is simulated as it is: that its drive is recorded brings nothing (docs/decisions/0033).
+    """
+    return isinstance(machine.controller, SampledPid) and record.inputs.drive_of_every_period
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:

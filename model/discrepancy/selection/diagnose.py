@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import SampledPid
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
@@ -34,7 +35,9 @@ from model.discrepancy.output_error.controller_evidence import (
 )
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
+from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
+from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
@@ -44,6 +47,8 @@ from model.machine_model.model import Lineage, Model
 
 CHANCES = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
+CONTROLLER_EFFECTS = ("wrong_gain", "lost_set_points")
+"""Effects of the controller, which do not show where the recorded drive is the input: its own numbers tell them."""
 NEARER = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 FIRST_STEPS = 6
@@ -64,11 +69,16 @@ def diagnose_by_simulation(
     progress(0.0, "checking the controller's own numbers")
     findings = check_controller(traces, model.machine, model)
     excluded = settled_by_records(traces, model.machine)
+    traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
     if any(f.effect == "lost_set_points" for f in findings):  # the set points that were used are known to the count
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
+    if isinstance(model.machine.controller, SampledPid):
+        traces, holdout = (tuple(map(thinned, some)) for some in (traces, holdout))
     progress(0.02, "fitting the tolerance parameters")
     known = with_findings(model, findings)
     given = _given_point(*observe(known, traces))
+    if given.observation.drive_is_input:
+        excluded = CONTROLLER_EFFECTS  # the plant gets the drive that was recorded, whatever the controller has done
     fitted = judge(_fit_tolerances(given))
     case = build_case(model, given, fitted.point, traces, hold_out(known, holdout), options, excluded)
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)

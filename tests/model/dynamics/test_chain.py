@@ -21,8 +21,7 @@ def one_joint(link: Link = BODY, joint: Joint = Joint(), **more: object) -> Chai
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: Chain((), ()), "chain has 0 joints; 1 to 6 are allowed"),
-        (lambda: Chain((Joint(),) * 7, (BODY,) * 7), "chain has 7 joints; 1 to 6 are allowed"),
+        (lambda: Chain((), ()), "chain has 0 joints; at least one is needed"),
         (lambda: Chain((Joint(),) * 2, (BODY,)), "2 joints and 1 links"),
         (lambda: one_joint(joint=Joint(alpha=float("nan"))), "joint 1: alpha is nan"),
         (lambda: one_joint(joint=Joint(rotor_inertia=-1.0)), "joint 1: rotor inertia is -1.0"),

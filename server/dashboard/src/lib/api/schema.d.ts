@@ -1627,6 +1627,20 @@ export interface components {
             duration?: number;
         };
         /**
+         * CurrentDrive
+         * @description Motor whose recorded input is its current, in A: torque at the joint = torque_constant · gear_ratio · current.
+         */
+        CurrentDrive: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "current";
+            torque_constant: components["schemas"]["Quantity"];
+            gear_ratio: components["schemas"]["Quantity"];
+            rotor_inertia?: components["schemas"]["Quantity"] | null;
+        };
+        /**
          * Curve
          * @description Mean squared error (rad², None where a run diverged) against one parameter's value, the others held.
          */
@@ -2738,7 +2752,7 @@ export interface components {
             /** Link */
             link: components["schemas"]["Cylinder"] | components["schemas"]["Rod"] | components["schemas"]["Body"];
             /** Drive */
-            drive: components["schemas"]["DcMotor"] | components["schemas"]["PlainGain"];
+            drive: components["schemas"]["DcMotor"] | components["schemas"]["CurrentDrive"] | components["schemas"]["PlainGain"];
             /** @default {} */
             friction?: components["schemas"]["Friction"];
             sensor?: components["schemas"]["Sensor"] | null;
@@ -4356,6 +4370,11 @@ export interface components {
          * SampledPid
          * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
          *     an inner loop (cascade): the outer output is then a speed set point for it.
+         *
+         *     The output is in the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to
+         *     ± `output_limit` ahead of the amplifier, whose dead zone and supply limit come after; at that limit the error is not
+         *     integrated further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the
+         *     output is 1 + `gain_error` times what the gains say. One number for all joints, or one a joint.
          */
         SampledPid: {
             /**
@@ -4377,6 +4396,14 @@ export interface components {
                 number,
                 number
             ][] | null;
+            /** Drive Resolution */
+            drive_resolution?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
+            /** Output Limit */
+            output_limit?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
+            /** Set Point Resolution */
+            set_point_resolution?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
+            /** Gain Error */
+            gain_error?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
         };
         /**
          * Schedule
@@ -5021,7 +5048,7 @@ export interface components {
             /** Period */
             period?: number | null;
             /** Drive Unit */
-            drive_unit?: ("V" | "N·m" | "N") | null;
+            drive_unit?: ("V" | "A" | "N·m" | "N") | null;
             /**
              * Clock
              * @default {}

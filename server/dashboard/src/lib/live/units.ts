@@ -36,8 +36,9 @@ const LENGTHS: Record<'position' | 'error', Shown> = {
 export function shownAs(machine: Machine, joint: number, signal: Signal, angle: AngleUnit): Shown {
   const one = machine.joints[joint - 1];
   if (signal === 'drive') {
-    // A drive that is a plain gain takes torque or force; a motor is told in volts.
-    const unit = one?.drive.kind === 'dc_motor' ? 'V' : one?.kind === 'prismatic' ? 'N' : 'N·m';
+    // A drive that is a plain gain takes torque or force; a motor is told in volts, or in the current that it takes.
+    const own: Record<string, string> = { dc_motor: 'V', current: 'A' };
+    const unit = own[one?.drive.kind ?? ''] ?? (one?.kind === 'prismatic' ? 'N' : 'N·m');
     return { unit, factor: 1, digits: 2, least: 4 };
   }
   const kind = signal === 'error' ? 'error' : 'position';

@@ -1,0 +1,163 @@
+"""The numbers of a sampled PID or cascade, from recorded set points, positions and drive, without a model of the arm.
+
+In every period the controller has used either the set point that was sent, or the one that it had before. What either
+of them makes of the recorded positions is compared with the recorded drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.machine import Machine, SampledPid, of_joint
+from daq.contracts.trace import Trace
+from model.arrays import Floats
+
+LEAST_AGREEMENT = 0.95
+"""Least share of samples whose drive must be the controller's, to rounding, for a record to prove anything: below it
+the controller is another than the machine file says."""
+FINEST = 1e-3
+"""Share of a joint's largest drive to which numbers of a record are trusted, where the file states no resolution."""
+LEAST_STEPS = 4.0
+"""Least drive of a sample that is used for a gain, in resolutions: rounding dominates below it."""
+LEAST_SAMPLES = 20
+"""Samples that the estimate of a gain needs."""
+
+
+@dataclass(frozen=True)
+class ControllerNumbers:
+    """What a record tells of one joint's controller.
+
+    used: (k,) rad, set points that it worked with. formed: (k,) drive that the gains of the file make of them. drive:
+    (k,) as recorded. limited: (k,) whether the drive is at its limit, where it tells nothing. free: (k,) whether it is
+    away from it and large enough to measure a gain. factor: by which the drive is larger than the gains of the file
+    make it.
+    """
+
+    used: Floats
+    formed: Floats
+    drive: Floats
+    limited: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+    factor: float
+
+
+def controller_numbers(trace: Trace, machine: Machine, joint: int) -> ControllerNumbers | None:
+    """The numbers of one joint; None where the record does not hold set points and the drive of every period, or is of
+    another controller."""
+    controller = machine.controller
+    if not isinstance(controller, SampledPid) or trace.set_point is None or trace.drive is None:
+        return None
+    period = trace.record.period or controller.period.value
+    if trace.missing or len(trace) < LEAST_SAMPLES or np.abs(np.diff(trace.time) / period - 1).max() > 0.1:
+        return None
+    column = trace.column(joint)
+    drive = trace.drive[:, column]
+    stated = of_joint(controller.drive_resolution, joint)
+    resolution = FINEST * float(np.abs(drive).max()) if stated is None else stated.value
+    limit = of_joint(controller.output_limit, joint)
+    limited = np.abs(drive) >= (np.inf if limit is None else limit.value - resolution)
+    law = _Law(controller, joint, period)
+    sent, position = _rounded(trace.set_point[:, column], controller, joint), trace.position[:, column]
+    plain = law.follow(sent, position, drive, limited, 1.0, np.inf)[1]
+    free = ~limited & (np.abs(plain) > LEAST_STEPS * resolution)
+    factor = 1.0 if int(free.sum()) < LEAST_SAMPLES else _ratio(drive[free], plain[free], resolution)
+    if not factor > 0.0:
+        return None
+    factor = 1.0 if abs(factor - 1.0) < FINEST else factor
+    used, formed = law.follow(sent, position, drive, limited, factor, resolution)
+    apart = np.abs(drive - factor * formed)
+    agreed = limited | (apart <= 0.75 * resolution + 2 * FINEST * np.abs(drive))
+    if np.mean(agreed) < LEAST_AGREEMENT:
+        return None
+    near = apart <= _farthest(drive, resolution)
+    large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
+    return ControllerNumbers(used, formed, drive, limited, large, factor)
+
+
+def _ratio(drive: Floats, formed: Floats, resolution: float) -> float:
+    """By which the drive is larger than the formed one, but for samples whose set points were lost."""
+    near = np.abs(drive - np.median(drive / formed) * formed) <= _farthest(drive, resolution)
+    return float(drive[near] @ formed[near] / (formed[near] @ formed[near]))
+
+
+def _farthest(drive: Floats, resolution: float) -> Floats:
+    """Distance from the formed drive that rounding and a nearly right factor leave: a closer cut would choose those
+    samples whose rounding suits it."""
+    return 2 * resolution + 0.03 * np.abs(drive)
+
+
+def with_errors(traces: Sequence[Trace], machine: Machine) -> tuple[Trace, ...]:
+    """The traces with the errors that the controller formed, where they hold none and their drive tells them."""
+    found = []
+    for trace in traces:
+        numbers = [controller_numbers(trace, machine, j) for j in trace.joints if j in machine.modelled_joints]
+        if trace.error is None and trace.set_point is not None and numbers and all(n is not None for n in numbers):
+            error = trace.set_point - trace.position
+            for joint, known in zip((j for j in trace.joints if j in machine.modelled_joints), numbers, strict=True):
+                if known is not None:
+                    column = trace.column(joint)
+                    error[:, column] = known.used - trace.position[:, column]
+            found.append(replace(trace, error=error))
+        else:
+            found.append(trace)
+    return tuple(found)
+
+
+class _Law:
+    """The law of one joint's controller, as `model.drives.controller` has it, period by period."""
+
+    def __init__(self, controller: SampledPid, joint: int, period: float) -> None:
+        self.outer = controller.gains[joint - 1]
+        inner = controller.velocity_gains
+        self.inner = None if inner is None else inner[joint - 1]
+        self.period = period
+
+    def follow(
+        self, sent: Floats, position: Floats, drive: Floats, limited: NDArray[np.bool_], factor: float, line: float
+    ) -> tuple[Floats, Floats]:
+        """Set points in use, and the drive that the gains make of them. A set point counts as lost where the drive is
+        further than `line` from what it would make, and nearer to what the one before makes."""
+        used, formed = np.empty_like(sent), np.empty_like(sent)
+        p, i, _ = self.outer
+        start = float(sent[0] - position[0])
+        own = drive[0] / factor
+        total = (own - p * start) / i - start * self.period if i != 0.0 and self.inner is None else 0.0
+        memory = (total, start, 0.0, 0.0, float(position[0]))
+        for k in range(len(sent)):
+            wanted = float(sent[k])
+            output, after = self._output(wanted - position[k], float(position[k]), memory)
+            miss = abs(drive[k] - factor * output)
+            if k > 0 and not limited[k] and miss > line:
+                other, held = self._output(used[k - 1] - position[k], float(position[k]), memory)
+                if abs(drive[k] - factor * other) < 0.5 * miss:
+                    wanted, output, after = float(used[k - 1]), other, held
+            used[k], formed[k] = wanted, output
+            memory = (memory[0], *after[1:]) if limited[k] else after
+        return used, formed
+
+    def _output(
+        self, error: float, position: float, memory: tuple[float, float, float, float, float]
+    ) -> tuple[float, tuple[float, float, float, float, float]]:
+        """The output for an error, and the memory after it: sum and last of the errors, of the inner ones, position."""
+        total, last, inner_total, inner_last, before = memory
+        p, i, d = self.outer
+        total += error * self.period
+        output = p * error + i * total + d * (error - last) / self.period
+        if self.inner is None:
+            return output, (total, error, 0.0, 0.0, position)
+        p, i, d = self.inner
+        inner = output - (position - before) / self.period
+        inner_total += inner * self.period
+        output = p * inner + i * inner_total + d * (inner - inner_last) / self.period
+        return output, (total, error, inner_total, inner, position)
+
+
+def _rounded(set_points: Floats, controller: SampledPid, joint: int) -> Floats:
+    resolution = of_joint(controller.set_point_resolution, joint)
+    if resolution is None:
+        return set_points
+    return np.asarray(resolution.value * np.floor(set_points / resolution.value + 0.5))

@@ -1,0 +1,118 @@
+"""An arm that others wrote, diagnosed with its recorded drive as the input."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import TraceError
+from model.discrepancy.output_error.controller_evidence import (
+    check_controller,
+    settled_by_records,
+    with_used_set_points,
+)
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.sampled_controller import with_errors
+from model.discrepancy.output_error.thinning import thinned
+from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
+from model.discrepancy.workflow import diagnose
+from model.fitting.records import records_of
+from model.machine_model.model import base_model
+from tests.model.discrepancy import outside_arm
+
+MACHINE = outside_arm.machine()
+
+
+@pytest.fixture(scope="module")
+def sound() -> outside_arm.OutsideArm:
+    return outside_arm.drawn(1)
+
+
+def test_a_sound_arm_is_explained_to_the_noise_of_its_readings(sound: outside_arm.OutsideArm) -> None:
+    """Its drive is rounded to 0.14 V and limited, which the record of the drive tells and no law needs to."""
+    given = _given_point(*observe(base_model(MACHINE), [outside_arm.record(sound, 11)]))
+    assert given.observation.drive_is_input
+    assert _fit_tolerances(given).misfit == pytest.approx(1.0, abs=0.08)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_sound_arm_is_not_called_unsound(seed: int) -> None:
+    arm = outside_arm.drawn(seed)
+    traces = [outside_arm.record(arm, 10 * seed + k) for k in (1, 2)]
+    assert diagnose(base_model(MACHINE), traces[:1], traces[1:]).verdict == "nothing-significant"
+
+
+@pytest.mark.slow
+def test_a_dead_zone_is_found() -> None:
+    arm = outside_arm.drawn(11).changed("dead_zone", 2, 1.2)
+    answer = diagnose(base_model(MACHINE), [outside_arm.record(arm, 111)], [outside_arm.record(arm, 112)])
+    step = answer.steps[0]
+    assert (step.effect, step.joints) == ("dead_zone", (2,))
+    assert next(iter(step.parameters.values())).value == pytest.approx(1.2, abs=0.05)
+
+
+def test_a_sound_controller_gives_no_finding_and_settles_its_effects(sound: outside_arm.OutsideArm) -> None:
+    made = [outside_arm.record(sound, 11)]
+    assert check_controller(made, MACHINE) == ()
+    assert set(settled_by_records(made, MACHINE)) == {"wrong_gain", "lost_set_points"}
+
+
+@pytest.mark.parametrize("limit", [16.0, 9.0])
+def test_lost_set_points_are_proved_by_the_drive(sound: outside_arm.OutsideArm, limit: float) -> None:
+    arm = replace(sound.changed("lost", 2, 0.05), limit=limit)
+    machine = outside_arm.machine(limit=limit)
+    made = outside_arm.record(arm, 11)
+    (found,) = check_controller([made], machine)
+    assert (found.effect, found.joint) == ("lost_set_points", 2)
+    assert found.value == pytest.approx(0.05, abs=0.02)
+    restored = with_used_set_points(with_errors([made], machine)[0])
+    assert restored.set_point is not None
+    assert made.set_point is not None
+    assert not np.array_equal(restored.set_point[:, 1], made.set_point[:, 1])
+    assert np.allclose(restored.set_point[:, [0, 2]], made.set_point[:, [0, 2]])
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.05, 1.4])
+def test_a_wrong_gain_is_measured_by_the_drive(sound: outside_arm.OutsideArm, factor: float) -> None:
+    (found,) = check_controller([outside_arm.record(sound.changed("factor", 3, factor), 11)], MACHINE)
+    assert (found.effect, found.joint) == ("wrong_gain", 3)
+    assert found.value == pytest.approx(factor - 1, abs=0.005), "a rounding that repeats itself while the joint rests"
+
+
+def test_the_drive_of_another_controller_proves_nothing(sound: outside_arm.OutsideArm) -> None:
+    made = outside_arm.record(sound, 11)
+    assert made.drive is not None
+    late = replace(made, drive=np.roll(made.drive, 1, axis=0))
+    assert check_controller([late], MACHINE) == ()
+    assert settled_by_records([late], MACHINE) == ()
+
+
+def test_set_points_are_compared_with_the_travel_not_with_counts(sound: outside_arm.OutsideArm) -> None:
+    """An encoder of 24 bits makes half a million counts of a lag of 0.2 rad; degrees are refused as before."""
+    fine = MACHINE.joints[0].sensor
+    assert fine is not None
+    joints = tuple(j.model_copy(update={"sensor": fine.model_copy(update={"bits": 24})}) for j in MACHINE.joints)
+    made = outside_arm.record(sound, 11)
+    assert records_of([made], MACHINE.model_copy(update={"joints": joints}), "position")
+    assert made.set_point is not None
+    with pytest.raises(TraceError, match="apart throughout"):
+        records_of([replace(made, set_point=np.degrees(made.set_point))], MACHINE, "position")
+
+
+def test_a_fast_record_is_thinned_and_its_drive_averaged(sound: outside_arm.OutsideArm) -> None:
+    made = outside_arm.record(sound, 11)
+    assert made.drive is not None
+    assert thinned(made) is made
+    record = made.record.model_copy(update={"period": outside_arm.PERIOD / 10})
+    rough = 5.0 + np.arange(len(made))[:, None] % 2 * np.ones(3)
+    shaking = replace(made, time=made.time / 10, record=record, drive=rough)
+    assert thinned(shaking) is shaking, "what such a drive does to friction, its mean does not"
+    calm = 5.0 + np.sin(0.02 * np.arange(len(made)))[:, None] * np.ones(3)
+    few = thinned(replace(shaking, drive=calm))
+    assert few.record.period == pytest.approx(0.005)
+    assert few.drive is not None
+    assert np.array_equal(few.position, made.position[::5])
+    assert np.allclose(few.drive[3], calm[15:20].mean(axis=0))

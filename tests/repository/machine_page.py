@@ -1,0 +1,118 @@
+"""Writes docs/machine-file.md from the schema of a machine file: `python -m tests.repository.machine_page`."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+import types
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from daq.contracts import machine
+from daq.contracts.quantity import Quantity
+from tests.repository.tracked import ROOT
+
+PAGE = ROOT / "docs" / "machine-file.md"
+PARTS: tuple[type[BaseModel], ...] = (
+    machine.Machine,
+    machine.Joint,
+    machine.Geometry,
+    machine.Cylinder,
+    machine.Rod,
+    machine.Body,
+    machine.DcMotor,
+    machine.CurrentDrive,
+    machine.PlainGain,
+    machine.Friction,
+    machine.Sensor,
+    machine.SampledPid,
+    machine.BoardPid,
+    machine.NoController,
+)
+BEGIN = f"""# The machine file, field by field
+
+Made from the schema (`daq/contracts/machine.py`) by `python -m tests.repository.machine_page`; a test holds the two
+together. [own-machine.md](own-machine.md) shows how to write and use such a file.
+
+A **number** is a table: `value`, `unit` (as in the column below), `source`, and, where they are known, `assumed = true`
+(a guess), `low` and `high` (physical bounds) and `deviation`, the standard deviation that may be expected between the
+file and the machine. A number with a deviation is a tolerance parameter: fits and diagnoses may move it, at a price.
+{textwrap.fill(f"Deviations can be stated of {machine.DEVIATIONS_ARE_USED_OF}.", 118)}
+Stated of any other number of a modelled joint or of the controller they are an error: no method would use them.
+
+A torque constant, resistance, gain or gear ratio sets the scale of all torques, which motion alone does not show. Their
+deviations are used where the closed loop is diagnosed; a balance of torques believes these numbers, and a fit moves
+them only when they are named.
+
+Nothing limits the number of joints but time: a step of the simulation takes time in proportion to its square, a probe
+of every effect on every joint to its cube. CSV columns are numbered up to 99; the MA2000's board has six.
+"""
+
+
+def page() -> str:
+    """The page as it should be."""
+    told = _told()
+    return "\n".join([BEGIN, *(_section(part, told) for part in PARTS)])
+
+
+def _section(part: type[BaseModel], told: dict[tuple[str, str], str]) -> str:
+    kind = part.model_fields.get("kind", part.model_fields.get("shape"))
+    names = get_args(kind.annotation) if kind is not None else ()
+    own = f" (`{names[0]}`)" if len(names) == 1 else ""
+    text = " ".join((inspect.getdoc(part) or "").split())
+    rows = [
+        f"| `{name}` | {_unit(field)} | {_default(field)} | {told.get((part.__name__, name), '')} |"
+        for name, field in part.model_fields.items()
+        if not (own and name in ("kind", "shape"))
+    ]
+    table = ["| field | unit or value | default | meaning |", "|---|---|---|---|", *rows] if rows else []
+    return "\n".join([f"## {part.__name__}{own}", "", text, *([""] if rows else []), *table, ""])
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "needed"
+    if field.default in (None, ()) or isinstance(field.default, BaseModel):
+        return "none"
+    return f"`{field.default!r}`".replace("'", '"')
+
+
+def _unit(field: FieldInfo) -> str:
+    return _name(Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation)
+
+
+def _name(kind: Any) -> str:
+    """The unit of a number, or what a field may be."""
+    origin, inside = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        units = [unit for note in inside[1:] if (unit := getattr(getattr(note, "func", None), "unit", None))]
+        return units[0] if units else _name(inside[0])
+    if origin is Literal:
+        return ", ".join(f"`{value!r}`".replace("'", '"') for value in inside)  # as TOML writes them
+    if origin in (Union, types.UnionType):
+        return " or ".join(dict.fromkeys(_name(one) for one in inside if one is not type(None)))
+    if origin is tuple:
+        each = list(dict.fromkeys(_name(one) for one in inside if one is not Ellipsis))
+        return f"list of {' and '.join(each)}"
+    own = kind.__name__
+    return {"str": "text", "int": "integer", "FiniteFloat": "float", Quantity.__name__: "number"}.get(own, own)
+
+
+def _told() -> dict[tuple[str, str], str]:
+    """Text under each field of the schema's source, by class and field."""
+    found = {}
+    for part in ast.parse(inspect.getsource(machine)).body:
+        if isinstance(part, ast.ClassDef):
+            for field, text in zip(part.body, part.body[1:], strict=False):
+                named = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+                said = isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+                if named and said:
+                    found[part.name, field.target.id] = " ".join(str(text.value.value).split())
+    return found
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
