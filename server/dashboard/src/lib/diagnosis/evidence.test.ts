@@ -105,6 +105,16 @@ describe('words', () => {
     expect(verdictTitle({ verdict: 'unknown-effect', steps: [step([])] })).toBe(
       'Coulomb friction, joint 2, and an unknown effect',
     );
+    const suspicion = {
+      effect: 'coulomb_friction',
+      joints: [1],
+      evidence: 24,
+      needed: 30,
+      seconds: 20,
+    };
+    expect(verdictTitle({ verdict: 'suspected', steps: [], suspicion })).toBe(
+      'Suspected: Coulomb friction, joint 1',
+    );
     expect(verdictTitle({ verdict: 'nothing-significant', steps: [] })).toBe(
       'Nothing significant is missing',
     );

@@ -28,6 +28,7 @@ export const VERDICTS: Record<Verdict, { title: string; tone: 'good' | 'warn' | 
   'nothing-significant': { title: 'Nothing significant is missing', tone: 'good' },
   named: { title: 'Named', tone: 'good' },
   ambiguous: { title: 'One of several candidates', tone: 'warn' },
+  suspected: { title: 'An effect is suspected', tone: 'warn' },
   'unknown-effect': { title: 'An unknown effect', tone: 'bad' },
 };
 
@@ -56,7 +57,10 @@ export function listed(names: readonly string[], last = 'and'): string {
 }
 
 /** What was found, as a headline. */
-export function verdictTitle(found: Pick<DiagnosisData, 'verdict' | 'steps'>): string {
+export function verdictTitle(
+  found: Pick<DiagnosisData, 'verdict' | 'steps'> & Partial<Pick<DiagnosisData, 'suspicion'>>,
+): string {
+  if (found.verdict === 'suspected' && found.suspicion) return `Suspected: ${candidateName(found.suspicion)}`;
   const names = found.steps
     .filter((step) => step.adopted && step.effect !== null)
     .map((step) => candidateName({ effect: step.effect ?? '', joints: step.joints }));
