@@ -16,7 +16,7 @@ from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
-from model.discrepancy.experiment_design.next_experiment import Asked, Asker, rivals_of
+from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
@@ -57,7 +57,7 @@ def diagnose_by_simulation(
     options: DiagnosisOptions,
     progress: Progress,
     cancel: Cancel,
-    ask: Asker | None,
+    chooser: ExperimentChooser | None,
 ) -> Diagnosis:
     """The answer to traces with set points from a machine with a controller, as `workflow.diagnose` describes."""
     begun = time.perf_counter()
@@ -74,7 +74,7 @@ def diagnose_by_simulation(
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
-    answer = _answer(case, search, proved, ask)
+    answer = _answer(case, search, proved, chooser)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
 
@@ -178,7 +178,7 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
     return rank(case, better, progress, cancel), better
 
 
-def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | None) -> Diagnosis:
+def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: ExperimentChooser | None) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained_joints(case, found, looked)
@@ -189,7 +189,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | N
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
     remaining = case.remaining(end) if answered == "unknown-effect" else ()
-    asked = Asked(None) if ask is None else ask.after(answered, end, found.rivals, case.traces)
+    asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces)
     notes = (
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
