@@ -9,7 +9,7 @@ import numpy as np
 from model import layout as at
 from model.arrays import Array
 from model.drives.amplifier import warmed
-from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pid
+from model.drives.controller import LAST_ERROR, LAST_READING, board_pid, cascade, sampled_pid
 from model.drives.sensor import reading
 from model.dynamics.compilation import internal
 from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR_SPEED, SPEED
@@ -54,14 +54,14 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
     if kind == at.BOARD_PID:
         error = wanted - read
         if k == 0:
-            memory[j, 1] = error
+            memory[j, LAST_ERROR] = error
         power = board_pid(error, record.gains[j], joint, quantise, memory[j])
         drive = power * joint[at.VOLTS_PER_COUNT]
         error = error * unit
     else:
         error = wanted - (zero + unit * read)
         if k == 0:
-            memory[j, 1], memory[j, LAST_READING] = error, read
+            memory[j, LAST_ERROR], memory[j, LAST_READING] = error, read
         scale = 1.0 + joint[at.GAIN_ERROR]
         if kind == at.SAMPLED_PID:
             drive = scale * sampled_pid(error, period, record.gains[j], memory[j])
@@ -69,7 +69,7 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
             speed = unit * (read - memory[j, LAST_READING]) / period
             drive = scale * cascade(error, speed, period, record.gains[j], memory[j])
             memory[j, LAST_READING] = read
-        else:
+        else:  # at.NO_CONTROLLER: the recorded drive moves the model; `prepare` refuses controllers that have no kind
             drive = record.recorded[k, j] + 0.0 * error
         power = drive / joint[at.VOLTS_PER_COUNT]
     out[OUT_POSITION, k, j] = state[j, POSITION]

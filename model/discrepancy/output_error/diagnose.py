@@ -42,9 +42,9 @@ from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, w
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
-CHANCES = 3
+MOST_REFUSALS = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
-NEARER = (0.0, 0.5)
+FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 FIRST_STEPS = 6
 """Steps of a search in these fits, before derivatives are computed anew."""
@@ -83,9 +83,15 @@ def diagnose_by_simulation(
 class _Search:
     """The state of the search for missing effects.
 
-    first: the fit before any effect was added. current: the fit now. steps: one for every ranking with something to
-    say. before: the fit that each of them began from. rivals: candidates close to the last added effect. probes: all so
-    far. tried: the last ranking, where nothing was added. ended: whether the search is over.
+    Args:
+        first: the fit before any effect was added.
+        current: the fit now.
+        steps: one for every ranking with something to say.
+        before: the fit that each step began from.
+        rivals: candidates close to the last added effect.
+        probes: all so far.
+        tried: the last ranking, where nothing was added.
+        ended: whether the search is over.
     """
 
     first: Fit
@@ -117,7 +123,7 @@ def _fit_tolerances(given: Point) -> Point:
     effect can, the fit starts again from the given model.
     """
     near = given
-    for share in NEARER:
+    for share in FIRST_FEEDBACK_SHARES:
         near = _fit_with_feedback(near, given.observation.with_feedback_share(share)) or near
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
@@ -156,7 +162,7 @@ def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel)
     search = replace(search, current=current, probes=(*search.probes, *ranking.probed), tried=ranking)
     if not search.added:
         search = replace(search, first=current)
-    for _ in range(CHANCES):
+    for _ in range(MOST_REFUSALS):
         decision = decide(ranking, case.thresholds, search.added)
         step, following = make_step(case, current, ranking, decision)
         if step is None:
@@ -228,14 +234,16 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
 def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tuple[int, ...]:
     """Joints with an unexplained error on fitted or held-out traces. where: the map of the current point, while no
     effect has been added."""
-    before, after, named = found.first.point, found.current.point, where is None
-    if named:
+    before, after, effect_added = found.first.point, found.current.point, where is None
+    if effect_added:
         case = case.with_floors_of(after)
     held_errors = case.held_errors(*case.held_residuals(before, after))
     joints = len(case.floor)
     judged = 0 if case.held is None else case.held.observation.samples
     counts = case.scoring.samples // joints, judged // joints
-    left = unexplained(case.fitted_errors(before, after), held_errors, case.thresholds, named=named, samples=counts)
+    left = unexplained(
+        case.fitted_errors(before, after), held_errors, case.thresholds, named=effect_added, samples=counts
+    )
     if where is None:
         return left
     closer = unexplained(errors_of_fit(after), (), case.thresholds, named=False, samples=counts)
