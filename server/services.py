@@ -152,7 +152,7 @@ class Services:
         self.end_processes()
         every = self.robots()
         for rig in every:
-            rig.queue.take_no_more()  # first, or the end of the connection would pause the queue
+            rig.queue.begin_no_more()  # first, or the end of the connection would pause the queue
         _all_within(
             SHUTDOWN,
             [partial(end, SHUTDOWN) for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)],
@@ -183,7 +183,7 @@ class Services:
         def record_event(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
             self.record_event(name, kind, text, actor=actor, experiment=experiment)
 
-        def recorded(answer: Answer) -> None:
+        def add_trace(answer: Answer) -> None:
             assert answer.finished is not None
             catalogue.add(Path(answer.finished.trace))
 
@@ -196,8 +196,8 @@ class Services:
                 queues=QueueStore(self.store),
                 clock=self.clock,
                 record_event=record_event,
-                recorded=recorded,
-                unfinished=lambda: self._take_in(catalogue),
+                add_trace=add_trace,
+                add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
             )
         )

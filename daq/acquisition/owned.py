@@ -24,9 +24,9 @@ class OwnedRobot:
         """The greeted controller."""
         return self.session.controller
 
-    def ended(self) -> str | None:
+    def end_cause(self) -> str | None:
         """Returns the cause of a requested end (`daq stop`, a signal), or None."""
-        return self.session.ended()
+        return self.session.end_cause()
 
 
 @contextmanager
@@ -40,7 +40,7 @@ def owned_robot(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -
         consent.require(session.controller)
         require_not_stopped(session.controller)
         control = session.take_control()
-        if (cause := session.ended()) is not None:
+        if (cause := session.end_cause()) is not None:
             control.stop(cause)
             raise StoppedError(cause)
         with control.frozen_on_error():

@@ -69,11 +69,13 @@ def run_job(job: Job, speaker: Speaker) -> RunResult:
     memory_map = default_memory_map() if job.memory_map is None else parse_memory_map(job.memory_map)
     with port_session(Controller.connect, job.robot, job.url, memory_map, parent=sys.stdin.fileno()) as session:
         controller, control = session.controller, session.take_control()
-        if (cause := session.ended()) is not None:
+        if (cause := session.end_cause()) is not None:
             # It came while there was nothing to freeze. Now there is.
             control.stop(cause)
             raise StoppedError(cause, f"stopped before it began ({cause}); nothing moved")
-        requests = StopRequests(ended=session.ended, interrupted=lambda: session.guardian.cause is EndCause.ORPHANED)
+        requests = StopRequests(
+            ended=session.end_cause, interrupted=lambda: session.guardian.cause is EndCause.ORPHANED
+        )
         run = RunSetup(controller, control, job.spec, job.machine, job.limits, job.folder, speaker, requests, job.robot)
         result = run_experiment(run, Consent(job.moves_real_arm))
         if controller.link.state is LinkState.LOST and controller.link.control is None:

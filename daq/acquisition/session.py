@@ -1,7 +1,7 @@
-"""The one process that holds a robot's port: whoever may stop it is listened to before the port is opened, until after.
+"""Opens a robot's port; requests for a stop are heard from before it is opened until nothing can move any more.
 
-Entered in this order, and left in the reverse order: the thread that carries out a stop, the stop socket, the guardian
-that listens, the port. Only the port is closed last of all, after everybody who asked for a stop has been answered.
+Entered in this order: the thread that carries out a stop, the stop socket, the guardian that listens, the port. Left in
+the reverse order, except the port, which closes last, after everybody who asked for a stop has been answered.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ C = TypeVar("C", bound=Controller)
 
 @dataclass(frozen=True)
 class PortSession(Generic[C]):
-    """A greeted controller and the guardian that hears every request to end the work."""
+    """A connected controller and the guardian that hears every request to end the work."""
 
     controller: C
     guardian: Guardian
@@ -35,7 +35,7 @@ class PortSession(Generic[C]):
         control = self._freezer.control = ArmControl(self.controller)
         return control
 
-    def ended(self) -> str | None:
+    def end_cause(self) -> str | None:
         """Why the work is to end: `daq stop`, a signal, the parent process; None while nobody asks for the end."""
         cause = self.guardian.cause
         return None if cause is None else cause.value
@@ -56,7 +56,7 @@ def port_session(
     A stop that comes after the end finds nobody here, and opens the port itself. Enter on the main thread.
 
     Args:
-        connect: opens the port and greets the controller, such as `Controller.connect`.
+        connect: opens the port and connects to the controller, such as `Controller.connect`.
         parent: descriptor of the parent's pipe: any byte is a stop, its end the loss of the parent.
         ctrl_z_stops: Ctrl-Z counts as a stop. A process that the terminal has suspended could not be asked for one.
 

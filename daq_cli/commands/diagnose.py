@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from daq.contracts.errors import DaqError
     from daq.contracts.trace import Trace
     from model.discrepancy.diagnosis import Diagnosis
-    from model.discrepancy.experiment_design.next_experiment import Asker
+    from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
     from model.discrepancy.options import DiagnosisOptions
     from model.machine_model.model import Model
 
@@ -84,7 +84,7 @@ def diagnose(
     from daq_cli.models.acquire_loop import diagnose_and_acquire
     from model.discrepancy.carried_load import require_load_held
     from model.discrepancy.workflow import diagnose as run_diagnosis
-    from server.jobs.asking import asker
+    from server.jobs.next_experiment import experiment_chooser
 
     robot = robot_of(context)
     load_effects(effect_file, robot)
@@ -97,9 +97,9 @@ def diagnose(
         require_load_held(begin, fitted_to)
     failure: DaqError | None = None
 
-    def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
+    def once(traces: Sequence[Trace], chooser: ExperimentChooser) -> Diagnosis:
         with shown_progress("diagnosing") as progress:
-            return run_diagnosis(begin, traces, held, options, progress, ask=ask)
+            return run_diagnosis(begin, traces, held, options, progress, chooser=chooser)
 
     if not acquire and (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
@@ -111,7 +111,7 @@ def diagnose(
         ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, Consent(yes), once)
         found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
-        found = once(fitted_to, asker(begin.machine))
+        found = once(fitted_to, experiment_chooser(begin.machine))
     _save(found, out)
     page = None if report is None else _written(found, fitted_to, held, report)
     _print_result(found, out, page, as_json=json)

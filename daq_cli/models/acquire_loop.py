@@ -12,16 +12,16 @@ from daq.contracts.errors import DaqError, SpecError
 from daq_cli.app.consent import Consent
 from daq_cli.app.context import console
 from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
-from server.jobs.asking import asker
+from server.jobs.next_experiment import experiment_chooser
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
     from daq.contracts.trace import Trace
     from daq_cli.robot.access import RobotAccess
     from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
-    from model.discrepancy.experiment_design.next_experiment import Asker
+    from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 
-Diagnose = Callable[["Sequence[Trace]", "Asker"], "Diagnosis"]
+Diagnose = Callable[["Sequence[Trace]", "ExperimentChooser"], "Diagnosis"]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def diagnose_and_acquire(
     runs: list[Acquired] = []
     every = list(traces)
     failure: DaqError | None = None
-    found = diagnose(every, asker(arm, budget))
+    found = diagnose(every, experiment_chooser(arm, budget))
     while failure is None and (asked := next_to_run(found, runs, budget)) is not None:
         left = time_left(runs, budget)
         console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}")
@@ -66,7 +66,7 @@ def diagnose_and_acquire(
             run, trace = _run(robot, arm, asked, folder or robot.call.trace_folder, consent)
             runs.append(run)
             if run.outcome == "complete":
-                found = diagnose([*every, trace], asker(arm, time_left(runs, budget)))
+                found = diagnose([*every, trace], experiment_chooser(arm, time_left(runs, budget)))
                 every.append(trace)
             else:
                 console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")

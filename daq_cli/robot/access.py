@@ -47,7 +47,8 @@ class RobotAccess(Protocol):
         """P, I and D of every joint."""
 
     def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
-        """Writes gains, and calls `written` with those read back. Returns a line on limp joints, or an empty one."""
+        """Writes gains, and calls `written` with those read back. Returns a line
+        on limp joints (their gains are 0, so nothing holds them), or an empty one."""
 
     def process(self) -> ProcessState:
         """Process inputs and outputs, and the gripper."""
@@ -84,7 +85,7 @@ class RobotAccess(Protocol):
         """Imports a trace of another rig or tool."""
 
     def program(self, name: Path) -> Program:
-        """A taught program, from a file or kept by the service."""
+        """A taught program. name: the path of its file, or its name at the service."""
 
     def teaching(self, consent: Consent) -> Teaching:
         """Jogging, programs and leading by hand, one of them at a time."""

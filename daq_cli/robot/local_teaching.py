@@ -46,7 +46,7 @@ class LocalTeaching:
 
             def commands(row: SampleRow) -> JogCommand | None:
                 command = pendant.command(keyboard.pressed(), robot.controller.clock.now())
-                if pendant.gripper is not None and robot.ended() is None:
+                if pendant.gripper is not None and robot.end_cause() is None:
                     robot.controller.set_gripper(closed=pendant.gripper)
                     pendant.gripper = None
                 if pendant.keep:
@@ -74,7 +74,9 @@ class LocalTeaching:
 
         with self._owned(checked) as (robot, planned):
             tell = console().print
-            performer = FollowingPerformer(robot.controller, robot.control, machine, machine.limits, robot.ended, tell)
+            performer = FollowingPerformer(
+                robot.controller, robot.control, machine, machine.limits, robot.end_cause, tell
+            )
             run_program(planned, machine, performer, tell)
             performer.finish()
         return f"done: {len(planned)} instructions"
@@ -123,4 +125,4 @@ class LocalTeaching:
     def _arm(self, robot: OwnedRobot) -> ControllerArm:
         from daq.teaching.controller_arm import ControllerArm
 
-        return ControllerArm(robot.controller, robot.control, self.machine, robot.ended)
+        return ControllerArm(robot.controller, robot.control, self.machine, robot.end_cause)

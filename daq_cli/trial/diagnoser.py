@@ -16,7 +16,7 @@ from daq_cli.trial.sealed import ANSWER, ASKING, HELD_OUT, MODEL
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-    from model.discrepancy.experiment_design.next_experiment import Asker
+    from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 
 
 def main() -> int:
@@ -30,7 +30,7 @@ def main() -> int:
         traces = [read_trace(file) for file in sorted(here.glob("trace-*.mcap"))]
         held_out = [read_trace(file) for file in sorted(here.glob(HELD_OUT))]
         model = load_model(here / MODEL)
-        answer = diagnose(model, traces, held_out, ask=_asker(here / ASKING, model.machine))
+        answer = diagnose(model, traces, held_out, chooser=_chooser(here / ASKING, model.machine))
     except DaqError as error:
         print(error, file=sys.stderr)
         return error.exit_code
@@ -38,11 +38,11 @@ def main() -> int:
     return 0
 
 
-def _asker(file: Path, machine: Machine) -> Asker | None:
+def _chooser(file: Path, machine: Machine) -> ExperimentChooser | None:
     """The experiments that may be asked for; None where none may."""
-    from server.jobs.asking import asker
+    from server.jobs.next_experiment import experiment_chooser
 
-    return asker(machine, float(json.loads(file.read_text("utf-8"))["budget"])) if file.exists() else None
+    return experiment_chooser(machine, float(json.loads(file.read_text("utf-8"))["budget"])) if file.exists() else None
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ REGISTERED = (
     "model/dynamics",
     "model/drives",
     "model/kinematics",
-    "model/control",
+    "model/thesis_control",
     "model/design",
     "model/validation",
     "model/analysis",
@@ -45,7 +45,7 @@ REGISTERED = (
     "daq_cli/trial",
     "daq_cli/commands/blind.py",
     "daq_cli/models/stopping_rule.py",
-    "server/jobs/asking.py",
+    "server/jobs/next_experiment.py",
 )
 """Parts of the source tree that decide the outcome. A test follows the imports of every stage and finds them all
 here."""

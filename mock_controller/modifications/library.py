@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from mock_controller.modifications import amplifier, controller, friction, gear, load, motor, sensor, strange_friction
+from mock_controller.modifications import (
+    amplifier,
+    controller,
+    friction,
+    load,
+    motor,
+    sensor,
+    strange_friction,
+    transmission,
+)
 
 SHARED: tuple[type[Any], ...] = (
     *friction.SHARED,
     *motor.SHARED,
     *amplifier.SHARED,
-    *gear.SHARED,
+    *transmission.SHARED,
     *load.SHARED,
     *sensor.SHARED,
     *controller.SHARED,
@@ -19,7 +28,7 @@ SHARED: tuple[type[Any], ...] = (
 
 OPEN_SET: tuple[type[Any], ...] = (
     *strange_friction.OPEN_SET,
-    *gear.OPEN_SET,
+    *transmission.OPEN_SET,
     *amplifier.OPEN_SET,
     *sensor.OPEN_SET,
 )

@@ -12,7 +12,7 @@ from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from model.arrays import Floats
-from model.design.candidates import drawn_experiment
+from model.design.drawn_experiments import drawn_experiment
 from model.design.information import (
     InformationGain,
     ParameterGain,

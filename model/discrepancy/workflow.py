@@ -9,7 +9,7 @@ from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.experiment_design.next_experiment import Asker
+from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
@@ -22,13 +22,13 @@ def diagnose(
     options: DiagnosisOptions | None = None,
     progress: Progress = silent,
     cancel: Cancel | None = None,
-    ask: Asker | None = None,
+    chooser: ExperimentChooser | None = None,
 ) -> Diagnosis:
     """Where a model and traces disagree, which effects are missing, and what adding them brings.
 
     On a machine with a controller the closed loop is simulated from the recorded set points. Without one, or where the
-    traces have no set points, the recorded drive is balanced against the motion in torques. `ask` says what may be run
-    next on a machine with a controller; without it, nothing is proposed.
+    traces have no set points, the recorded drive is balanced against the motion in torques. `chooser` knows the
+    experiments that may be run next on a machine with a controller; without it, nothing is proposed.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give an answer; one line says why.
@@ -41,7 +41,7 @@ def diagnose(
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
         return diagnose_torques(model, traces, holdout, options, progress, cancel)
-    return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, ask)
+    return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser)
 
 
 def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:

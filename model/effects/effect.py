@@ -24,7 +24,7 @@ class JointScale:
         speed: speed without load at that voltage, rad/s (m/s); 1 where the drive has no back-EMF.
         resolution: one count of its sensor, rad (m); a 4096th of a turn where it has none.
         range: of its sensor, rad (m); one turn where it has none.
-        back_emf: back-EMF constant, V·s/rad. viscous: motor-side damping from the machine file, N·m·s/rad.
+        gear: motor turns per joint turn. viscous: motor-side damping from the machine file, N·m·s/rad.
         inertia: seen by the transmission between rotor and link in series, kg·m² (kg).
         period: control period, s. length, mass: of its link. supply: the supply's limit, V.
     """
@@ -59,7 +59,7 @@ class EffectParameter:
 
     Args:
         name: last part of the parameter's full name.
-        column: where it lies (`model.layout`), a joint's column or, for the whole machine, a shared slot.
+        column: its index in `model.layout`: a column of the joint, or a shared slot for an effect of the whole machine.
         unit: in SI.
         null: value at which the effect is absent; None for a parameter that only shapes it.
         start: value when the effect is added without one: the null value, or a typical shape.

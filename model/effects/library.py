@@ -6,7 +6,7 @@ from functools import cache
 
 from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
-from model.effects.control import CONTROL
+from model.effects.controller import CONTROL
 from model.effects.effect import Effect, EffectFile
 from model.effects.external import EXTERNAL
 from model.effects.friction import FRICTION

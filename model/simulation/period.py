@@ -65,14 +65,14 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
     if kind == at.BOARD_PID:
         error = wanted - read
         if k == 0:
-            memory[j, 1] = error
+            memory[j, LAST_ERROR] = error
         power = board_pid(error, record.gains[j], joint, quantise, memory[j])
         drive = power * joint[at.VOLTS_PER_COUNT]
         error = error * unit
     else:
         error = wanted - (zero + unit * read)
         if k == 0:
-            memory[j, 1], memory[j, LAST_READING] = error, read
+            memory[j, LAST_ERROR], memory[j, LAST_READING] = error, read
         scale = 1.0 + joint[at.GAIN_ERROR]
         if kind == at.SAMPLED_PID:
             drive = scale * sampled_pid(error, period, record.gains[j], memory[j])
@@ -82,7 +82,7 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
             drive = scale * cascade(error, speed, period, record.gains[j], memory[j])
             drive = given_out(drive, error, period, record.gains[j], joint, rounds, memory[j])
             memory[j, LAST_READING] = read
-        else:
+        else:  # at.NO_CONTROLLER: the recorded drive moves the model; `prepare` refuses controllers that have no kind
             drive = record.recorded[k, j] + 0.0 * error
         power = drive / joint[at.VOLTS_PER_COUNT]
     if record.settings[at.DRIVE_RECORDED] != 0:

@@ -205,8 +205,8 @@ class _Worker:
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
-        from server.jobs.asking import asker
         from server.jobs.diagnosis_data import diagnosis_data, where_given
+        from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
@@ -219,7 +219,7 @@ class _Worker:
             options,
             lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text),
             self.mailbox,
-            ask=asker(begin.machine),
+            chooser=experiment_chooser(begin.machine),
         )
         comparison, given = None, None
         controlled = not isinstance(begin.machine.controller, NoController)

@@ -49,7 +49,7 @@ def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
             robot.limits,
             robot.folder,
             robot.speaker,
-            StopRequests(robot.ended, lambda: robot.guardian.cause is EndCause.ORPHANED),
+            StopRequests(robot.end_cause, lambda: robot.guardian.cause is EndCause.ORPHANED),
             robot.name,
             order.trace_id,
         ),
@@ -94,7 +94,7 @@ def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
         raise SafetyError(f"program refused: {against[0]}; nothing moved")
     with robot.control.frozen_on_error():
         performer = FollowingPerformer(
-            robot.controller, robot.control, robot.machine, robot.limits, robot.ended, robot.say
+            robot.controller, robot.control, robot.machine, robot.limits, robot.end_cause, robot.say
         )
         run_program(planned, robot.machine, performer, robot.say)
         performer.finish()
@@ -129,7 +129,7 @@ def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
 
 def _require_ready(robot: OwnedRobot) -> None:
     """Raises SafetyError or StoppedError if neither keys nor programs may move the arm."""
-    if (cause := robot.ended() or robot.control.halted) is not None:
+    if (cause := robot.end_cause() or robot.control.halted) is not None:
         raise StoppedError(cause)
     line = limp_line(robot.read_gains())
     if line:

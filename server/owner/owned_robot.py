@@ -52,14 +52,14 @@ class OwnedRobot:
 
         self.controller.listener = listen
 
-    def ended(self) -> str | None:
+    def end_cause(self) -> str | None:
         """Returns why the running work must end; None if it need not."""
         cause = self.guardian.cause
         return None if cause is None else cause.value
 
     def arm(self) -> ControllerArm:
         """Returns the controller as an arm that can be taught."""
-        return ControllerArm(self.controller, self.control, self.machine, self.ended)
+        return ControllerArm(self.controller, self.control, self.machine, self.end_cause)
 
     def read_gains(self) -> dict[int, Gain]:
         """Reads the gains of the machine's joints, and remembers them to report limp joints."""
@@ -73,7 +73,7 @@ class OwnedRobot:
 
     def tell_arm(self, *, anew: bool = False) -> None:
         """Reports the arm's state if it has changed, or once a second; in any case with `anew`."""
-        arm, ended = self.control.arm, self.ended()
+        arm, ended = self.control.arm, self.end_cause()
         # The arm counts as stopped even before the board has confirmed it:
         stopping = ended is not None and arm.connected and arm.state is not State.FAULT
         counters = self.controller.counters.numbers() if self._due() else (self._told.counters if self._told else {})

@@ -57,7 +57,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             inbox,
             speaker,
         )
-        if (cause := robot.ended()) is not None:
+        if (cause := robot.end_cause()) is not None:
             control.stop(cause)
         robot.read_gains()
         identity = controller.identity

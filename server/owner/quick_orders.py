@@ -72,7 +72,7 @@ def _write_gains(robot: OwnedRobot, order: WriteGains) -> dict[str, object]:
 
 def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) -> None:
     """Raises StoppedError if the arm is stopped, unless the order says that its sender knows of the stop."""
-    cause = robot.ended() or robot.control.halted
+    cause = robot.end_cause() or robot.control.halted
     if cause is not None and not order.while_stopped:
         line = f"the arm has been stopped ({cause}): nothing was switched; while_stopped overrides this"
         raise StoppedError(cause, line)
@@ -114,7 +114,7 @@ def _release(robot: OwnedRobot, order: Reset) -> None:
 
 
 def _overtaken(robot: OwnedRobot) -> SafetyError:
-    return SafetyError(f"the arm has been stopped since this reset was asked for ({robot.ended()}): reset again")
+    return SafetyError(f"the arm has been stopped since this reset was asked for ({robot.end_cause()}): reset again")
 
 
 def _reset(robot: OwnedRobot, order: Reset) -> str:
@@ -127,9 +127,9 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
-        control.stop(robot.ended() or "on the board, by somebody else")
+        control.stop(robot.end_cause() or "on the board, by somebody else")
         raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
-    if (cause := robot.ended()) is not None:
+    if (cause := robot.end_cause()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")
     limp = limp_line(robot.read_gains())

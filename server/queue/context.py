@@ -34,8 +34,8 @@ class QueueContext:
     queues: QueueStore
     clock: Clock
     record_event: RecordEvent
-    recorded: Callable[[Answer], None]
+    add_trace: Callable[[Answer], None]
     """Called with the answer of every run that left a trace."""
-    unfinished: Callable[[], None]
+    add_unfinished_traces: Callable[[], None]
     """Called after a run whose trace could not be closed or added to the catalogue, to add what was written of it."""
     unattended: bool

@@ -11,7 +11,7 @@ import threading
 from dataclasses import dataclass
 
 from server.owner.messages import ArmReport
-from server.queue.readiness import why_held
+from server.queue.readiness import why_paused
 
 LOOK_FIRST = "look at the arm, then resume the queue"
 
@@ -38,7 +38,7 @@ class Notices:
         self._connected = False
         self._link_lost = False
 
-    def take(self) -> str:
+    def pop_reason(self) -> str:
         """Returns the reason, and forgets it."""
         with self._lock:
             reason, self.reason = self.reason, ""
@@ -50,14 +50,14 @@ class Notices:
         with self._lock:
             return Seen(self._noted, self._connections)
 
-    def answer_for(self, seen: Seen) -> None:
+    def acknowledge(self, seen: Seen) -> None:
         """Forgets the notices that a person had `seen`. The newest of any later ones becomes the reason, even if a
         reason has been taken since."""
         with self._lock:
             self.reason = self._newest if self._noted > seen.notices else ""
 
     def note(self, reason: str) -> None:
-        """Notes a reason. The first one stays until it is taken."""
+        """Notes a reason. The first one stays until it is popped."""
         with self._lock:
             self.reason = self.reason or reason
             self._newest, self._noted = reason, self._noted + 1
@@ -65,8 +65,8 @@ class Notices:
     def arm_reported(self, arm: ArmReport) -> None:
         """Notes a stop, a fault, a lost link, or a link that comes back: somebody may be at the cable."""
         lost = arm.link == "lost"
-        if held := why_held(arm):
-            self.note(held)
+        if cause := why_paused(arm):
+            self.note(cause)
         elif lost != self._link_lost:
             self.note(f"the link to the robot {'was lost' if lost else 'came back'}: {LOOK_FIRST}")
         self._link_lost = lost

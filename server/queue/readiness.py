@@ -28,7 +28,7 @@ class Missing:
     pause: str = ""
 
 
-def why_held(arm: ArmReport) -> str:
+def why_paused(arm: ArmReport) -> str:
     """Returns why the queue must wait for a person after a stop or a fault of the arm; empty in every other state."""
     if arm.arm not in ("stopped", "fault"):
         return ""
@@ -39,10 +39,10 @@ def what_is_missing(now: Circumstances) -> Missing | None:
     """Returns the first thing that is missing; None if an experiment may begin."""
     if now.identity is None or now.arm is None:
         return Missing(f"the robot is not connected. {now.connection_problem}".strip())
-    state, held = now.arm.arm, why_held(now.arm)
+    state, cause = now.arm.arm, why_paused(now.arm)
     found = [
         (now.arm.link == "lost" or state == "disconnected", Missing("the link to the robot is lost")),
-        (held != "", Missing(f"the arm is {state}", held)),
+        (cause != "", Missing(f"the arm is {state}", cause)),
         (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
         (
             not now.identity.simulated and not now.consent,

@@ -20,7 +20,7 @@ from server.queue.attendance import Attendance
 from server.queue.context import QueueContext
 from server.queue.due_runs import DueRuns
 from server.queue.notices import Notices, Seen
-from server.queue.readiness import Circumstances, what_is_missing, why_held
+from server.queue.readiness import Circumstances, what_is_missing, why_paused
 from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
@@ -56,7 +56,7 @@ class QueueService:
         self._lock = threading.RLock()
         self._changed = threading.Event()
         self._closing = False
-        self._consented: int | None = None
+        self._consented_connection: int | None = None
         """The connection, by its number in `Seen`, for which a person consented to moving a real arm."""
         self._attendance = Attendance(context.clock)
         self._running: Running | None = None
@@ -109,8 +109,8 @@ class QueueService:
     def pause(self, reason: str, by: str | None = None) -> None:
         """Pauses the queue: no further experiment begins, and one that runs goes on."""
         with self._lock:
-            held = self._hold(reason, anew=by is not None)
-        if held:
+            paused = self._pause(reason, anew=by is not None)
+        if paused:
             self._context.record_event("queue", f"paused: {reason}", actor=by)
 
     def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
@@ -118,16 +118,16 @@ class QueueService:
         had `seen` pauses it again. Raises a 409 while the arm is stopped or at fault."""
         seen = seen or self.notices.seen
         with self._lock:
-            self.notices.answer_for(seen)
+            self.notices.acknowledge(seen)
             arm = self._context.robot.arm
-            if arm is not None and (held := why_held(arm)):
-                self.notices.note(held)
+            if arm is not None and (cause := why_paused(arm)):
+                self.notices.note(cause)
                 line = f"the arm is {arm.arm}: {arm.cause}"
                 raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
             state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
             self._context.queues.set(self._context.robot.name, state)  # first: what is not written stays paused
             self._state, self._written = state, True
-            self._consented = seen.connections if moves_real_arm else self._consented
+            self._consented_connection = seen.connections if moves_real_arm else self._consented_connection
             self._attendance.say()
         self._context.record_event("queue", "resumed", actor=by)
         self.wake()
@@ -188,8 +188,8 @@ class QueueService:
     def status(self) -> QueueStatus:
         """Returns the status now. It waits neither for a disk nor for the lock, since the event loop calls this."""
         running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
-        if not state.paused and (held := self.notices.reason):  # the queue counts as paused from now on
-            state = QueueState(True, held, self._context.clock.utc())
+        if not state.paused and (reason := self.notices.reason):  # the queue counts as paused from now on
+            state = QueueState(True, reason, self._context.clock.utc())
         attended = self._context.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
         return QueueStatus(
             paused=state.paused,
@@ -201,7 +201,7 @@ class QueueService:
             attended_until=attended,
         )
 
-    def take_no_more(self) -> None:
+    def begin_no_more(self) -> None:
         """Lets no further experiment begin. Later notices come from the service's own end, and pause nothing."""
         with self._lock:
             self._closing = True
@@ -209,7 +209,7 @@ class QueueService:
 
     def close(self, patience: float) -> None:
         """Lets no further experiment begin, and waits until the end of the running one is written."""
-        self.take_no_more()
+        self.begin_no_more()
         if self._worker.is_alive():
             self._worker.join(patience)
 
@@ -231,7 +231,7 @@ class QueueService:
         context.queues.set(name, state)
         return state
 
-    def _hold(self, reason: str, *, anew: bool = False) -> bool:
+    def _pause(self, reason: str, *, anew: bool = False) -> bool:
         """Pauses the queue, under the lock. Unless `anew`, a queue that is paused already keeps its reason, and this
         returns False."""
         if self._state.paused and not anew:
@@ -252,7 +252,7 @@ class QueueService:
         return self._context.experiments.count_waiting(self._context.robot.name)
 
     def _has_consent(self) -> bool:
-        return self._consented == self.notices.seen.connections
+        return self._consented_connection == self.notices.seen.connections
 
     def _needs_attendance(self) -> bool:
         identity = self._context.robot.identity
@@ -267,7 +267,7 @@ class QueueService:
             try:
                 self._settle()
                 self._runs.submit()
-                experiment = self._take()
+                experiment = self._begin_next()
                 if experiment is not None:
                     self._carry_out(experiment)
                     continue
@@ -281,33 +281,33 @@ class QueueService:
         """Pauses the queue for any notice, and writes what could not be written before, before anything begins."""
         self._notice_absence()
         with self._lock:
-            if not self._closing and (reason := self.notices.take()):
+            if not self._closing and (reason := self.notices.pop_reason()):
                 self.pause(reason)
             self._write_state()
             self._write_end()
 
-    def _take(self) -> Experiment | None:
-        """Takes control of the robot for the next experiment, and returns that; None if none may begin now."""
+    def _begin_next(self) -> Experiment | None:
+        """Takes control of the robot and begins the next experiment, which it returns; None if none may begin now."""
         context = self._context
         with self._lock:
             now = context.clock.utc()
-            following = next_due(context.experiments.due(context.robot.name, now), now)
-            if following is None:
+            next_experiment = next_due(context.experiments.due(context.robot.name, now), now)
+            if next_experiment is None:
                 self._waiting_for = ""
                 return None
             self._waiting_for = self._what_is_missing()
             if self._state.paused or self._waiting_for or self._closing:
                 return None
-            if not context.control.take_for_queue(following.id):
+            if not context.control.take_for_queue(next_experiment.id):
                 self._waiting_for = "somebody has control of the robot"
                 return None
             if self.notices.reason:  # for example, a client's control has just ended: the queue must pause first
                 context.control.give_back_for_queue()
                 self.wake()
                 return None
-            self._running = Running(following.id)  # before it stops waiting, so that the queue never looks empty
+            self._running = Running(next_experiment.id)  # before it stops waiting, so that the queue never looks empty
             try:
-                return context.experiments.begin(context.robot.name, following.id, context.clock.utc())
+                return context.experiments.begin(context.robot.name, next_experiment.id, context.clock.utc())
             except BaseException as error:
                 self._running = None
                 context.control.give_back_for_queue()
@@ -348,19 +348,19 @@ class QueueService:
             context.robot.experiment = None
             context.control.give_back_for_queue()
         with self._lock:
-            ending = self._as_wished(ending, self._running)
+            ending = self._with_stop_reason(ending, self._running)
             state = advance("running", ending.event)
             why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
-            held = ending.holds_queue and self._hold(why)  # first, so that clients told of the end find it paused
+            paused = ending.holds_queue and self._pause(why)  # first, so that clients told of the end find it paused
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()
             except Exception:
                 log.exception("experiment %s: its end as %s is not written yet", experiment.id, state)
-                held = self._hold(why) or held
+                paused = self._pause(why) or paused
             finally:
                 self._running = None
-        if held:
+        if paused:
             context.record_event("queue", f"paused: {why}")
 
     def _write_end(self) -> None:
@@ -376,8 +376,8 @@ class QueueService:
         self._ended = None
         what = "completed" if ending.event is Event.COMPLETED else state
         context.record_event("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
-        if ending.untaken:
-            context.unfinished()  # the database can be written to again, so the trace can be added from its folder
+        if ending.trace_not_in_catalogue:
+            context.add_unfinished_traces()  # the database can be written to again, so its folder can be read
 
     def _run(self, experiment: Experiment) -> Ending:
         """Runs an experiment, and returns how it ended. Raises any error that prevents or loses it."""
@@ -398,13 +398,13 @@ class QueueService:
         ending = ending_of(found)
         try:
             if found.finished is not None:
-                context.recorded(found)
+                context.add_trace(found)
             elif ending.event is not Event.REFUSED:
-                context.unfinished()
+                context.add_unfinished_traces()
         except Exception:
             log.exception("experiment %s: its trace", experiment.id)
             line = "its trace is not in the catalogue: see the log"
-            return replace(ending, reason=f"{ending.reason}; {line}".removeprefix("; "), untaken=True)
+            return replace(ending, reason=f"{ending.reason}; {line}".removeprefix("; "), trace_not_in_catalogue=True)
         return ending
 
     def _await(self, answer: Future[Answer]) -> Answer:
@@ -419,7 +419,7 @@ class QueueService:
                         running.cancelled_by = "the service: no operator confirmed to be present"
                         self._context.robot.tell(HaltRun())
 
-    def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
+    def _with_stop_reason(self, ending: Ending, running: Running | None) -> Ending:
         """Returns the ending with the reason of a stop: who cancelled the run, or the end of the service."""
         if ending.event is not Event.STOPPED:
             return ending

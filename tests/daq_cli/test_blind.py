@@ -289,7 +289,13 @@ def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
     assert expected[thresholds] == sha256((source_tree() / thresholds).read_bytes()).hexdigest()
 
 
-STAGE_MODULES = ("daq_cli.trial", "daq_cli.commands.blind", "daq.acquisition", "server.jobs.asking", "mock_controller")
+STAGE_MODULES = (
+    "daq_cli.trial",
+    "daq_cli.commands.blind",
+    "daq.acquisition",
+    "server.jobs.next_experiment",
+    "mock_controller",
+)
 AROUND = ("daq_cli", "daq.client", "daq.config")
 """What only the command line around a trial uses, which decides nothing."""
 

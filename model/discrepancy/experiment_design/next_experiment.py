@@ -23,7 +23,7 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, same
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
-from model.discrepancy.experiment_design.signals import Imagined, Planner, Prediction, imagine
+from model.discrepancy.experiment_design.prediction import Imagined, Planner, Prediction, imagine
 from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
 from model.discrepancy.output_error.observation import Observation
@@ -54,7 +54,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Asker:
+class ExperimentChooser:
     """The experiments that may be asked for. budget: s of robot time that are left; None for no limit."""
 
     experiments: tuple[OfferedExperiment, ...]
@@ -109,18 +109,18 @@ def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
     return found
 
 
-def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
+def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser) -> Asked:
     """The experiment on which the rivals that are hardest to tell apart differ most for its robot time; pairs that no
     experiment tells apart are named in the note."""
     names = [effect_on(r.hypothesis.name, r.hypothesis.joints) for r in rivals]
-    judged = [j for e in asker.experiments if (j := _separations(rivals, e, asker)) is not None]
+    judged = [j for e in chooser.experiments if (j := _separations(rivals, e, chooser)) is not None]
     if not judged:
-        return Asked(None, Note(kind="no-experiment-left", values={"candidates": names, "budget": asker.budget}))
+        return Asked(None, Note(kind="no-experiment-left", values={"candidates": names, "budget": chooser.budget}))
     pairs = list(combinations(range(len(rivals)), 2))
     best = {pair: max(j.sizes[pair] for j in judged) for pair in pairs}
     hopeless = [pair for pair in pairs if best[pair] < LEAST]
     separable = [pair for pair in pairs if pair not in hopeless]
-    note = _hopeless(hopeless, best, names, asker.budget)
+    note = _hopeless(hopeless, best, names, chooser.budget)
     if not separable:
         return Asked(None, note)
     chosen = max(judged, key=lambda j: _worth(min(j.sizes[p] for p in separable), j.there.duration))
@@ -133,23 +133,25 @@ def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
     return Asked(asked.model_copy(update={"hardest": hardest_names, "differs_at": place}), note)
 
 
-def most_information(point: Point, asker: Asker, done: Sequence[ExperimentSpec]) -> Asked:
+def most_information(point: Point, chooser: ExperimentChooser, done: Sequence[ExperimentSpec]) -> Asked:
     """Returns the most informative general experiment that was not made yet, or another one if all of those take too
     long. Returns none if a general experiment was made already."""
-    if any(_same_motion(e.spec, s) for e in asker.experiments if e.general for s in done):
+    if any(_same_motion(e.spec, s) for e in chooser.experiments if e.general for s in done):
         return Asked(None)
-    new = [e for e in asker.experiments if not any(_same_motion(e.spec, s) for s in done)]
+    new = [e for e in chooser.experiments if not any(_same_motion(e.spec, s) for s in done)]
     for general in (True, False):
-        found = [j for e in new if e.general is general and (j := _information(point, e, asker)) is not None]
+        found = [j for e in new if e.general is general and (j := _information(point, e, chooser)) is not None]
         if found:
             experiment, there, nats = max(found, key=lambda f: f[2])
             return Asked(_next(experiment, there, (), 0.0).model_copy(update={"information": nats}))
     return Asked(None)
 
 
-def _separations(rivals: Sequence[CandidateFit], experiment: OfferedExperiment, asker: Asker) -> _Separations | None:
+def _separations(
+    rivals: Sequence[CandidateFit], experiment: OfferedExperiment, chooser: ExperimentChooser
+) -> _Separations | None:
     points = [r.fit.point for r in rivals]
-    there = asker.imagine(experiment, points[0])
+    there = chooser.imagine(experiment, points[0])
     if there is None:
         return None
     own = [Prediction(there, p).recorded() for p in points]
@@ -196,10 +198,10 @@ def _unhidden(
 
 
 def _information(
-    point: Point, experiment: OfferedExperiment, asker: Asker
+    point: Point, experiment: OfferedExperiment, chooser: ExperimentChooser
 ) -> tuple[OfferedExperiment, Imagined, float] | None:
     """The experiment with the information that it would add about the arm's parameters, nats."""
-    there = asker.imagine(experiment, point)
+    there = chooser.imagine(experiment, point)
     if there is None:
         return None
     try:

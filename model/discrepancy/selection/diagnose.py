@@ -18,7 +18,7 @@ from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
-from model.discrepancy.experiment_design.next_experiment import Asked, Asker, rivals_of
+from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
@@ -45,11 +45,11 @@ from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, w
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
-CHANCES = 3
+MOST_REFUSALS = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
 CONTROLLER_EFFECTS = ("wrong_gain", "lost_set_points")
 """Effects of the controller, which do not show where the recorded drive is the input: its own numbers tell them."""
-NEARER = (0.0, 0.5)
+FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 FIRST_STEPS = 6
 """Steps of a search in these fits, before derivatives are computed anew."""
@@ -62,7 +62,7 @@ def diagnose_by_simulation(
     options: DiagnosisOptions,
     progress: Progress,
     cancel: Cancel,
-    ask: Asker | None,
+    chooser: ExperimentChooser | None,
 ) -> Diagnosis:
     """The answer to traces with set points from a machine with a controller, as `workflow.diagnose` describes."""
     begun = time.perf_counter()
@@ -84,7 +84,7 @@ def diagnose_by_simulation(
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
-    answer = _answer(case, search, proved, ask)
+    answer = _answer(case, search, proved, chooser)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
 
@@ -93,9 +93,15 @@ def diagnose_by_simulation(
 class _Search:
     """The state of the search for missing effects.
 
-    first: the fit before any effect was added. current: the fit now. steps: one for every ranking with something to
-    say. before: the fit that each of them began from. rivals: candidates close to the last added effect. probes: all so
-    far. tried: the last ranking, where nothing was added. ended: whether the search is over.
+    Args:
+        first: the fit before any effect was added.
+        current: the fit now.
+        steps: one for every ranking with something to say.
+        before: the fit that each step began from.
+        rivals: candidates close to the last added effect.
+        probes: all so far.
+        tried: the last ranking, where nothing was added.
+        ended: whether the search is over.
     """
 
     first: Fit
@@ -127,7 +133,7 @@ def _fit_tolerances(given: Point) -> Point:
     effect can, the fit starts again from the given model.
     """
     near = given
-    for share in NEARER:
+    for share in FIRST_FEEDBACK_SHARES:
         near = _fit_with_feedback(near, given.observation.with_feedback_share(share)) or near
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
@@ -166,7 +172,7 @@ def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel)
     search = replace(search, current=current, probes=(*search.probes, *ranking.probed), tried=ranking)
     if not search.added:
         search = replace(search, first=current)
-    for _ in range(CHANCES):
+    for _ in range(MOST_REFUSALS):
         decision = decide(ranking, case.thresholds, search.added)
         step, following = make_step(case, current, ranking, decision)
         if step is None:
@@ -188,7 +194,7 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
     return rank(case, better, progress, cancel), better
 
 
-def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | None) -> Diagnosis:
+def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: ExperimentChooser | None) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained_joints(case, found, looked)
@@ -199,7 +205,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | N
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
     remaining = case.remaining(end) if answered == "unknown-effect" else ()
-    asked = Asked(None) if ask is None else ask.after(answered, end, found.rivals, case.traces)
+    asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces)
     notes = (
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
@@ -238,14 +244,16 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | N
 def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tuple[int, ...]:
     """Joints with an unexplained error on fitted or held-out traces. where: the map of the current point, while no
     effect has been added."""
-    before, after, named = found.first.point, found.current.point, where is None
-    if named:
+    before, after, effect_added = found.first.point, found.current.point, where is None
+    if effect_added:
         case = case.with_floors_of(after)
     held_errors = case.held_errors(*case.held_residuals(before, after))
     joints = len(case.floor)
     judged = 0 if case.held is None else case.held.observation.samples
     counts = case.scoring.samples // joints, judged // joints
-    left = unexplained(case.fitted_errors(before, after), held_errors, case.thresholds, named=named, samples=counts)
+    left = unexplained(
+        case.fitted_errors(before, after), held_errors, case.thresholds, named=effect_added, samples=counts
+    )
     if where is None:
         return left
     closer = unexplained(errors_of_fit(after), (), case.thresholds, named=False, samples=counts)

@@ -19,7 +19,7 @@ from daq_cli.app.context import Invocation
 from daq_cli.models.acquire_loop import Diagnose, LoopEnd, diagnose_and_acquire
 from daq_cli.robot.local import LocalRobot
 from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
-from model.discrepancy.experiment_design.next_experiment import Asker, Planner
+from model.discrepancy.experiment_design.next_experiment import ExperimentChooser, Planner
 from model.machine_model.model import base_model
 from tests.daq_cli.invoke import CommandLine
 
@@ -80,9 +80,9 @@ class Answers:
         self.given: list[tuple[int, float | None]] = []
         self.plans: list[Planner] = []
 
-    def __call__(self, traces: Sequence[Trace], ask: Asker) -> Diagnosis:
-        self.given.append((len(traces), ask.budget))
-        self.plans.append(ask.plan)
+    def __call__(self, traces: Sequence[Trace], chooser: ExperimentChooser) -> Diagnosis:
+        self.given.append((len(traces), chooser.budget))
+        self.plans.append(chooser.plan)
         model = base_model(load_machine("ma2000"))
         asked = NextExperiment(
             name="ramp",
@@ -184,7 +184,7 @@ def test_the_answer_is_printed_and_the_exit_code_is_that_of_the_last_run(
     run = Acquired(experiment="ramp", trace="abc", file="abc.mcap", outcome=outcome, duration=3.0, reason="")
 
     def made(_robot: object, _machine: object, traces: list[Trace], *_: object) -> LoopEnd:
-        found = Answers(3.0)(traces, Asker((), lambda _: pytest.fail("nothing is planned")))
+        found = Answers(3.0)(traces, ExperimentChooser((), lambda _: pytest.fail("nothing is planned")))
         return LoopEnd(found.model_copy(update={"acquired": (run,)}), traces)
 
     monkeypatch.setattr("daq_cli.models.acquire_loop.diagnose_and_acquire", made)
@@ -208,8 +208,8 @@ def test_the_answer_survives_a_run_that_cannot_begin(
     def gone(*_: object) -> Finished:
         raise ReachError("the arm is gone")
 
-    def answers(_model: object, traces: list[Trace], *_: object, ask: Asker) -> Diagnosis:
-        return Answers(3.0)(traces, ask)
+    def answers(_model: object, traces: list[Trace], *_: object, chooser: ExperimentChooser) -> Diagnosis:
+        return Answers(3.0)(traces, chooser)
 
     monkeypatch.setattr(LocalRobot, "acquire", gone)
     monkeypatch.setattr("model.discrepancy.workflow.diagnose", answers)
@@ -225,10 +225,10 @@ def test_the_answer_survives_a_run_that_cannot_begin(
 def test_the_answer_survives_a_trace_that_cannot_be_used(ramp: Path) -> None:
     answers = Answers(3.0)
 
-    def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
+    def once(traces: Sequence[Trace], chooser: ExperimentChooser) -> Diagnosis:
         if len(traces) > 1:
             raise TraceError("trace abc: cannot be used")
-        return answers(traces, ask)
+        return answers(traces, chooser)
 
     ended = loop(Arm(ramp, "complete"), [read_trace(ramp)], 60.0, once)
     assert isinstance(ended.failure, TraceError)

@@ -97,7 +97,7 @@ def _gripper_of(moved: list[bool]) -> SimpleNamespace:
 
 def _robot(moved: list[bool], ended: str | None = None, halted: str | None = None) -> SimpleNamespace:
     control = SimpleNamespace(halted=halted)
-    return SimpleNamespace(activity="none", controller=_gripper_of(moved), control=control, ended=lambda: ended)
+    return SimpleNamespace(activity="none", controller=_gripper_of(moved), control=control, end_cause=lambda: ended)
 
 
 @pytest.mark.parametrize(("ended", "halted"), [("daq stop", None), (None, "following error")])

@@ -106,8 +106,8 @@ class Bench:
             queues=self.queues,
             clock=self.clock,
             record_event=self._record_event,
-            recorded=self._record,
-            unfinished=self._look_for_traces,
+            add_trace=self._record,
+            add_unfinished_traces=self._look_for_traces,
             unattended=False,
         )
         return QueueService(context)

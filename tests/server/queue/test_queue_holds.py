@@ -142,7 +142,7 @@ def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: B
     seen = bench.queue.notices.seen  # a request that waits for the queue
     bench.queue.stop_asked("bert")
     if taken:
-        bench.queue.notices.take()
+        bench.queue.notices.pop_reason()
     bench.queue.resume("anna", moves_real_arm=False, seen=seen)
     assert bench.queue.status().reason.startswith("bert requested")
     _is_held(bench, "bert requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
@@ -178,7 +178,7 @@ def test_connecting_moves_nothing_whatever_waits(bench: Bench) -> None:
 def test_the_end_of_the_service_is_no_reason_to_find_the_queue_held(bench: Bench) -> None:
     bench.queue.connection_made()
     bench.queue.start()
-    bench.queue.take_no_more()
+    bench.queue.begin_no_more()
     bench.queue.connection_ended("exit code 0")
     bench.queue.close(10)
     assert not bench.begun_anew().status().paused

@@ -21,7 +21,7 @@ from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.experiment_design.next_experiment import (
-    Asker,
+    ExperimentChooser,
     best_experiment,
     converge_rivals,
     most_information,
@@ -85,7 +85,7 @@ def test_a_record_of_what_is_asked_for_separates_as_predicted(
     ramp_step: Trace, friction: tuple[CandidateFit, ...]
 ) -> None:
     offered = [EXPERIMENTS["diagnostic-b"], EXPERIMENTS["diagnostic-d"]]
-    asked = best_experiment(friction, Asker(tuple(offered), plan, budget=60.0))
+    asked = best_experiment(friction, ExperimentChooser(tuple(offered), plan, budget=60.0))
     assert asked.experiment is not None
     found = asked.experiment
     assert set(found.separates) == {"Coulomb friction on joint 2", "Stribeck friction on joint 2"}
@@ -132,7 +132,7 @@ def test_candidates_that_no_experiment_separates_are_named_in_a_note() -> None:
     moved = [r.fit.point.value(SPEED_LAWS[r.hypothesis.name]) for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
     assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["back_emf_error"]).value
-    asked = best_experiment(rivals, Asker((EXPERIMENTS["diagnostic-b"],), plan))
+    asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), plan))
     assert asked.experiment is None
     assert asked.note is not None
     words = note_words(asked.note)
@@ -146,7 +146,7 @@ def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_s
     short = Ramp(amplitude=0.1, duration=0.5)
     slight = OfferedExperiment("slight", "a small ramp", ExperimentSpec(trajectory=short, hold=0.5))
     rich = replace(EXPERIMENTS["diagnostic-d"], general=True)
-    offered = Asker((slight, rich), plan)
+    offered = ExperimentChooser((slight, rich), plan)
     asked = most_information(point, offered, []).experiment
     assert asked is not None
     assert (asked.name, asked.separates) == ("diagnostic-d", ())
@@ -163,7 +163,7 @@ def test_an_experiment_that_the_limits_forbid_is_not_asked_for(friction: tuple[C
     def refused(spec: ExperimentSpec) -> NDArray[np.float64]:
         raise SpecError(f"{spec.name}: joint 2 would leave its range")
 
-    asked = best_experiment(friction, Asker((EXPERIMENTS["diagnostic-b"],), refused))
+    asked = best_experiment(friction, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), refused))
     assert asked.experiment is None
     assert asked.note is not None
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.control.arm import DrivenArm, equation_of_motion
-from model.control.closed_loop import ClassicalPid, Partitioned, Sinusoid, control
 from model.dynamics import recursive
 from model.thesis.tables import VISCOUS_AND_COULOMB
+from model.thesis_control.arm import DrivenArm, equation_of_motion
+from model.thesis_control.closed_loop import ClassicalPid, Partitioned, Sinusoid, control
 
 START = (np.pi, np.pi / 4, 0.0)
 STILL = Sinusoid(START, (0.0, 0.0, 0.0), 3.0, (0.0, 0.0, 0.0))

@@ -12,15 +12,15 @@ from daq.trajectories.offered import offered_experiments
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-    from model.discrepancy.experiment_design.next_experiment import Asker
+    from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 
 
-def asker(machine: Machine, budget: float | None = None) -> Asker:
+def experiment_chooser(machine: Machine, budget: float | None = None) -> ExperimentChooser:
     """Returns the library of experiments, planned and checked for a machine. The caller runs those asked for.
 
     Args:
         budget: remaining robot time (s); None for no limit.
     """
-    from model.discrepancy.experiment_design.next_experiment import Asker
+    from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 
-    return Asker(offered_experiments(), lambda spec: planned(spec, machine), budget)
+    return ExperimentChooser(offered_experiments(), lambda spec: planned(spec, machine), budget)
