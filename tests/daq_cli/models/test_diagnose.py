@@ -154,7 +154,7 @@ def test_json_is_the_answer_and_files_are_written(
     asked: dict[str, object] = {}
 
     def imagined(
-        model: object, traces: object, holdout: object, options: object, progress: object, ask: object
+        model: object, traces: object, holdout: object, options: object, progress: object, *, chooser: object
     ) -> Diagnosis:
         asked.update(model=model, traces=traces, holdout=holdout, options=options)
         return answer

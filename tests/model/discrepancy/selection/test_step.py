@@ -59,7 +59,7 @@ def test_a_candidate_that_is_not_significant_is_not_taken_after_a_refused_one(mo
 
 def test_the_search_ends_after_three_refused_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     found = after_ranking(monkeypatch, [candidate_fit(f"effect_{k}", (1,), 90.0 - 10 * k) for k in range(6)], None)
-    assert len(found.steps) == diagnose.CHANCES
+    assert len(found.steps) == diagnose.MOST_REFUSALS
     assert found.ended
 
 
