@@ -12,11 +12,15 @@ FOR_DEVELOPMENT := .venv/installed-for-development
 # processes in real time. For one process: make test WORKERS=
 WORKERS ?= -n 3 --dist loadfile --no-loadscope-reorder
 
+# Python keeps what it has compiled, whatever the environment says: the tests start hundreds of processes, and each would
+# compile all of its sources again.
+export PYTHONDONTWRITEBYTECODE :=
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 # Even with -j: `page` and the background part of `lint` both install the page's packages into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo page test test-all lint format types requirements bench golden clean distclean
+.PHONY: help serve demo page test test-all checks page-tests lint format types requirements bench golden clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,17 +35,23 @@ demo: $(FOR_USE) ## record a ramp-step on joints 1-3 of the mock controller, and
 page: | $(FOR_USE) ## build the dashboard's page where it is out of date
 	@$(BIN)/python hatch_build.py
 
-test: lint ## lint, types, import contracts, then the tests
-	@echo "== tests of the page's modules"
-	@$(BIN)/python hatch_build.py test
+test: checks ## lint, types, import contracts, then the tests
 	@echo "== tests"
 	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow"
 
-test-all: lint ## the same, with the slow tests
-	@echo "== tests of the page's modules"
-	@$(BIN)/python hatch_build.py test
+test-all: checks ## the same, with the slow tests
 	@echo "== tests, the slow ones too"
 	@$(BIN)/python -m pytest -q $(WORKERS)
+
+# What all workers of the tests need is compiled meanwhile, once: each would do it again, or wait for the one that does.
+checks: $(FOR_DEVELOPMENT) page
+	@$(BIN)/python -m tests.compile_ahead & ahead=$$!; \
+	$(MAKE) --no-print-directory lint page-tests; code=$$?; \
+	wait $$ahead || code=1; exit $$code
+
+page-tests:
+	@echo "== tests of the page's modules"
+	@$(BIN)/python hatch_build.py test
 
 lint: $(FOR_DEVELOPMENT) page ## lint, format, types and import contracts, without the tests
 	@echo "== page"

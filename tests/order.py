@@ -1,5 +1,6 @@
 """In which order the test files run, and which of them stay with one worker."""
 
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,9 +27,15 @@ ONE_WORKER = ("server/dashboard", "server/jobs", "server")
 
 def is_against_the_clock(test: pytest.Item) -> bool:
     """Whether the test starts processes that run in real time."""
-    return any(test.path.is_relative_to(TESTS / folder) for folder in AGAINST_THE_CLOCK)
+    return _lies_below(test.path, AGAINST_THE_CLOCK)
 
 
+@cache
+def _lies_below(path: Path, folders: tuple[str, ...]) -> bool:
+    return any(path.is_relative_to(TESTS / folder) for folder in folders)
+
+
+@cache
 def unit_of(path: Path) -> str:
     """The unit of work, all of which one worker runs, that a test file belongs to: a folder's name, or its own."""
     for folder in ONE_WORKER:
