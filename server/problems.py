@@ -46,6 +46,8 @@ TITLES = {
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Error numbers of the operating system that mean that the disk is full."""
+NOT_WRITABLE = (errno.EROFS, errno.EIO)
+"""Error numbers that mean that the disk can be read at most: the system makes one read-only after an error."""
 
 NO_FIELD = re.compile(r"(constrained|function)-.*|(dict|list|set|tuple)\[.*\]|\[key\]")
 """Parts of pydantic's error locations that are not fields: the type of a union that was tried, or the mark of a key."""
@@ -86,8 +88,8 @@ def of_error(error: DaqError) -> ProblemError:
     """Returns the problem for an error of this program's other packages."""
     if isinstance(error, PortBusyError):
         return conflict("port-in-use", str(error), "end the other program, then connect again")
-    if isinstance(error.__cause__, OSError) and error.__cause__.errno in NO_ROOM:
-        return no_room(error.__cause__)
+    if isinstance(error.__cause__, OSError) and (problem := of_disk(error.__cause__)) is not None:
+        return problem
     return of_exit_code(error.exit_code, str(error))
 
 
@@ -106,10 +108,16 @@ def of_damage(error: DamagedError) -> ProblemError:
     return ProblemError(503, "database", f"the database: {error}", BRING_BACK)
 
 
-def no_room(error: OSError) -> ProblemError:
-    """Returns a 507: the disk is full."""
+def of_disk(error: OSError) -> ProblemError | None:
+    """Returns a 507 if the disk is full, a 503 if it cannot be written, and None if the error is another one."""
+    if error.errno in NO_ROOM:
+        status, kind, advice = 507, "no-room", "free some space on it"
+    elif error.errno in NOT_WRITABLE:
+        status, kind, advice = 503, "disk", "the operating system's log says why; make it writable, then try again"
+    else:
+        return None
     log.error("disk: %s", error)
-    return ProblemError(507, "no-room", f"the disk: {error.strerror}", "free some space on it")
+    return ProblemError(status, kind, f"the disk: {error.strerror}", advice)
 
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
@@ -184,9 +192,8 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(OSError)
     async def disk(request: Request, error: OSError) -> JSONResponse:
-        if error.errno in NO_ROOM:
-            return response(request, no_room(error))
-        return await fault(request, error)
+        problem = of_disk(error)
+        return await fault(request, error) if problem is None else response(request, problem)
 
     @app.exception_handler(Exception)
     async def fault(request: Request, error: Exception) -> JSONResponse:

@@ -259,6 +259,7 @@ class QueueService:
         return identity is not None and not identity.simulated and not self._context.unattended
 
     def _work(self) -> None:
+        told = ""
         while True:
             with self._lock:
                 if self._closing:
@@ -271,9 +272,13 @@ class QueueService:
                 if experiment is not None:
                     self._carry_out(experiment)
                     continue
-            except Exception:
-                # The disk may be full, or the database locked: the queue must neither end nor go on blindly.
-                log.exception("queue")
+                told = ""
+            except Exception as error:
+                # The disk may be full, or the database locked: the queue must neither end nor go on blindly. What lasts
+                # is told once.
+                if (fault := f"{type(error).__name__}: {error.args[:1]}") != told:
+                    log.exception("queue")
+                told = fault
                 self._waiting_for = "an error occurred in the queue: see the log"
             self._changed.wait(LOOK_EVERY)
 
@@ -340,10 +345,12 @@ class QueueService:
             context.robot.experiment = experiment.id
             context.record_event("experiment", "started", experiment=experiment.id)
             ending = self._run(experiment)
+        except DaqError as error:
+            log.error("experiment %s: %s", experiment.id, error)  # noqa: TRY400 - the line says it all
+            ending = Ending(Event.LOST, str(error))
         except Exception as error:
             log.exception("experiment %s", experiment.id)
-            why = str(error) if isinstance(error, DaqError) else f"{type(error).__name__}: see the log"
-            ending = Ending(Event.LOST, why)
+            ending = Ending(Event.LOST, f"{type(error).__name__}: see the log")
         finally:
             context.robot.experiment = None
             context.control.give_back_for_queue()

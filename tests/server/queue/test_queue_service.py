@@ -63,6 +63,18 @@ def test_a_schedule_that_cannot_be_read_holds_up_neither_another_nor_the_queue(b
     bench.until(lambda event: event == "experiment: failed: refused")
 
 
+def test_a_fault_that_lasts_is_logged_once(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    def fails() -> None:
+        bench.queue.wake()  # it looks again at once
+        raise FULL
+
+    bench.experiments.before("due", *[fails] * 4)
+    bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event == "experiment: failed: refused")
+    assert [record.getMessage() for record in caplog.records if record.exc_info] == ["queue"]
+
+
 @pytest.mark.parametrize(("exit_code", "state"), [(3, "interrupted"), (6, "cancelled"), (5, "failed")])
 def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, exit_code: int, state: str) -> None:
     bench.answer = Answer(number=1, problem="why", exit_code=exit_code)
