@@ -7,8 +7,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from daq_cli.models.diagnosis_candidates import candidates_lines
-from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
-from model.effects.names import effect_on
+from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
 from model.reports.units import shown_unit
 
 if TYPE_CHECKING:
@@ -16,18 +16,12 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 INDENT = 9
-VERDICTS = {
-    "nothing-significant": "NOTHING SIGNIFICANT",
-    "named": "NAMED",
-    "ambiguous": "AMBIGUOUS",
-    "suspected": "SUSPECTED",
-    "unknown-effect": "UNKNOWN EFFECT",
-}
 
 
 def answer_text(found: Diagnosis) -> str:
     """The whole answer."""
-    lines = _filled(VERDICTS[found.verdict], _headline(found), len(VERDICTS[found.verdict]) + 2)
+    verdict = found.verdict.replace("-", " ").upper()
+    lines = _filled(verdict, headline(found), len(verdict) + 2)
     warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
     for number in sorted(warnings):
         lines += ["", *_filled("WARNING", found.notes[number])]
@@ -44,27 +38,6 @@ def answer_text(found: Diagnosis) -> str:
         lines += [] if number in warnings else ["", *_filled("note", note)]
     lines += ["", f"Took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"]
     return "\n".join(lines)
-
-
-def _headline(found: Diagnosis) -> str:
-    adopted = [s for s in found.steps if s.adopted and s.effect is not None]
-    if found.verdict == "named" and adopted:
-        return "; ".join(effect_on(s.effect or "", s.joints) for s in adopted)
-    if found.verdict == "ambiguous" and found.steps:
-        return "; ".join(_name_or_group(s) for s in found.steps if s.adopted)
-    if found.verdict == "suspected":
-        return found.summary.removeprefix("Suspected: ")
-    if found.verdict == "nothing-significant":
-        if any(s.effect is not None for s in found.steps):
-            return "nothing that the held-out traces confirm"
-        return "the model explains these traces within their noise and its tolerances"
-    return "none of the known effects explains what is left"
-
-
-def _name_or_group(step: Step) -> str:
-    if step.group:
-        return "one of " + ", ".join(effect_on(c.effect, c.joints) for c in step.group)
-    return effect_on(step.effect or "", step.joints)
 
 
 def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
@@ -99,7 +72,7 @@ def _left(found: Diagnosis) -> list[str]:
 def _shown(step: Step) -> list[str]:
     lines = _errors(step.rmse_fit, step.rmse_holdout, "before → after (noise)")
     if step.excess_removed_holdout is not None:
-        lines += _filled("", _removed(step.excess_removed_holdout))
+        lines += _filled("", removed_words(step.excess_removed_holdout))
     if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
         lines += _filled("", f"Σλ² {_plain(step.sum_lambda2_before)} → {_plain(step.sum_lambda2_after)}")
     return lines
@@ -117,14 +90,6 @@ def _errors(fitted: Sequence[SignalError], held: Sequence[SignalError], columns:
             lines += _filled("" if lines else "shown", f"rms error on traces {label}, {columns}")
             lines += [f"{'':{INDENT}}  {_error(e)}" for e in errors]
     return lines
-
-
-def _removed(share: float) -> str:
-    """What was removed of the held-out variance beyond noise: all of it, where the error is below its floor."""
-    if share < 0:
-        return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
-    gone = "all" if share >= 1.0 else f"{100 * share:.1f} %"
-    return f"{gone} of the held-out variance beyond noise is gone"
 
 
 def _error(e: SignalError) -> str:

@@ -9,8 +9,9 @@ from typing import Any
 from daq.contracts.documents import parse_json
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
-from daq.contracts.service.jobs import MACHINE, EffectChoice, ModelDetails, ModelParameter
-from model.machine_model.model import Model, base_model
+from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
+from model.effects.names import placed
+from model.machine_model.model import EffectUse, Model, base_model
 from model.machine_model.model_file import load_model, save_model
 from model.machine_model.parameter_words import words_of
 from server.clock import Clock
@@ -94,7 +95,7 @@ class Models:
         model = load_model(self.path_of(identity))
         return ModelDetails(
             entry=entry,
-            effects=tuple(EffectChoice(name=use.name, joints=use.joints) for use in model.effects),
+            effects=tuple(map(_effect, model.effects)),
             parameters=_parameters(model),
             ancestors=self.store.ancestors(self._robot, identity),
         )
@@ -111,6 +112,10 @@ class Models:
         """Deletes a model's row and file. Raises a 404, 409."""
         file = self.store.remove(self._robot, identity)
         (self.folder / file).unlink(missing_ok=True)
+
+
+def _effect(use: EffectUse) -> EffectInModel:
+    return EffectInModel(name=use.name, joints=use.joints, called=placed(use.name, use.joints))
 
 
 def _parameters(model: Model) -> tuple[ModelParameter, ...]:

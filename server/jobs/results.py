@@ -73,23 +73,29 @@ class ComparisonData(_Part):
 
 
 class TriedEffect(Candidate):
-    """An effect that the diagnosis tried."""
+    """An effect that the diagnosis tried. `called`: the effect and its joints as people write them."""
+
+    called: str
 
 
 class DiagnosisStep(Step):
-    """One step of the workflow."""
+    """One step of the workflow. `called`: what was added, as people write it."""
 
+    called: str
     candidates: tuple[TriedEffect, ...]
     group: tuple[TriedEffect, ...] = ()
     chance: float
     """Significance that noise alone exceeds in any cell of `where` in one record out of a hundred."""
+    not_a_finding: str
+    """Why the dependences in `where` are no finding; empty where the diagnosis names one."""
 
 
 class GivenWhere(_Part):
-    """Where the given model disagrees with the traces; `chance` as in a step."""
+    """Where the given model disagrees with the traces; `chance` and `not_a_finding` as in a step."""
 
     where: Where
     chance: float
+    not_a_finding: str
 
 
 class DiagnosisData(Diagnosis):

@@ -22,7 +22,7 @@ from daq.contracts.service.jobs import (
 )
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
-from server.jobs.headlines import of_comparison, of_diagnosis, of_fit, of_validation
+from server.jobs.headlines import of_comparison, of_fit, of_validation
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
 
 if TYPE_CHECKING:
@@ -202,6 +202,7 @@ class _Worker:
     def diagnose(self, request: DiagnoseRequest) -> Ended:
         """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
+        from model.discrepancy.explanation.headline import headline
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
@@ -233,7 +234,7 @@ class _Worker:
             self._keep_model(found.model_after)
         result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given))
         report = diagnosis_report(found, comparison)
-        return self._done(result, report, of_diagnosis(found), found.model_after if changed else None)
+        return self._done(result, report, headline(found), found.model_after if changed else None)
 
     def _compared(
         self,
