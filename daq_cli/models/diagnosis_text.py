@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from daq_cli.models.diagnosis_candidates import candidates_lines
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
-from model.reports.units import shown_unit
+from model.units import shown_unit
 
 if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Diagnosis, FoundValue, NextExperiment, SignalError, Step

@@ -24,7 +24,7 @@ from pydantic import (
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model import layout as at
-from model.effects.effect import EffectFile
+from model.effects.effect import EffectFile, Tone
 from model.effects.library import effect, effect_from
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.nominal import base_parameters, joint_scale, nominal_vector
@@ -102,6 +102,13 @@ class Model(_Part):
         if unknown := sorted(set(self.values) - set(self.by_name)):
             raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
         return self
+
+    @property
+    def disturbances(self) -> tuple[tuple[Parameter, Parameter], ...]:
+        """Sine and cosine of every torque that repeats over time; where joints share one, only that of the first."""
+        own = [p for p in self.parameters if p.effect is not None and effect(p.effect).tone is Tone.OVER_TIME]
+        cosines = {p.joints: p for p in own if p.part == "cosine"}
+        return tuple((p, cosines[p.joints]) for p in own if p.part == "sine" and p.joints in cosines)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

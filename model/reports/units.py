@@ -1,26 +1,12 @@
-"""Units for readers: degrees and millimetres, squares of units, and the unit of each kind of joint."""
+"""The unit of each kind of joint, and units of sums of squares."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-
-_DEGREES = math.degrees(1.0)
-_SHOWN = {"rad": (_DEGREES, "°"), "m": (1e3, "mm"), "rad/s": (_DEGREES, "°/s"), "m/s": (1e3, "mm/s")}
-
-
-def shown_unit(unit: str) -> tuple[float, str]:
-    """Factor and name of the unit to show: degrees for radians, millimetres for metres."""
-    return _SHOWN.get(unit, (1.0, unit))
-
-
-def with_unit(number: str, unit: str) -> str:
-    """A number and its unit as they are written: 3.2°, 3.2 mm."""
-    return f"{number}{'' if unit.startswith('°') else ' '}{unit}"
 
 
 def joint_unit(machine: Machine, joint: int) -> str:

@@ -17,7 +17,7 @@ from model.fitting.options import FitOptions, Prior
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.thesis.check import Check, Choice
-from model.thesis.published_models import FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
+from model.thesis.published_models import BACK_EMF_SYMBOLS, FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
 from model.thesis.tables import (
     BASIC,
     DATA_SHEET_BACK_EMF_2,
@@ -195,7 +195,7 @@ def _prior(symbol: str) -> Prior:
 
 
 def _bounds(symbol: str) -> tuple[float, float]:
-    if symbol.startswith("Kb"):
+    if symbol in BACK_EMF_SYMBOLS:
         return 0.0, LARGEST_BACK_EMF
     if symbol in FRICTION_SYMBOLS:
         return 0.0, LARGEST_FRICTION_ARM if symbol == "μ̃" else LARGEST_VISCOUS

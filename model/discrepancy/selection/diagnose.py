@@ -122,7 +122,7 @@ class _Search:
 def _given_point(observation: Observation, given: Calibration) -> Point:
     """The model as it was given; its derivatives are left at zero. Wrong gains, which the controller's own numbers
     prove, stay as they are."""
-    free = [k for k, u in enumerate(given.unknowns) if u.parameter.effect != "wrong_gain"]
+    free = [k for k, u in enumerate(given.unknowns) if not u.parameter.is_gain_error]
     return point_at(observation, given.only(free), np.zeros((len(free), observation.samples)))
 
 
