@@ -16,6 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.acquisition.messages import EventHappened, Progress
 from daq.config import Settings
 from daq.config.robot_files import load_memory_map
+from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
@@ -82,11 +83,13 @@ class RobotServices:
 
     def require_motion(self, lease: str | None) -> None:
         """Raises a 409 unless this lease has control now and, for a real arm, the operator's consent."""
-        held = self.control.require(lease)
-        identity = self.robot.identity
-        if identity is not None and not identity.simulated and not held.moves_real_arm:
+        self.require_consent(self.control.require(lease).moves_real_arm, "take control again, with moves_real_arm")
+
+    def require_consent(self, given: bool, advice: str) -> None:
+        """Raises a 409 if the robot is a real arm and the operator's consent is not given."""
+        if lacks_consent(self.robot.identity, given):
             line = f"{self.robot.place.url} is a real arm: it moves only with the operator's consent"
-            raise conflict("consent-needed", line, "take control again, with moves_real_arm")
+            raise conflict("consent-needed", line, advice)
 
     def word(self, lease: str | None, said: float) -> Word:
         """Returns the request of a client with this lease to move the arm by hand."""

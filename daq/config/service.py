@@ -17,7 +17,7 @@ def _true_or_false(given: object) -> object:
     raise ValueError("must be true or false")
 
 
-Consent = Annotated[bool, BeforeValidator(_true_or_false)]
+TrueOrFalse = Annotated[bool, BeforeValidator(_true_or_false)]
 """Consent that may move an arm: `true`, and no other value that is merely truthy."""
 
 
@@ -41,7 +41,7 @@ class ServiceSettings(BaseModel):
     """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
     """Whether the service connects to the robot when it starts; connecting moves nothing."""
-    unattended: Consent = False
+    unattended: TrueOrFalse = False
     """Whether the queue may move a real arm while no operator has confirmed being present."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits and diagnoses; short jobs have one of their own."""

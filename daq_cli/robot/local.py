@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts import exit_codes
+from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError, ReachError, SafetyError, SpecError, TraceError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
 
@@ -90,7 +91,9 @@ class LocalRobot:
         with self._connected() as controller:
             return controller.gains()
 
-    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+    def set_gains(
+        self, wanted: Mapping[int, Gain], consent: ConsentPrompt, written: Callable[[int, Gain], None]
+    ) -> str:
         """Raises SafetyError, and writes nothing, for a joint off its set point, which would jump there."""
         from daq.contracts.limp import limp_line, require_no_jump
 
@@ -107,20 +110,20 @@ class LocalRobot:
         with self._connected() as controller:
             return _process(controller)
 
-    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Switches and reads back. Raises SafetyError as `_switchable` does."""
         with self._switchable(while_stopped, consent) as controller:
             controller.write_outputs(1 << output, on << output)
             return _process(controller)
 
-    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Switches and reads back. Raises SafetyError as `_switchable` does."""
         with self._switchable(while_stopped, consent) as controller:
             controller.set_gripper(closed=closed)
             return _process(controller)
 
     @contextmanager
-    def _switchable(self, while_stopped: bool, consent: Consent) -> Iterator[Controller]:
+    def _switchable(self, while_stopped: bool, consent: ConsentPrompt) -> Iterator[Controller]:
         """The controller of an arm whose outputs may be switched now.
 
         Raises SafetyError without the operator's consent on a real arm, and if the arm is stopped, also if this happens
@@ -131,17 +134,17 @@ class LocalRobot:
 
     @contextmanager
     def _consented(
-        self, consent: Consent, check: Callable[[Controller], None] = lambda _controller: None
+        self, consent: ConsentPrompt, check: Callable[[Controller], None] = lambda _controller: None
     ) -> Iterator[Controller]:
         """The controller, with the operator's consent on a real arm. `check` runs before the operator is asked, and
         again afterwards. The port is free while the operator is asked, so that a stop gets through."""
         with self._connected() as controller:
             check(controller)
-            simulated = controller.identity.simulated
-            if simulated or consent.given:
+            identity = controller.identity
+            if not lacks_consent(identity, consent.given):
                 yield controller
                 return
-        consent.require(self.call.port, simulated=simulated)
+        consent.require(self.call.port, identity)
         with self._connected() as controller:
             check(controller)
             yield controller
@@ -175,7 +178,7 @@ class LocalRobot:
         now = "; the set points are the posture measured now" if here else ""
         return ResetDone(f"released: {holds}{now}", limp)
 
-    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Runs the experiment in an acquisition process of its own."""
         from daq_cli.robot.local_run import acquire_locally
 
@@ -215,7 +218,7 @@ class LocalRobot:
 
         return load_program(name)
 
-    def teaching(self, consent: Consent) -> Teaching:
+    def teaching(self, consent: ConsentPrompt) -> Teaching:
         """Teaching with the port held by this process."""
         from daq_cli.robot.local_teaching import LocalTeaching
 

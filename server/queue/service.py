@@ -8,6 +8,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
+from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
 from daq.contracts.service.queue import QueueStatus
@@ -255,8 +256,7 @@ class QueueService:
         return self._consented_connection == self.notices.seen.connections
 
     def _needs_attendance(self) -> bool:
-        identity = self._context.robot.identity
-        return identity is not None and not identity.simulated and not self._context.unattended
+        return lacks_consent(self._context.robot.identity, self._context.unattended)
 
     def _work(self) -> None:
         while True:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
@@ -59,7 +59,9 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return robot.gains().gains
 
-    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+    def set_gains(
+        self, wanted: Mapping[int, Gain], consent: ConsentPrompt, written: Callable[[int, Gain], None]
+    ) -> str:
         """Writes gains. The service refuses a joint off its set point."""
         from daq.contracts.limp import limp_line
 
@@ -74,12 +76,12 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return robot.process()
 
-    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             return control.set_output(output, on=on, while_stopped=while_stopped)
 
-    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             return control.set_gripper(closed=closed, while_stopped=while_stopped)
@@ -96,7 +98,7 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return ResetDone(robot.reset(here=here).text)
 
-    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Queues the experiment at the service."""
         del machine  # the service has its own
         from daq_cli.robot.remote.run import acquire_remotely
@@ -138,7 +140,7 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return kept_program(robot, str(name))
 
-    def teaching(self, consent: Consent) -> Teaching:
+    def teaching(self, consent: ConsentPrompt) -> Teaching:
         """Returns teaching with control of the service's robot."""
         from daq_cli.robot.remote.teach import RemoteTeaching
 
