@@ -8,6 +8,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
+from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
@@ -15,7 +16,7 @@ from daq.contracts.service.queue import QueueStatus
 from server.experiments.endings import Ending, ending_of
 from server.experiments.order import next_due
 from server.experiments.states import Event, IllegalEventError, advance
-from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
+from server.owner.messages import Answer, ArmReport, HaltRun, Opened, Report, RunExperiment
 from server.problems import ProblemError, conflict
 from server.queue.attendance import Attendance
 from server.queue.context import QueueContext
@@ -138,6 +139,17 @@ class QueueService:
         self._notice_absence()  # a late confirmation does not undo the absence before it
         self._attendance.say()
         self.wake()
+
+    def on_report(self, report: Report) -> None:
+        """Hears what the owner of the robot's port reports."""
+        if isinstance(report, Progress):
+            self.progressed(report.fraction, report.text)
+        elif isinstance(report, ArmReport):
+            self.on_arm_report(report)
+        elif isinstance(report, Opened):
+            self.connection_made()
+        elif isinstance(report, EventHappened):
+            self.wake()
 
     def on_arm_report(self, arm: ArmReport) -> None:
         """Handles a report of the arm: a stop, a fault or a lost link pauses the queue. Must not block."""
