@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.app.consent import ConsentPrompt
-    from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+    from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
     from daq_cli.robot.pendant import Teaching
 
 
@@ -40,7 +40,7 @@ class RobotAccess(Protocol):
     def require_reached(self) -> None:
         """Connects, without sending anything that could move the arm, and raises the errors of connecting."""
 
-    def view(self) -> RobotView:
+    def state(self) -> RobotState:
         """Posture, state and link, as they are now."""
 
     def gains(self) -> Mapping[int, Gain]:
@@ -68,8 +68,8 @@ class RobotAccess(Protocol):
             reached: ports whose processes have been asked already.
         """
 
-    def reset(self, *, here: bool) -> ResetDone:
-        """Ends the freeze of a stop; with `here` the measured posture becomes the set points first."""
+    def reset(self, *, adopt_posture: bool) -> ResetDone:
+        """Ends the freeze of a stop; with `adopt_posture` the measured posture becomes the set points first."""
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Runs an experiment and shows its progress; its trace is in `folder` then. Ctrl-C stops the arm.

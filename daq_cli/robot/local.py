@@ -15,7 +15,7 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError, ReachError, SafetyError, SpecError, TraceError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
 
 if TYPE_CHECKING:
     from daq.acquisition.messages import Finished
@@ -73,7 +73,7 @@ class LocalRobot:
         with self._controller():
             pass
 
-    def view(self) -> RobotView:
+    def state(self) -> RobotState:
         """The state that the board reports now."""
         from daq.contracts.limp import limp_joints
 
@@ -84,7 +84,7 @@ class LocalRobot:
         state = ", ".join(flag.name.lower().replace("_", " ") for flag in board.flags if flag.name) or "no flags"
         kind = "mock" if controller.identity.simulated else "REAL ARM"
         missed = f"{board.missed} set points missed since power-up"
-        return RobotView(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
+        return RobotState(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
 
     def gains(self) -> Mapping[int, Gain]:
         """Reads the board."""
@@ -155,7 +155,7 @@ class LocalRobot:
 
         return stop_configured(self.call, reached)
 
-    def reset(self, *, here: bool) -> ResetDone:
+    def reset(self, *, adopt_posture: bool) -> ResetDone:
         """Ends the stop that the board is in. Raises NotFrozenError."""
         from daq.contracts.limp import limp_line
         from firmware_protocol.commands import StatusFlag
@@ -163,7 +163,7 @@ class LocalRobot:
         with self._connected() as controller:
             status = controller.status()
             frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # this ends no stop that comes later
-            if here:
+            if adopt_posture:
                 # A second stop would change nothing: the board measures the posture when a stop begins.
                 controller.release(stop)
                 stopped = controller.stop()
@@ -172,10 +172,10 @@ class LocalRobot:
                 stop = controller.status().stop
             controller.release(stop)
             limp = limp_line(controller.gains())
-        if not frozen and not here:
+        if not frozen and not adopt_posture:
             return ResetDone("was not stopped", limp)
         holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
-        now = "; the set points are the posture measured now" if here else ""
+        now = "; the set points are the posture measured now" if adopt_posture else ""
         return ResetDone(f"released: {holds}{now}", limp)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:

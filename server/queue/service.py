@@ -363,7 +363,7 @@ class QueueService:
             ending = self._with_stop_reason(ending, self._running)
             state = advance("running", ending.event)
             why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
-            paused = ending.holds_queue and self._pause(why)  # first, so that clients told of the end find it paused
+            paused = ending.pauses_queue and self._pause(why)  # first, so that clients told of the end find it paused
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from daq.contracts.errors import SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
@@ -45,14 +45,14 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             connected_status(robot)
 
-    def view(self) -> RobotView:
+    def state(self) -> RobotState:
         """Returns the state as the service knows it, with the age of the sample."""
         from daq.contracts.status import report_of
 
         with remote_robot(self.call) as robot:
             found = robot.status()
             gains = robot.gains().gains if found.limp else {}
-        return RobotView(report_of(found, self.server), _headline(found), gains)
+        return RobotState(report_of(found, self.server), _headline(found), gains)
 
     def gains(self) -> Mapping[int, Gain]:
         """The gains that the service has read."""
@@ -93,10 +93,10 @@ class RemoteRobot:
 
         return stop_at_server(self.call)
 
-    def reset(self, *, here: bool) -> ResetDone:
+    def reset(self, *, adopt_posture: bool) -> ResetDone:
         """Has the service end the stop."""
         with remote_robot(self.call) as robot:
-            return ResetDone(robot.reset(here=here).text)
+            return ResetDone(robot.reset(here=adopt_posture).text)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Queues the experiment at the service."""

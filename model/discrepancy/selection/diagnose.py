@@ -197,10 +197,10 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
 def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: ExperimentChooser | None) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
-    left = _unexplained_joints(case, found, looked)
-    answered = verdict((*proved, *found.steps), unexplained=bool(left))
+    joints = _unexplained_joints(case, found, looked)
+    answered = verdict((*proved, *found.steps), unexplained=bool(joints))
     if answered == "unknown-effect":
-        found = _withdraw(found, left)
+        found = _withdraw(found, joints)
     current, steps = update_to_last_fit(found.current, found.steps)
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
@@ -220,7 +220,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
         verdict=answered,
         summary=UNWRITTEN,
         method="output-error",
-        unexplained_joints=left if unknown else (),
+        unexplained_joints=joints if unknown else (),
         worse_held_out=worse_held_out(held) if unknown else (),
         steps=(*proved, *found.steps),
         where=where,
@@ -262,12 +262,12 @@ def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tupl
     return tuple(sorted({*left, *closer, *places}))
 
 
-def _withdraw(found: _Search, left: Sequence[int]) -> _Search:
+def _withdraw(found: _Search, unexplained_joints: Sequence[int]) -> _Search:
     """The search before its first step on a joint that stays unexplained."""
-    wrong = first_to_withdraw(found.steps, left)
+    wrong = first_to_withdraw(found.steps, unexplained_joints)
     if wrong is None:
         return found
-    steps = (*found.steps[:wrong], *(withdrawn(s, left) for s in found.steps[wrong:]))
+    steps = (*found.steps[:wrong], *(withdrawn(s, unexplained_joints) for s in found.steps[wrong:]))
     return replace(found, current=found.before[wrong], steps=steps, tried=None)  # it was tried against another point
 
 
