@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
+from pydantic import BeforeValidator, Field, field_validator
+
+from daq.contracts.frozen import FrozenRecord
 
 DEFAULT_PORT = 8300
 
@@ -21,10 +23,8 @@ TrueOrFalse = Annotated[bool, BeforeValidator(_true_or_false)]
 """Consent that may move an arm: `true`, and no other value that is merely truthy."""
 
 
-class ServiceSettings(BaseModel):
+class ServiceSettings(FrozenRecord):
     """Section `[server]`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     host: Annotated[str, Field(min_length=1, max_length=253)] = "127.0.0.1"
     """Address to listen at. Anything but loopback needs tokens (`daq token add`)."""

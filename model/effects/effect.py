@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.effects import EffectName, effect_names
+from daq.contracts.frozen import FrozenRecord
 from model import layout as at
 
 
@@ -94,10 +93,8 @@ class Tone(StrEnum):
     OVER_TIME = "frequency"
 
 
-class EffectFile(BaseModel):
+class EffectFile(FrozenRecord):
     """The file that an effect of the user's own comes from: its name, and the first digits of its SHA-256."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
     sha256: str

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel, Progress, silent
 from daq.contracts.trace import Trace
@@ -61,11 +60,7 @@ PLAIN = FitOptions(
 """Options of a fit to the source's squared error, which has no priors, weights, nuisances or noise."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class LadderStep(_Part):
+class LadderStep(FrozenRecord):
     """One model: fitted values by the source's symbols beside the published ones, errors (rad²), Σλ²."""
 
     name: str
@@ -81,7 +76,7 @@ class LadderStep(_Part):
     seconds: float
 
 
-class Ladder(_Part):
+class Ladder(FrozenRecord):
     """The four models fitted by one method to the same traces, from the unoptimised model's error on."""
 
     method: Method

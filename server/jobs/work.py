@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import DaqError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import (
@@ -44,10 +43,8 @@ MAP_SHARE, REPORT_SHARE = 0.94, 0.98
 """Share of the progress before the map of disagreement of a diagnosis, and before the report."""
 
 
-class Task(BaseModel):
+class Task(FrozenRecord):
     """The input of a worker: the request, and the files of the traces and models that it names."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     request: JobRequest
     machine: Machine
