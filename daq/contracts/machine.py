@@ -34,8 +34,6 @@ from daq.contracts.quantity import (
 from firmware_protocol.invalid import first_invalid
 from firmware_protocol.units import DriveScale, JointCalibration
 
-Unitful = Annotated[Quantity, Field()]
-
 
 def _positive(quantity: Quantity) -> Quantity:
     if not quantity.value > 0.0:

@@ -6,16 +6,23 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from daq_cli.models.diagnosis_candidates import candidates_lines
+from model.discrepancy.diagnosis import in_order
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
+from model.effects.names import effect_on
 from model.units import shown_unit
 
 if TYPE_CHECKING:
-    from model.discrepancy.diagnosis import Diagnosis, FoundValue, NextExperiment, SignalError, Step
+    from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
 
 WIDTH = 100
 INDENT = 9
+FITTED = 5
+"""Fitted candidates that are listed; those that the step names always are."""
+PROBED = 2
+"""Probed candidates that are listed: few, because their estimates are not comparable with those of fits."""
+COLUMN = 10
+"""Width of the column of evidence."""
 
 
 def answer_text(found: Diagnosis) -> str:
@@ -50,6 +57,31 @@ def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
     if not step.adopted and step.effect is not None:
         lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
     return lines + _shown(step)
+
+
+def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
+    """The list of a step, a line each; empty where nothing was tried (what the controller's own numbers prove).
+
+    earlier: the steps before; a probe of a candidate that they fitted is not listed again.
+    """
+    if not step.candidates:
+        return []
+    tried = {(s.effect, s.joints) for s in earlier}
+    fitted, probed = in_order([c for c in step.candidates if c.refitted or (c.effect, c.joints) not in tried])
+    named = {(step.effect, step.joints), *((c.effect, c.joints) for c in step.group)}
+    shown = [c for rank, c in enumerate(fitted) if rank < FITTED or (c.effect, c.joints) in named]
+    lines = [f"{'evidence':>{COLUMN}}", *map(_candidate, shown)]
+    promising = [c for c in probed if c.evidence > 0][:PROBED]
+    if promising:
+        lines += ["promised by probes alone (not fitted)", *map(_candidate, promising)]
+    if more := len(fitted) + len(probed) - len(shown) - len(promising):
+        lines.append(f"{'':{COLUMN}}  and {more} more")
+    return lines
+
+
+def _candidate(candidate: Candidate) -> str:
+    misfit = "" if candidate.misfit is None else f"   misfit {candidate.misfit:.2f}"
+    return f"{candidate.evidence:{COLUMN}.0f}  {effect_on(candidate.effect, candidate.joints)}{misfit}"
 
 
 def _without_steps(found: Diagnosis) -> list[str]:
