@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Any, Literal
 
 from daq.contracts.frozen import FrozenRecord
@@ -96,6 +97,18 @@ class Reason(FrozenRecord):
     removed: float | None = None
     slides: bool = False
     rival: NamedEffect | None = None
+
+
+class ControllerEffect(StrEnum):
+    """Effects of the controller, which its own recorded numbers prove or exclude."""
+
+    WRONG_GAIN = "wrong_gain"
+    LOST_SET_POINTS = "lost_set_points"
+
+    @property
+    def part(self) -> str:
+        """The effect's only number."""
+        return "relative" if self is ControllerEffect.WRONG_GAIN else "share"
 
 
 class ControllerProof(FrozenRecord):

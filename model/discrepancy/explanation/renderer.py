@@ -30,7 +30,7 @@ from model.discrepancy.diagnosis import (
 from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.pattern_words import pattern_words
-from model.discrepancy.grounds import NamedEffect, Reason, Refusal
+from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
 from model.discrepancy.numbers import from_to, plain
 from model.effects.names import capitalised, effect_on, joints_in_words, placed
 
@@ -269,7 +269,7 @@ def _proof(step: Step) -> str:
     """What the controller's own recorded numbers prove, as a clause."""
     assert step.proof is not None
     joint, samples, of = step.joints[0], step.proof.samples, step.proof.of
-    if step.effect == "wrong_gain":
+    if step.effect == ControllerEffect.WRONG_GAIN:
         ratio = 1 + next(iter(step.parameters.values())).value
         share = f"{samples} of {of} samples"
         return f"joint {joint}: the recorded power is {ratio:.3f} times the gain times the recorded error ({share})"

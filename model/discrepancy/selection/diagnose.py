@@ -21,7 +21,7 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, W
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
-from model.discrepancy.grounds import Note
+from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
@@ -47,8 +47,6 @@ from model.machine_model.model import Lineage, Model
 
 MOST_REFUSALS = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
-CONTROLLER_EFFECTS = ("wrong_gain", "lost_set_points")
-"""Effects of the controller, which do not show where the recorded drive is the input: its own numbers tell them."""
 FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 FIRST_STEPS = 6
@@ -70,7 +68,8 @@ def diagnose_by_simulation(
     findings = check_controller(traces, model.machine, model)
     excluded = settled_by_records(traces, model.machine)
     traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
-    if any(f.effect == "lost_set_points" for f in findings):  # the set points that were used are known to the count
+    if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
+        # The set points that were used are known to the count.
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
     if isinstance(model.machine.controller, SampledPid):
         traces, holdout = (tuple(map(thinned, some)) for some in (traces, holdout))
@@ -78,7 +77,8 @@ def diagnose_by_simulation(
     known = with_findings(model, findings)
     given = _given_point(*observe(known, traces))
     if given.observation.drive_is_input:
-        excluded = CONTROLLER_EFFECTS  # the plant gets the drive that was recorded, whatever the controller has done
+        # The plant gets the drive that was recorded, whatever the controller has done.
+        excluded = tuple(effect.value for effect in ControllerEffect)
     fitted = judge(_fit_tolerances(given))
     case = build_case(model, given, fitted.point, traces, hold_out(known, holdout), options, excluded)
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
