@@ -31,7 +31,7 @@ import numpy as np
 from benchmarks.figures import Figure, show
 from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import RunningMock, started_mock
-from benchmarks.own_desk import environment_of
+from benchmarks.own_environment import environment_of
 from benchmarks.service_process import COMMAND, child
 from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine, load_machine
@@ -97,7 +97,7 @@ class Undisturbed:
 
 
 @dataclass
-class Desk:
+class Workspace:
     """One run: a mock of its own and a folder of its own."""
 
     folder: Path
@@ -128,19 +128,19 @@ class Desk:
 
 
 @contextlib.contextmanager
-def desk() -> Iterator[Desk]:
+def workspace() -> Iterator[Workspace]:
     """A fresh one."""
     with (
         tempfile.TemporaryDirectory() as name,
         started_mock(*MOCK) as mock,
         MockControl(mock.control) as control,
     ):
-        yield Desk(Path(name), mock, control)
+        yield Workspace(Path(name), mock, control)
 
 
 def undisturbed() -> Undisturbed:
     """The run that all others are held against. Raises RuntimeError where it fails."""
-    with desk() as here:
+    with workspace() as here:
         begun = time.monotonic()
         run = here.start()
         until_acquiring(run)
@@ -164,32 +164,32 @@ def until_acquiring(run: subprocess.Popen[bytes]) -> int:
         time.sleep(0.002)
 
 
-def after(share: float, way: Way, whole: Undisturbed) -> Callable[[Desk], None]:
+def after(share: float, way: Way, whole: Undisturbed) -> Callable[[Workspace], None]:
     """Waits for a share (0 to 1) of what the undisturbed run took from the start of the process that is met."""
-    return lambda _desk: time.sleep(share * (whole.acquisition if way.acquisition else whole.command))
+    return lambda _workspace: time.sleep(share * (whole.acquisition if way.acquisition else whole.command))
 
 
-def within_the_record(share: float, whole: Undisturbed) -> Callable[[Desk], None]:
+def within_the_record(share: float, whole: Undisturbed) -> Callable[[Workspace], None]:
     """Waits until there is a record, and then for a share (0 to 1) of what the undisturbed run took to make it."""
 
-    def wait(here: Desk) -> None:
+    def wait(here: Workspace) -> None:
         once_recording(here)
         time.sleep(share * whole.record)
 
     return wait
 
 
-def once_recording(here: Desk) -> None:
+def once_recording(here: Workspace) -> None:
     """Waits until so much of the run has gone by on the board that its record is well under way."""
     while here.control.ask("state")["tick"] < RECORDING_FROM:
         time.sleep(0.002)
 
 
 def end_one(
-    way: Way, moment: Callable[[Desk], None], label: str, whole: Undisturbed, machine: Machine, findings: Findings
+    way: Way, moment: Callable[[Workspace], None], label: str, whole: Undisturbed, machine: Machine, findings: Findings
 ) -> None:
     """One run, ended when `moment` returns."""
-    with desk() as here:
+    with workspace() as here:
         run = here.start()
         acquisition = until_acquiring(run) if way.acquisition else None
         moment(here)
@@ -228,7 +228,7 @@ def _runs(process: int) -> bool:
         return False
 
 
-def _check(here: Desk, way: Way, label: str, whole: Undisturbed, machine: Machine, findings: Findings) -> None:
+def _check(here: Workspace, way: Way, label: str, whole: Undisturbed, machine: Machine, findings: Findings) -> None:
     """What is left of a run: the mock's record first, which a look at the arm pushes out of its ring."""
     kept = {one["tick"]: one for one in here.control.ask("snapshots")["snapshots"]}
     state = here.control.ask("state")
@@ -289,7 +289,7 @@ def _is_kept(trace: Trace, row: int, kept: dict[str, Any] | None, machine: Machi
     return True
 
 
-def _after(here: Desk) -> list[str]:
+def _after(here: Workspace) -> list[str]:
     """What is wrong with the port, or with the arm behind it."""
     try:
         with Controller.connect(here.url) as controller:

@@ -14,7 +14,7 @@ from typing import Any
 
 import httpx
 
-from benchmarks.own_desk import environment_of
+from benchmarks.own_environment import environment_of
 
 ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0

@@ -31,7 +31,7 @@ from typing import Any
 
 from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.mock_control import MockControl
-from benchmarks.own_desk import environment_of
+from benchmarks.own_environment import environment_of
 from daq.acquisition.guardian import Guardian
 from daq.acquisition.stop_socket import FOLDER_VARIABLE, StopAnswer, request_stop, stop_listener
 from daq.driver import Controller
@@ -99,14 +99,14 @@ def _stop_later(controller: Controller, after_s: float, asked: list[tuple[float,
     asked.append((at, controller.stop().acknowledged))
 
 
-def _by_thread(host: Connection, after_s: float, _desk: Path) -> tuple[float, bool]:
+def _by_thread(host: Connection, after_s: float, _folder: Path) -> tuple[float, bool]:
     host.send(after_s)
     host.recv()
     ((at, confirmed),) = host.recv()
     return at, confirmed
 
 
-def _by_socket(host: Connection, after_s: float, _desk: Path) -> tuple[float, bool]:
+def _by_socket(host: Connection, after_s: float, _folder: Path) -> tuple[float, bool]:
     host.send("run")
     host.recv()
     time.sleep(after_s)
@@ -116,21 +116,21 @@ def _by_socket(host: Connection, after_s: float, _desk: Path) -> tuple[float, bo
     return at, len(attempts) == 1 and attempts[0].answer is not None and attempts[0].answer.confirmed
 
 
-def _by_command(host: Connection, after_s: float, desk: Path) -> tuple[float, bool]:
+def _by_command(host: Connection, after_s: float, folder: Path) -> tuple[float, bool]:
     host.send("run")
     host.recv()
     time.sleep(after_s)
     at = time.monotonic()
-    code = stop_command(desk)
+    code = stop_command(folder)
     host.recv()
     return at, code == 0
 
 
-def stop_command(desk: Path, run_process: Callable[..., Any] = subprocess.run) -> int:
-    """The exit code of `daq stop` at a desk of its own, where it finds the robots of this benchmark and no other."""
+def stop_command(folder: Path, run_process: Callable[..., Any] = subprocess.run) -> int:
+    """The exit code of `daq stop` in a folder of its own, where it finds the robots of this benchmark and no other."""
     command = [str(Path(sys.executable).with_name("daq")), "stop"]
-    environment = environment_of(desk)
-    ended = run_process(command, stdout=subprocess.DEVNULL, check=False, cwd=desk, env=environment)
+    environment = environment_of(folder)
+    ended = run_process(command, stdout=subprocess.DEVNULL, check=False, cwd=folder, env=environment)
     code: int = ended.returncode
     return code
 
@@ -147,8 +147,8 @@ def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
     raise RuntimeError(f"stop {number} never had an effect: the mock recorded {stop}")
 
 
-def measure(url: str, repeats: int, desk: Path) -> tuple[dict[str, Stops], int, dict[str, int]]:
-    """Stops by thread, socket and command (its folder: `desk`); repetitions the host needed; lateness of the mock."""
+def measure(url: str, repeats: int, folder: Path) -> tuple[dict[str, Stops], int, dict[str, int]]:
+    """Stops by thread, socket and command, in `folder`; repetitions the host needed; lateness of the mock."""
     dice = random.Random(1991)
     ways: list[tuple[str, Callable[[Connection, float, Path], tuple[float, bool]], int]] = [
         ("by a thread", _by_thread, repeats),
@@ -165,7 +165,7 @@ def measure(url: str, repeats: int, desk: Path) -> tuple[dict[str, Stops], int, 
         for where, way, times in ways:
             stops = results[where]
             for _ in range(times):
-                at, confirmed = way(host, dice.uniform(3 * PERIOD_S, 4 * PERIOD_S), desk)
+                at, confirmed = way(host, dice.uniform(3 * PERIOD_S, 4 * PERIOD_S), folder)
                 number += 1
                 frozen, used = record_of_stop(control, number)
                 stops.frozen.append(1e3 * (frozen - at))
@@ -214,11 +214,11 @@ def main() -> int:
     given = parser.parse_args()
     repeats = 30 if given.quick else given.repeats
     figures = []
-    with tempfile.TemporaryDirectory() as folder:
-        desk = Path(folder)
-        os.environ[FOLDER_VARIABLE] = environment_of(desk)[FOLDER_VARIABLE]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.environ[FOLDER_VARIABLE] = environment_of(folder)[FOLDER_VARIABLE]
         for line, url in (("clean", URL), ("1 % damaged", URL + FAULTS)):
-            figures += figures_of(line, *measure(url, repeats, desk))
+            figures += figures_of(line, *measure(url, repeats, folder))
     return show("Stop, at 115200 baud", "python -m benchmarks stop_latency", figures)
 
 

@@ -1,8 +1,9 @@
-"""Errors of the database, in one line that names the table. Imports no database library."""
+"""Errors of the database, in one line that names the table. Does not import SQLAlchemy."""
 
 from __future__ import annotations
 
 import re
+import sqlite3
 from typing import TYPE_CHECKING
 
 from daq.contracts import exit_codes
@@ -13,16 +14,9 @@ if TYPE_CHECKING:
 
 BRING_BACK = "`daq restore FILE --overwrite` restores a backup"
 TRY_AGAIN = "try again; if this goes on, see the database's own log"
-_DAMAGE = (
-    "disk image is malformed",
-    "malformed database schema",
-    "file is not a database",
-    "no such table",
-    "no such column",
-    "duplicate column name",
-    "already exists",
-)
-"""Parts of SQLite's messages that mean that the file or its tables are damaged. The last two come from migrations."""
+_DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
+"""SQLite's result codes that mean that the file or its tables are damaged. The last one is that of a table or column
+that a statement does not find, or that a migration finds already."""
 _TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
 _LONGEST = 200
 
@@ -45,14 +39,24 @@ def line_of(error: DatabaseError) -> str:
     return f"{f'table {table}: ' if table else ''}{one_line(error.orig or error)}"
 
 
-def advice_of(line: str) -> str:
+def advice_of(error: DatabaseError) -> str:
     """Returns what helps: a backup against damage, disk space if the disk is full, patience against anything else.
 
-    A restored backup loses everything written after it, so only SQLite's own messages about damage lead to this advice.
+    A restored backup loses everything written after it, so only SQLite's own codes of damage lead to this advice.
     """
-    if "database or disk is full" in line:
+    if is_full(error):
         return "make room on its disk"
-    return BRING_BACK if any(words in line for words in _DAMAGE) else TRY_AGAIN
+    return BRING_BACK if _result_code(error) in _DAMAGE else TRY_AGAIN
+
+
+def is_full(error: DatabaseError) -> bool:
+    """Whether SQLite found the disk full."""
+    return _result_code(error) == sqlite3.SQLITE_FULL
+
+
+def _result_code(error: DatabaseError) -> int | None:
+    """SQLite's primary result code; None from another database. The higher bits tell the reason more exactly."""
+    return error.orig.sqlite_errorcode & 0xFF if isinstance(error.orig, sqlite3.Error) else None
 
 
 def one_line(error: object) -> str:

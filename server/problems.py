@@ -13,7 +13,7 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
 from firmware_protocol.invalid import message_of
-from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of
+from server.database_errors import BRING_BACK, DamagedError, advice_of, is_full, line_of
 
 if TYPE_CHECKING:
     from fastapi import FastAPI, Request
@@ -97,9 +97,9 @@ def of_database(error: DatabaseError) -> ProblemError:
     """Returns a 503 that names the table, or a 507 if the disk is full."""
     line = line_of(error)
     log.error("database: %s", line)
-    if "full" in str(error.orig):
+    if is_full(error):
         return ProblemError(507, "no-room", "the disk of the database is full", "free some space on it")
-    return ProblemError(503, "database", f"the database: {line}", advice_of(line))
+    return ProblemError(503, "database", f"the database: {line}", advice_of(error))
 
 
 def of_damage(error: DamagedError) -> ProblemError:

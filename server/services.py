@@ -13,9 +13,9 @@ from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from daq.acquisition.messages import EventHappened, Progress
 from daq.config import Settings
 from daq.config.robot_files import load_memory_map
+from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
@@ -35,7 +35,7 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
-from server.owner.messages import Answer, ArmReport, Opened, Report
+from server.owner.messages import Answer
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
@@ -82,11 +82,13 @@ class RobotServices:
 
     def require_motion(self, lease: str | None) -> None:
         """Raises a 409 unless this lease has control now and, for a real arm, the operator's consent."""
-        held = self.control.require(lease)
-        identity = self.robot.identity
-        if identity is not None and not identity.simulated and not held.moves_real_arm:
+        self.require_consent(self.control.require(lease).moves_real_arm, "take control again, with moves_real_arm")
+
+    def require_consent(self, given: bool, advice: str) -> None:
+        """Raises a 409 if the robot is a real arm and the operator's consent is not given."""
+        if lacks_consent(self.robot.identity, given):
             line = f"{self.robot.place.url} is a real arm: it moves only with the operator's consent"
-            raise conflict("consent-needed", line, "take control again, with moves_real_arm")
+            raise conflict("consent-needed", line, advice)
 
     def word(self, lease: str | None, said: float) -> Word:
         """Returns the request of a client with this lease to move the arm by hand."""
@@ -169,19 +171,50 @@ class Services:
         self.motions.close()
 
     def _make_robot(self, settings: Settings) -> RobotServices:
-        name, folder = settings.robot.name, settings.traces.folder.absolute()
-        memory_map: str | None = None
-        if settings.robot.memory_map is not None:
-            load_memory_map(settings.robot.memory_map)
-            memory_map = settings.robot.memory_map.read_text("utf-8")
-        robot = Robot(RobotPlace(name, settings.port, settings.machine(), folder, memory_map), self.clock)
+        robot = Robot(_place(settings), self.clock)
+        name, folder = robot.place.name, robot.place.folder
         control = ControlService(
             self.clock, lambda holder: self._lapsed(robot, holder), lambda holder: self._given_back(robot, holder)
         )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
+        queue = self._make_queue(robot, control, catalogue, unattended=settings.server.unattended)
+        # After the loss of a process that wrote a trace, its part file is finished and found.
+        robot.disconnected.append(lambda _why: self._take_in(catalogue))
+        teaching = TeachingService(robot, lambda line: self.record_event_later(name, "teaching", line))
+        history = History(len(robot.machine.joints), control_period(robot.machine), settings.server.history)
+
+        def status() -> RobotStatus:
+            return self._robots[name].status()
+
+        hub = Hub(self.clock, history, status)
+        robot.listeners.append(hub.on_report)
+        robot.listeners.append(lambda report: self.metrics.count_report(name, report))
+        robot.disconnected.append(lambda _why: hub.look())
+        models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
+        jobs = JobService(
+            JobContext(
+                robot=name,
+                machine=robot.machine,
+                folder=self.folder / "jobs",
+                jobs=self.jobs,
+                catalogue=catalogue,
+                models=models,
+                clock=self.clock,
+                changed=lambda job: self._job_changed(hub, job),
+                at_once=settings.server.jobs_at_once,
+            )
+        )
+        stop = StopService(robot)
+        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models)
+
+    def _make_queue(
+        self, robot: Robot, control: ControlService, catalogue: Catalogue, *, unattended: bool
+    ) -> QueueService:
+        """Returns the queue of a robot, which hears the robot's reports."""
+
         def record_event(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
-            self.record_event(name, kind, text, actor=actor, experiment=experiment)
+            self.record_event(robot.name, kind, text, actor=actor, experiment=experiment)
 
         def add_trace(answer: Answer) -> None:
             assert answer.finished is not None
@@ -198,50 +231,12 @@ class Services:
                 record_event=record_event,
                 add_trace=add_trace,
                 add_unfinished_traces=lambda: self._take_in(catalogue),
-                unattended=settings.server.unattended,
+                unattended=unattended,
             )
         )
-
-        def on_report(report: Report) -> None:
-            if isinstance(report, Progress):
-                queue.progressed(report.fraction, report.text)
-            elif isinstance(report, ArmReport):
-                queue.on_arm_report(report)
-            elif isinstance(report, Opened):
-                queue.connection_made()
-            elif isinstance(report, EventHappened):
-                queue.wake()
-
-        robot.listeners.append(on_report)
+        robot.listeners.append(queue.on_report)
         robot.disconnected.append(queue.connection_ended)
-        # After the loss of a process that wrote a trace, its part file is finished and found.
-        robot.disconnected.append(lambda _why: self._take_in(catalogue))
-        teaching = TeachingService(robot, lambda line: self.record_event_later(name, "teaching", line))
-        history = History(len(robot.machine.joints), control_period(robot.machine), settings.server.history)
-
-        def status() -> RobotStatus:
-            return self._robots[name].status()
-
-        hub = Hub(self.clock, history, status)
-        robot.listeners.append(hub.on_report)
-        robot.listeners.append(lambda report: self.metrics.count_report(name, report))
-        robot.disconnected.append(lambda _why: hub.look())
-        stop = StopService(robot)
-        models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
-        jobs = JobService(
-            JobContext(
-                robot=name,
-                machine=robot.machine,
-                folder=self.folder / "jobs",
-                jobs=self.jobs,
-                catalogue=catalogue,
-                models=models,
-                clock=self.clock,
-                changed=lambda job: self._job_changed(hub, job),
-                at_once=settings.server.jobs_at_once,
-            )
-        )
-        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models)
+        return queue
 
     def record_event(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
@@ -299,3 +294,13 @@ def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
         thread.start()
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
+
+
+def _place(settings: Settings) -> RobotPlace:
+    """Returns where the configured robot is. Raises an error for a memory map that cannot be used."""
+    path = settings.robot.memory_map
+    if path is not None:
+        load_memory_map(path)
+    memory_map = None if path is None else path.read_text("utf-8")
+    folder = settings.traces.folder.absolute()
+    return RobotPlace(settings.robot.name, settings.port, settings.machine(), folder, memory_map)

@@ -5,19 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, TypeAdapter
+from pydantic import Field, StrictBool, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Outcome, TraceEvent
 
 
-class _Message(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Job(_Message):
+class Job(FrozenRecord):
     """One experiment to run: the first line that the process reads.
 
     `moves_real_arm` is the operator's consent: without it a controller that is not simulated is refused.
@@ -37,7 +34,7 @@ class Job(_Message):
     report_samples: bool = False
 
 
-class Progress(_Message):
+class Progress(FrozenRecord):
     """How far the run is."""
 
     kind: Literal["progress"] = "progress"
@@ -45,14 +42,14 @@ class Progress(_Message):
     text: str
 
 
-class EventHappened(_Message):
+class EventHappened(FrozenRecord):
     """Something that is in the trace too."""
 
     kind: Literal["event"] = "event"
     event: TraceEvent
 
 
-class Sampled(_Message):
+class Sampled(FrozenRecord):
     """One sample, for a live view; columns in the order of `joints`."""
 
     kind: Literal["sample"] = "sample"
@@ -65,7 +62,7 @@ class Sampled(_Message):
     status: int
 
 
-class Finished(_Message):
+class Finished(FrozenRecord):
     """The run is over and its trace is closed."""
 
     kind: Literal["finished"] = "finished"
@@ -77,7 +74,7 @@ class Finished(_Message):
     reason: str = ""
 
 
-class Failed(_Message):
+class Failed(FrozenRecord):
     """Nothing was recorded: why, in one line, and the exit code that goes with it. `needs_consent`: the robot is real
     and waits for the operator's word."""
 

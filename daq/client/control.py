@@ -12,12 +12,12 @@ from pydantic import BaseModel
 from daq.client.connection import Connection, Request
 from daq.client.errors import ServiceError, ServiceNotReachedError
 from daq.contracts import exit_codes
+from daq.contracts.consent import require_word
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.service.queue import ControlLease, ControlRequest
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
 from daq.contracts.service.teaching import JogRequest, LeadRequest, StepRequest, TeachingStatus
-from daq.contracts.word import require_word
 
 HEADER = "Control-Lease"
 T = TypeVar("T")

@@ -8,6 +8,7 @@ from datetime import datetime
 from uuid import uuid4
 
 from daq.client.connection import Connection, Request
+from daq.contracts.consent import require_word
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import (
     ENDS,
@@ -21,7 +22,6 @@ from daq.contracts.service.experiments import (
     ScheduleRequest,
 )
 from daq.contracts.service.queue import QueueResume, QueueStatus
-from daq.contracts.word import require_word
 
 WAIT = 30.0
 """Time (s) that one request for the end of an experiment waits at the service."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
+from pydantic import BeforeValidator, Field, field_validator
+
+from daq.contracts.frozen import FrozenRecord
 
 DEFAULT_PORT = 8300
 
@@ -17,14 +19,12 @@ def _true_or_false(given: object) -> object:
     raise ValueError("must be true or false")
 
 
-Consent = Annotated[bool, BeforeValidator(_true_or_false)]
+TrueOrFalse = Annotated[bool, BeforeValidator(_true_or_false)]
 """Consent that may move an arm: `true`, and no other value that is merely truthy."""
 
 
-class ServiceSettings(BaseModel):
+class ServiceSettings(FrozenRecord):
     """Section `[server]`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     host: Annotated[str, Field(min_length=1, max_length=253)] = "127.0.0.1"
     """Address to listen at. Anything but loopback needs tokens (`daq token add`)."""
@@ -41,7 +41,7 @@ class ServiceSettings(BaseModel):
     """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
     """Whether the service connects to the robot when it starts; connecting moves nothing."""
-    unattended: Consent = False
+    unattended: TrueOrFalse = False
     """Whether the queue may move a real arm while no operator has confirmed being present."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits and diagnoses; short jobs have one of their own."""

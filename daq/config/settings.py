@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import platformdirs
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator
 from pydantic_settings import (
     BaseSettings,
     EnvSettingsSource,
@@ -20,6 +20,7 @@ from daq.config.limits import merged_limits
 from daq.config.service import ServiceSettings
 from daq.contracts.documents import parse_toml, read_text, shown
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace_limits import TraceLimits
@@ -32,10 +33,8 @@ SERVER_VARIABLE = "DAQ_SERVER"
 """Environment variable of the command line: URL of a service. It does not configure the section `[server]`."""
 
 
-class RobotSettings(BaseModel):
+class RobotSettings(FrozenRecord):
     """The arm: its name in files and addresses, its machine file, its port."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")] = "ma2000"
     machine: str = "ma2000"
@@ -45,10 +44,8 @@ class RobotSettings(BaseModel):
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
 
 
-class TraceSettings(BaseModel):
+class TraceSettings(FrozenRecord):
     """Where traces are kept, and how large they may be."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     folder: Path = Path("traces")
     limits: TraceLimits = TraceLimits()

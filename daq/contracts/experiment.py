@@ -8,10 +8,11 @@ import sys
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError, model_validator
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
@@ -39,11 +40,7 @@ Amplitude = Angle | dict[JointNumber, Angle]
 """One value for all joints of the experiment, or one per joint."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Ramp(_Part):
+class Ramp(FrozenRecord):
     """Constant speed through `amplitude` in `duration`; all joints arrive together."""
 
     kind: Literal["ramp"] = "ramp"
@@ -51,14 +48,14 @@ class Ramp(_Part):
     duration: Duration = DEFAULT_RAMP_TIME
 
 
-class Step(_Part):
+class Step(FrozenRecord):
     """The whole `amplitude` at once, in one set point."""
 
     kind: Literal["step"] = "step"
     amplitude: Amplitude = math.radians(5.4)
 
 
-class Staircase(_Part):
+class Staircase(FrozenRecord):
     """`steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each."""
 
     kind: Literal["staircase"] = "staircase"
@@ -68,7 +65,7 @@ class Staircase(_Part):
     back: StrictBool = True
 
 
-class SlowRamp(_Part):
+class SlowRamp(FrozenRecord):
     """Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction."""
 
     kind: Literal["slow_ramp"] = "slow_ramp"
@@ -77,7 +74,7 @@ class SlowRamp(_Part):
     reversals: Annotated[int, Field(ge=0, le=200)] = 3
 
 
-class Sine(_Part):
+class Sine(FrozenRecord):
     """`cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it."""
 
     kind: Literal["sine"] = "sine"
@@ -87,7 +84,7 @@ class Sine(_Part):
     phase: Angle = 0.0
 
 
-class Multisine(_Part):
+class Multisine(FrozenRecord):
     """Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out."""
 
     kind: Literal["multisine"] = "multisine"
@@ -105,7 +102,7 @@ class Multisine(_Part):
         return self
 
 
-class Cubic(_Part):
+class Cubic(FrozenRecord):
     """Cubic in time through `amplitude` in `duration`, at rest at both ends."""
 
     kind: Literal["cubic"] = "cubic"
@@ -113,7 +110,7 @@ class Cubic(_Part):
     duration: Duration = 1.0
 
 
-class Via(_Part):
+class Via(FrozenRecord):
     """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
 
     `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
@@ -133,7 +130,7 @@ class Via(_Part):
         return self
 
 
-class PickAndPlace(_Part):
+class PickAndPlace(FrozenRecord):
     """Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
 
     The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
@@ -148,7 +145,7 @@ class PickAndPlace(_Part):
     place: Duration = 1.0
 
 
-class Path(_Part):
+class Path(FrozenRecord):
     """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
 
     The first point is the start: the arm is brought there by a slow move.
@@ -168,7 +165,7 @@ class Path(_Part):
         return self
 
 
-class Pause(_Part):
+class Pause(FrozenRecord):
     """No motion for `duration`: a piece of a sequence."""
 
     kind: Literal["pause"] = "pause"
@@ -180,14 +177,14 @@ Simple = Annotated[
 ]
 
 
-class Segment(_Part):
+class Segment(FrozenRecord):
     """One piece of a sequence, on its own joints (all of the experiment's when None)."""
 
     move: Simple
     joints: tuple[JointNumber, ...] | None = None
 
 
-class Sequence(_Part):
+class Sequence(FrozenRecord):
     """Pieces one after the other, each from where the one before ended."""
 
     kind: Literal["sequence"] = "sequence"
@@ -200,7 +197,7 @@ Trajectory = Annotated[
 ]
 
 
-class ExperimentSpec(_Part):
+class ExperimentSpec(FrozenRecord):
     """One experiment. The same model serves the command line, the service and the trace's metadata.
 
     `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest

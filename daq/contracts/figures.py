@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from daq.contracts.frozen import FrozenRecord
 
 
-class JointFigureSet(BaseModel):
+class JointFigureSet(FrozenRecord):
     """Figures of one joint: angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the
     trace's unit.
 
     `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
     of the position between 10 and 90 % of the way; None where there is no set point, or no way.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     joint: int
     unit: str

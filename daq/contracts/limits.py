@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
+
+from daq.contracts.frozen import FrozenRecord
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 
-class JointLimits(BaseModel):
+class JointLimits(FrozenRecord):
     """Limits of one joint, in rad and s (m and s on a prismatic joint)."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     low: FiniteFloat | None = None
     high: FiniteFloat | None = None
@@ -25,15 +25,13 @@ class JointLimits(BaseModel):
         return self
 
 
-class Limits(BaseModel):
+class Limits(FrozenRecord):
     """Limits of the whole arm; `joints[i]` belongs to joint i+1.
 
     `floor_height` is the lowest z (m, in the base frame) that any link's end may reach; `following_error_counts` is
     the magnitude of positional error (ADC counts) at which set points pause (127 in the source, section 6.5), and
     `following_error_time` how long (s) it may last before the run ends in a fault.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     joints: tuple[JointLimits, ...] = ()
     floor_height: FiniteFloat | None = None

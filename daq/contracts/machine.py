@@ -13,10 +13,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.quantity import (
     Inertia,
@@ -33,8 +34,6 @@ from daq.contracts.quantity import (
 from firmware_protocol.invalid import first_invalid
 from firmware_protocol.units import DriveScale, JointCalibration
 
-Unitful = Annotated[Quantity, Field()]
-
 
 def _positive(quantity: Quantity) -> Quantity:
     if not quantity.value > 0.0:
@@ -47,11 +46,7 @@ Sizes = Size | tuple[Size, ...]
 """A number for all joints, or one a joint."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Geometry(_Part):
+class Geometry(FrozenRecord):
     """Standard Denavit–Hartenberg parameters (section 3.2 of the source): a, α, d, and the offset of θ (or d)."""
 
     a: Metre
@@ -64,7 +59,7 @@ class Geometry(_Part):
     """Angle about the joint's axis; added to the position of a revolute joint."""
 
 
-class Cylinder(_Part):
+class Cylinder(FrozenRecord):
     """A link turning about its own axis: I = ½ m r² about the joint (appendix B)."""
 
     shape: Literal["cylinder"]
@@ -74,7 +69,7 @@ class Cylinder(_Part):
     """Radius about the joint's own axis."""
 
 
-class Rod(_Part):
+class Rod(FrozenRecord):
     """A thin uniform rod along the link's a: centre at a/2, I = m a²/12 about it (appendix B)."""
 
     shape: Literal["rod"]
@@ -82,7 +77,7 @@ class Rod(_Part):
     """Mass of the link, spread evenly over its length `a`."""
 
 
-class Body(_Part):
+class Body(FrozenRecord):
     """A rigid body: centre of mass in the link's own frame (m), inertia about it: xx, yy, zz, xy, xz, yz."""
 
     shape: Literal["body"]
@@ -94,7 +89,7 @@ class Body(_Part):
     """About the centre of mass: xx, yy, zz, xy, xz, yz."""
 
 
-class DcMotor(_Part):
+class DcMotor(FrozenRecord):
     """Permanent-magnet DC motor behind a linear amplifier and a gear (section 7.1 of the source).
 
     `gear_ratio` is motor turns per joint turn. `dac_full_scale` is the controller's output at 127 counts.
@@ -126,7 +121,7 @@ class DcMotor(_Part):
         return DriveScale(self.dac_full_scale.value, self.amplifier_gain.value)
 
 
-class PlainGain(_Part):
+class PlainGain(FrozenRecord):
     """A drive whose force or torque is proportional to its recorded input: N·m or N per unit of drive."""
 
     kind: Literal["gain"]
@@ -136,7 +131,7 @@ class PlainGain(_Part):
     """Of the drive, at the joint; kg on a sliding joint."""
 
 
-class CurrentDrive(_Part):
+class CurrentDrive(FrozenRecord):
     """Motor whose recorded input is its current, in A: torque at the joint = torque_constant · gear_ratio · current."""
 
     kind: Literal["current"]
@@ -148,7 +143,7 @@ class CurrentDrive(_Part):
     """On the motor's side."""
 
 
-class Friction(_Part):
+class Friction(FrozenRecord):
     """Friction that is known beforehand. `viscous` is that of (7.30), on the motor's side, and multiplies the motor's
     speed; `coulomb_arm` is μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` is a plain
     torque at the joint."""
@@ -163,7 +158,7 @@ class Friction(_Part):
     """Constant friction at the joint (N·m, N)."""
 
 
-class Sensor(_Part):
+class Sensor(FrozenRecord):
     """Position sensor: `range` of the joint over 2^bits counts, the joint's value at count 0, the sign of counting."""
 
     bits: Annotated[int, Field(ge=1, le=32)]
@@ -182,7 +177,7 @@ class Sensor(_Part):
     """A tachometer measures velocity, which is integrated from 0."""
 
 
-class Joint(_Part):
+class Joint(FrozenRecord):
     """One joint with everything that belongs to it."""
 
     name: str
@@ -208,7 +203,7 @@ class Joint(_Part):
         return self.drive
 
 
-class BoardPid(_Part):
+class BoardPid(FrozenRecord):
     """The MA2000's own controller: integer PID on ADC counts, every `period`, its output `delay` later."""
 
     kind: Literal["board_pid"]
@@ -222,7 +217,7 @@ class BoardPid(_Part):
     """P, I, D per joint; a record's own gains come before these."""
 
 
-class SampledPid(_Part):
+class SampledPid(FrozenRecord):
     """PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
     an inner loop (cascade): the outer output is then a speed set point for it.
 
@@ -263,13 +258,13 @@ DEVIATIONS_ARE_USED_OF = (
 """Numbers of a machine file whose deviation becomes a tolerance parameter."""
 
 
-class NoController(_Part):
+class NoController(FrozenRecord):
     """No controller in the loop, or an unknown one: the recorded drive is the input."""
 
     kind: Literal["none"]
 
 
-class Machine(_Part):
+class Machine(FrozenRecord):
     """A machine file. `modelled_joints` are the joints (from 1) whose motion the model describes; the others are held
     and their mass is part of `load`, a point mass at the end of the last modelled link."""
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, FiniteFloat, model_validator
+from pydantic import AfterValidator, FiniteFloat, model_validator
+
+from daq.contracts.frozen import FrozenRecord
 
 
-class Quantity(BaseModel):
+class Quantity(FrozenRecord):
     """A value of a machine file.
 
     `deviation` is the expected (standard) deviation between the value written here and the machine on the bench;
     `low` and `high` bound what is physically possible. All three are None where nothing is claimed.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     value: FiniteFloat
     unit: str

@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 
 Floats = NDArray[np.float64]
@@ -59,10 +60,8 @@ Moment = Annotated[datetime, AfterValidator(_stamped_by_64_bits)]
 """A moment at which a trace can have been recorded."""
 
 
-class TraceEvent(BaseModel):
+class TraceEvent(FrozenRecord):
     """Something that happened during the record. `time` is in s from the record's start."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     time: float
     kind: EventKind
@@ -71,10 +70,8 @@ class TraceEvent(BaseModel):
     joint: int | None = None
 
 
-class TraceRecord(BaseModel):
+class TraceRecord(FrozenRecord):
     """What a trace says about itself: the metadata record at the start of the file, and at its end the outcome."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     format: Annotated[int, Field(le=TRACE_FORMAT)] = TRACE_FORMAT
     trace_id: str

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from daq.contracts.frozen import FrozenRecord
 
 MIB = 1 << 20
 
 
-class TraceLimits(BaseModel):
+class TraceLimits(FrozenRecord):
     """What a reader of traces accepts at most; section `[traces.limits]` of the configuration.
 
     The defaults hold nine hours of six joints at 50 Hz, and a chunk twenty times as large as the largest that a
     recording writes.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     file_bytes: Annotated[int, Field(ge=1)] = 2048 * MIB
     """Size of a file, MCAP or CSV: it is read as a whole."""

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from daq.contracts.consent import lacks_consent, require_word
 from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.contracts.word import require_word
 from daq.driver import EVERY_JOINT, Controller
 from daq.runner.rows import RowMaker
 from daq.safety import Violation, check_move_to_start, check_plan
@@ -39,7 +39,7 @@ class Consent:
 
     def require(self, controller: Controller) -> None:
         """Raises MissingConsentError when a real arm would move without the operator's consent."""
-        if not controller.identity.simulated and not self.moves_real_arm:
+        if lacks_consent(controller.identity, self.moves_real_arm):
             raise MissingConsentError(
                 f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
             )

@@ -6,11 +6,12 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError
+from pydantic import Field, FiniteFloat, StrictBool, ValidationError
 
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, Duration, JointNumber
+from daq.contracts.frozen import FrozenRecord
 from daq.teaching.files import write_whole
 from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
 from daq.trajectories import MOVE_SPEED
@@ -24,11 +25,7 @@ Line = Annotated[int, Field(ge=0, le=7)]
 Angles = Annotated[dict[JointNumber, Angle], Field(min_length=1)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Absolute(_Part):
+class Absolute(FrozenRecord):
     """Joints to these angles (rad), all arriving together; `speed` (rad/s) is the fastest joint's (SAMOVE's RATE)."""
 
     kind: Literal["absolute"] = "absolute"
@@ -36,7 +33,7 @@ class Absolute(_Part):
     speed: Speed = MOVE_SPEED
 
 
-class Relative(_Part):
+class Relative(FrozenRecord):
     """Joints by these angles (rad) from where the instruction before left them, all arriving together."""
 
     kind: Literal["relative"] = "relative"
@@ -44,7 +41,7 @@ class Relative(_Part):
     speed: Speed = MOVE_SPEED
 
 
-class PlayPath(_Part):
+class PlayPath(FrozenRecord):
     """A recorded path, `rate` times as fast as it was led, after a slow move to its start (CONTPATH)."""
 
     kind: Literal["path"] = "path"
@@ -52,14 +49,14 @@ class PlayPath(_Part):
     rate: Annotated[FiniteFloat, Field(ge=SLOWEST_RATE, le=FASTEST_RATE)] = 1.0
 
 
-class Wait(_Part):
+class Wait(FrozenRecord):
     """Waits for `duration` s without motion."""
 
     kind: Literal["wait"] = "wait"
     duration: Duration
 
 
-class SetOutput(_Part):
+class SetOutput(FrozenRecord):
     """Switches process output `line` (0–7) on or off."""
 
     kind: Literal["output"] = "output"
@@ -67,7 +64,7 @@ class SetOutput(_Part):
     on: StrictBool
 
 
-class AwaitInput(_Part):
+class AwaitInput(FrozenRecord):
     """Waits until process input `line` (0–7) is on or off; the program ends in an error after `longest` s."""
 
     kind: Literal["input"] = "input"
@@ -76,7 +73,7 @@ class AwaitInput(_Part):
     longest: Duration = 60.0
 
 
-class Gripper(_Part):
+class Gripper(FrozenRecord):
     """Closes or opens the gripper."""
 
     kind: Literal["gripper"] = "gripper"
@@ -88,7 +85,7 @@ Instruction = Annotated[
 ]
 
 
-class Program(_Part):
+class Program(FrozenRecord):
     """Instructions for one machine."""
 
     version: Literal[1] = 1

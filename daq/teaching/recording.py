@@ -6,10 +6,11 @@ from pathlib import Path as FilePath
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, ExperimentSpec, JointNumber, Path
+from daq.contracts.frozen import FrozenRecord
 from daq.teaching.files import write_whole
 
 SLOWEST_RATE = 0.01
@@ -18,10 +19,8 @@ FASTEST_RATE = 10.0
 """Highest playback rate; in practice the limits of the arm are lower."""
 
 
-class RecordedPath(BaseModel):
+class RecordedPath(FrozenRecord):
     """Measured angles (rad), one row per control period, one column per joint; times (s) from the first row."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)]
     times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]

@@ -7,9 +7,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import TraceError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.trace import Outcome, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
@@ -25,10 +24,8 @@ LAST = "last"
 """Name of the newest finished trace, in place of its number."""
 
 
-class TraceSummary(BaseModel):
+class TraceSummary(FrozenRecord):
     """One file of a folder of traces. Unknown values are None, such as the duration of an unfinished trace."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     path: Path
     state: State

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from daq.contracts.documents import parse_toml, shown
 from daq.contracts.errors import DaqError, SpecError, TraceError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import load_machine, shipped_machines
 from daq.contracts.trace import Floats, Moment, Outcome, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
@@ -37,10 +38,8 @@ INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
 
 
-class CsvDescription(BaseModel):
+class CsvDescription(FrozenRecord):
     """The TOML beside a CSV file. `machine` is the name of a shipped machine or a path from the TOML's folder."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     source: Literal["mock", "real", "imported"] = "imported"
     machine: str | None = None

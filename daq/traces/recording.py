@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import IO
 
@@ -128,8 +127,3 @@ class Recording:
 def software() -> str:
     """This software and its version, for `TraceRecord.software`."""
     return f"ma2000-daq/{version('ma2000-daq')}"
-
-
-def utc_now() -> datetime:
-    """UTC, for `TraceRecord.created`."""
-    return datetime.now(UTC)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import TraceError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
@@ -27,20 +27,16 @@ PERIODS_OFF = 0.01
 """Tolerance (control periods) between time and tick · period; time is the board's own."""
 
 
-class Finding(BaseModel):
+class Finding(FrozenRecord):
     """One finding, in one line."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     level: Level
     check: str
     message: str
 
 
-class Verification(BaseModel):
+class Verification(FrozenRecord):
     """All findings about one file. `trustworthy`: none of them is an error."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     path: Path
     findings: tuple[Finding, ...]

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import typer
 
+from daq.contracts.consent import Identity, lacks_consent
 from daq.contracts.errors import SafetyError
 from daq_cli.app.context import console
 
@@ -21,8 +22,8 @@ def can_be_asked() -> bool:
 
 
 @dataclass(frozen=True)
-class Consent:
-    """The operator's consent to something that a real arm will do.
+class ConsentPrompt:
+    """Asks for the operator's consent to something that a real arm will do.
 
     given:   whether the operator consented beforehand, with --yes
     what:    what will happen, in the words of the question
@@ -39,9 +40,9 @@ class Consent:
             f"{url} is a real arm, and {self.what}. Is its workspace clear?", err=True
         )
 
-    def require(self, url: str, *, simulated: bool) -> None:
+    def require(self, url: str, identity: Identity | None) -> None:
         """Raises SafetyError for a real arm at `url` unless the operator agreed, or agrees when asked."""
-        if not simulated and not self.given and not self.agreed(url):
+        if lacks_consent(identity, self.given) and not self.agreed(url):
             raise SafetyError(f"{url} is a real arm: {self.refused} only with the operator's consent (--yes)")
 
     def attempt(self, url: str, action: Callable[[bool], T], missing: type[SafetyError]) -> T:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from daq_cli.app import completion
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
 
@@ -47,7 +47,7 @@ def gain(
     wanted = parse_joints(joints)
     place = folder or robot.call.trace_folder
     if trace is None:
-        path = acquire_complete(robot, gain_experiment(wanted), robot.machine, place, Consent(yes)).trace
+        path = acquire_complete(robot, gain_experiment(wanted), robot.machine, place, ConsentPrompt(yes)).trace
     else:
         path = robot.find_trace(place, trace)
     measured = read_trace(path, robot.call.trace_limits)

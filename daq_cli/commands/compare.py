@@ -87,7 +87,7 @@ def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | Non
 
 def _print_result(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
     from daq_cli.models.agreement_table import agreement_data, print_agreement
-    from model.reports.units import squared
+    from model.units import squared
 
     if as_json:
         data = [difference.model_dump(mode="json") for difference in differing]

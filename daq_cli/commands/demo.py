@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.commands.traces import print_figures
 
@@ -34,7 +34,7 @@ def demo(
     )
     spec = ExperimentSpec(name="demo-ramp", notes="made by `daq demo`")
     robot = robot_access(Invocation(port_option=url))
-    finished = acquire_complete(robot, spec, load_machine("ma2000"), folder, Consent(False))
+    finished = acquire_complete(robot, spec, load_machine("ma2000"), folder, ConsentPrompt(False))
     trace = read_trace(finished.trace)
     print_figures(trace)
     print_result(finished)

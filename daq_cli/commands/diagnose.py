@@ -9,7 +9,7 @@ import typer
 
 from daq.contracts import exit_codes
 from daq_cli.app import completion
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import (
@@ -108,7 +108,7 @@ def diagnose(
         _print_result(found, out, None, as_json=json)
         return
     if acquire:
-        ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, Consent(yes), once)
+        ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, ConsentPrompt(yes), once)
         found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
         found = once(fitted_to, experiment_chooser(begin.machine))

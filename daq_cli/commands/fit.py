@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.comparison.agreement import ModelAgreement
+    from model.fitting.options import FitOptions
     from model.fitting.result import FitResult
     from model.machine_model.model import Model
 
@@ -95,22 +96,19 @@ def fit(
 ) -> None:
     """Find the parameters with which a model best reproduces traces, and name those that the traces do not
     determine."""
-    from daq_cli.app.progress import shown_progress
-    from model.comparison.compare import compare
-    from model.fitting.fit import fit as run_fit
     from model.fitting.options import FitOptions
-    from model.simulation.prepared import Options
 
-    if torques and (method != "least_squares" or starts > 1 or seed or open_loop):
-        raise SpecError("--torques: --method, --starts, --seed and --open-loop need a fit of motion; leave them out")
     robot = robot_of(context)
     if torques:
+        if method != "least_squares" or starts > 1 or seed or open_loop:
+            raise SpecError(
+                "--torques: --method, --starts, --seed and --open-loop need a fit of motion; leave them out"
+            )
         robot.require_local("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
     load_effects(effect_file, robot)
     fitted_to = read_traces(robot, folder, traces)
     held = read_traces(robot, folder, holdout or []) if holdout else []
     begin = _beginning(robot, fitted_to, model, machine, effects)
-    loop: Literal["open", "closed"] | None = "open" if open_loop else None
     options = FitOptions(
         parameters=patterns(parameters),
         held=patterns(hold) or (),
@@ -119,30 +117,48 @@ def fit(
         method=method,
         starts=starts,
         seed=seed,
-        loop=loop,
+        loop="open" if open_loop else None,
     )
     if (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
         done = jobs.fit(begin, named, held_out, options, out, report)
         _save(done, out, quiet=json)
         _print_result(done, done.models, out, as_json=json)
-        return
-    if torques:
+    elif torques:
         from daq_cli.models.fit_torques import fit_recorded_torques
 
         fit_recorded_torques(begin, fitted_to, held, options, out, as_json=json, report=report)
-        return
+    else:
+        _fit_motion(begin, fitted_to, held, options, out, as_json=json, report=report)
+
+
+def _fit_motion(
+    begin: Model,
+    traces: Sequence[Trace],
+    held: Sequence[Trace],
+    options: FitOptions,
+    out: Path,
+    *,
+    as_json: bool,
+    report: Path | None,
+) -> None:
+    """Fits motion on this computer, writes the model, and prints the result."""
+    from daq_cli.app.progress import shown_progress
+    from model.comparison.compare import compare
+    from model.fitting.fit import fit as run_fit
+    from model.simulation.prepared import Options
+
     with shown_progress("fitting") as progress:
-        found = run_fit(begin, fitted_to, options, lambda f, text: progress(0.9 * f, text))
-        _save(found, out, quiet=json)
+        found = run_fit(begin, traces, options, lambda f, text: progress(0.9 * f, text))
+        _save(found, out, quiet=as_json)
         comparison = compare(
             [("before", begin), ("fitted", found.model)],
-            [*fitted_to, *held],
+            [*traces, *held],
             [t.record.trace_id for t in held],
-            options=Options(loop=loop or "closed"),
+            options=Options(loop=options.loop or "closed"),
             progress=lambda f, text: progress(0.9 + 0.1 * f, text),
         )
-    _print_result(found, comparison.models, out, as_json=json)
+    _print_result(found, comparison.models, out, as_json=as_json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.quantities import parse_gains
 from daq_cli.robot.access import robot_of
@@ -39,7 +39,7 @@ def set_gains(
     wanted = parse_gains(gains)
     for joint, gain in wanted.items():
         SetGains(joint, *gain)  # raises outside its range: all or nothing is written
-    consent = Consent(yes, what="its gains will change", refused="its gains change")
+    consent = ConsentPrompt(yes, what="its gains will change", refused="its gains change")
     if limp := robot_of(context).set_gains(wanted, consent, _print_written):
         console().print(limp)
 

@@ -9,7 +9,7 @@ import typer
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
 
@@ -50,7 +50,7 @@ def set_output(
         raise SpecError(f"output {output}: allowed are 0 to {OUTPUTS - 1}")
     if value not in ("on", "off"):
         raise SpecError(f"output {output} {value!r}: allowed are on and off")
-    consent = Consent(yes, f"its output {output} will be switched {value}", "its outputs change")
+    consent = ConsentPrompt(yes, f"its output {output} will be switched {value}", "its outputs change")
     found = robot_of(context).set_output(output, on=value == "on", while_stopped=while_stopped, consent=consent)
     _print_switched(f"output {output}", value, "on" if found.outputs[output] else "off")
 
@@ -66,7 +66,7 @@ def gripper(
     if value not in ("open", "close"):
         raise SpecError(f"gripper {value!r}: allowed are open and close")
     closed = value == "close"
-    consent = Consent(yes, f"its gripper will {value}", "its gripper moves")
+    consent = ConsentPrompt(yes, f"its gripper will {value}", "its gripper moves")
     found = robot_of(context).set_gripper(closed=closed, while_stopped=while_stopped, consent=consent)
     _print_switched("gripper", "closed" if closed else "open", found.gripper)
 

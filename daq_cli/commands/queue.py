@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
 
@@ -45,7 +45,7 @@ def resume(context: typer.Context, yes: YesOption = False) -> None:
     from daq_cli.robot.remote.connection import connected_status, require_consent
 
     with robot_of(context).service("queue") as robot:
-        real = require_consent(connected_status(robot), Consent(yes))
+        real = require_consent(connected_status(robot), ConsentPrompt(yes))
         _print_status(robot.queue.resume(moves_real_arm=real))
 
 

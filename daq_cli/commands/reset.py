@@ -23,7 +23,7 @@ def reset(
 ) -> None:
     """End the freeze of a stop. Set points stay where the stop put them, or with --here become the present posture."""
     robot = robot_of(context)
-    done = robot.reset(here=here)
+    done = robot.reset(adopt_posture=here)
     if json:
         print_json({"server": robot.call.server, "here": here, "text": done.text})
         return

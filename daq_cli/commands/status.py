@@ -16,7 +16,7 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def status(context: typer.Context, json: JsonOption = False) -> None:
     """Posture, state and link of the robot, read once; --json has the same fields here and at a server."""
-    found = robot_of(context).view()
+    found = robot_of(context).state()
     report = found.report
     if json:
         print_json(report.model_dump(mode="json"))

@@ -71,12 +71,12 @@ def recorded_ramp(seed: int, folder: Path | None = None) -> Trace:
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine
     from daq.traces.reader import read_trace
-    from daq_cli.app.consent import Consent
+    from daq_cli.app.consent import ConsentPrompt
     from daq_cli.robot.experiment import acquire_complete
 
     spec = ExperimentSpec(name="thesis-ramp", notes="made by `daq thesis`")
     robot = robot_access(Invocation(port_option=f"mock://?seed={seed}&lock_step=1"))
     with TemporaryDirectory() as temporary:
         place = folder or Path(temporary)
-        finished = acquire_complete(robot, spec, load_machine("ma2000"), place, Consent(False))
+        finished = acquire_complete(robot, spec, load_machine("ma2000"), place, ConsentPrompt(False))
         return read_trace(finished.trace)

@@ -139,7 +139,7 @@ def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], m
 def _print_in_time(one: TimeDomain, machine: Machine) -> None:
     from rich.table import Table
 
-    from model.reports.units import joint_unit
+    from model.units import joint_unit
 
     table = Table(box=None, header_style="bold")
     for name in ("parameter", "σ of α(t)", "τ′", "beyond noise", "explains, constant", "varying", "goes with"):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import console
 from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from server.jobs.next_experiment import experiment_chooser
@@ -43,7 +43,7 @@ def diagnose_and_acquire(
     traces: Sequence[Trace],
     folder: Path | None,
     budget: float,
-    consent: Consent,
+    consent: ConsentPrompt,
     diagnose: Diagnose,
 ) -> LoopEnd:
     """Diagnoses, runs the experiment asked for, and diagnoses again, as long as `next_to_run` names one.
@@ -76,7 +76,7 @@ def diagnose_and_acquire(
 
 
 def _run(
-    robot: RobotAccess, arm: Machine, asked: NextExperiment, folder: Path, consent: Consent
+    robot: RobotAccess, arm: Machine, asked: NextExperiment, folder: Path, consent: ConsentPrompt
 ) -> tuple[Acquired, Trace]:
     from daq.traces.reader import read_trace
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from daq_cli.app.context import print_table
-from model.reports.units import shown_unit, with_unit
+from model.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
     from model.comparison.agreement import JointAgreement, ModelAgreement

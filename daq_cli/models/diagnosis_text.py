@@ -6,28 +6,29 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from daq_cli.models.diagnosis_candidates import candidates_lines
-from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
+from model.discrepancy.diagnosis import in_order
+from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
 from model.effects.names import effect_on
-from model.reports.units import shown_unit
+from model.units import shown_unit
 
 if TYPE_CHECKING:
-    from model.discrepancy.diagnosis import Diagnosis, FoundValue, NextExperiment, SignalError, Step
+    from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
 
 WIDTH = 100
 INDENT = 9
-VERDICTS = {
-    "nothing-significant": "NOTHING SIGNIFICANT",
-    "named": "NAMED",
-    "ambiguous": "AMBIGUOUS",
-    "suspected": "SUSPECTED",
-    "unknown-effect": "UNKNOWN EFFECT",
-}
+FITTED = 5
+"""Fitted candidates that are listed; those that the step names always are."""
+PROBED = 2
+"""Probed candidates that are listed: few, because their estimates are not comparable with those of fits."""
+COLUMN = 10
+"""Width of the column of evidence."""
 
 
 def answer_text(found: Diagnosis) -> str:
     """The whole answer."""
-    lines = _filled(VERDICTS[found.verdict], _headline(found), len(VERDICTS[found.verdict]) + 2)
+    verdict = found.verdict.replace("-", " ").upper()
+    lines = _filled(verdict, headline(found), len(verdict) + 2)
     warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
     for number in sorted(warnings):
         lines += ["", *_filled("WARNING", found.notes[number])]
@@ -46,27 +47,6 @@ def answer_text(found: Diagnosis) -> str:
     return "\n".join(lines)
 
 
-def _headline(found: Diagnosis) -> str:
-    adopted = [s for s in found.steps if s.adopted and s.effect is not None]
-    if found.verdict == "named" and adopted:
-        return "; ".join(effect_on(s.effect or "", s.joints) for s in adopted)
-    if found.verdict == "ambiguous" and found.steps:
-        return "; ".join(_name_or_group(s) for s in found.steps if s.adopted)
-    if found.verdict == "suspected":
-        return found.summary.removeprefix("Suspected: ")
-    if found.verdict == "nothing-significant":
-        if any(s.effect is not None for s in found.steps):
-            return "nothing that the held-out traces confirm"
-        return "the model explains these traces within their noise and its tolerances"
-    return "none of the known effects explains what is left"
-
-
-def _name_or_group(step: Step) -> str:
-    if step.group:
-        return "one of " + ", ".join(effect_on(c.effect, c.joints) for c in step.group)
-    return effect_on(step.effect or "", step.joints)
-
-
 def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
     lines = _filled("where", step.where.summary)
     lines += _filled("what", step.reason)
@@ -77,6 +57,31 @@ def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
     if not step.adopted and step.effect is not None:
         lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
     return lines + _shown(step)
+
+
+def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
+    """The list of a step, a line each; empty where nothing was tried (what the controller's own numbers prove).
+
+    earlier: the steps before; a probe of a candidate that they fitted is not listed again.
+    """
+    if not step.candidates:
+        return []
+    tried = {(s.effect, s.joints) for s in earlier}
+    fitted, probed = in_order([c for c in step.candidates if c.refitted or (c.effect, c.joints) not in tried])
+    named = {(step.effect, step.joints), *((c.effect, c.joints) for c in step.group)}
+    shown = [c for rank, c in enumerate(fitted) if rank < FITTED or (c.effect, c.joints) in named]
+    lines = [f"{'evidence':>{COLUMN}}", *map(_candidate, shown)]
+    promising = [c for c in probed if c.evidence > 0][:PROBED]
+    if promising:
+        lines += ["promised by probes alone (not fitted)", *map(_candidate, promising)]
+    if more := len(fitted) + len(probed) - len(shown) - len(promising):
+        lines.append(f"{'':{COLUMN}}  and {more} more")
+    return lines
+
+
+def _candidate(candidate: Candidate) -> str:
+    misfit = "" if candidate.misfit is None else f"   misfit {candidate.misfit:.2f}"
+    return f"{candidate.evidence:{COLUMN}.0f}  {effect_on(candidate.effect, candidate.joints)}{misfit}"
 
 
 def _without_steps(found: Diagnosis) -> list[str]:
@@ -99,7 +104,7 @@ def _left(found: Diagnosis) -> list[str]:
 def _shown(step: Step) -> list[str]:
     lines = _errors(step.rmse_fit, step.rmse_holdout, "before → after (noise)")
     if step.excess_removed_holdout is not None:
-        lines += _filled("", _removed(step.excess_removed_holdout))
+        lines += _filled("", removed_words(step.excess_removed_holdout))
     if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
         lines += _filled("", f"Σλ² {_plain(step.sum_lambda2_before)} → {_plain(step.sum_lambda2_after)}")
     return lines
@@ -117,14 +122,6 @@ def _errors(fitted: Sequence[SignalError], held: Sequence[SignalError], columns:
             lines += _filled("" if lines else "shown", f"rms error on traces {label}, {columns}")
             lines += [f"{'':{INDENT}}  {_error(e)}" for e in errors]
     return lines
-
-
-def _removed(share: float) -> str:
-    """What was removed of the held-out variance beyond noise: all of it, where the error is below its floor."""
-    if share < 0:
-        return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
-    gone = "all" if share >= 1.0 else f"{100 * share:.1f} %"
-    return f"{gone} of the held-out variance beyond noise is gone"
 
 
 def _error(e: SignalError) -> str:

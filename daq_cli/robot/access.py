@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from daq.contracts.service.robot import ProcessState
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
-    from daq_cli.app.consent import Consent
-    from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+    from daq_cli.app.consent import ConsentPrompt
+    from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
     from daq_cli.robot.pendant import Teaching
 
 
@@ -40,23 +40,25 @@ class RobotAccess(Protocol):
     def require_reached(self) -> None:
         """Connects, without sending anything that could move the arm, and raises the errors of connecting."""
 
-    def view(self) -> RobotView:
+    def state(self) -> RobotState:
         """Posture, state and link, as they are now."""
 
     def gains(self) -> Mapping[int, Gain]:
         """P, I and D of every joint."""
 
-    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+    def set_gains(
+        self, wanted: Mapping[int, Gain], consent: ConsentPrompt, written: Callable[[int, Gain], None]
+    ) -> str:
         """Writes gains, and calls `written` with those read back. Returns a line
         on limp joints (their gains are 0, so nothing holds them), or an empty one."""
 
     def process(self) -> ProcessState:
         """Process inputs and outputs, and the gripper."""
 
-    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Switches one process output, and returns what is read back."""
 
-    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Moves the gripper, and returns what is read back."""
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
@@ -66,10 +68,10 @@ class RobotAccess(Protocol):
             reached: ports whose processes have been asked already.
         """
 
-    def reset(self, *, here: bool) -> ResetDone:
-        """Ends the freeze of a stop; with `here` the measured posture becomes the set points first."""
+    def reset(self, *, adopt_posture: bool) -> ResetDone:
+        """Ends the freeze of a stop; with `adopt_posture` the measured posture becomes the set points first."""
 
-    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Runs an experiment and shows its progress; its trace is in `folder` then. Ctrl-C stops the arm.
 
         Raises AcquisitionFailedError when there is no trace.
@@ -87,7 +89,7 @@ class RobotAccess(Protocol):
     def program(self, name: Path) -> Program:
         """A taught program. name: the path of its file, or its name at the service."""
 
-    def teaching(self, consent: Consent) -> Teaching:
+    def teaching(self, consent: ConsentPrompt) -> Teaching:
         """Jogging, programs and leading by hand, one of them at a time."""
 
     def service(self, what: str) -> AbstractContextManager[Robot]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class RobotView:
+class RobotState:
     """The state of the robot, in full and in one line."""
 
     report: StatusReport

@@ -11,7 +11,7 @@ import typer
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import print_json
 from daq_cli.robot.answers import AcquisitionFailedError
 
@@ -47,7 +47,7 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
         preview(spec, robot.machine, options.json)
         return
     folder = options.folder or robot.call.trace_folder
-    finished = robot.acquire(spec, robot.machine, folder, Consent(options.yes))
+    finished = robot.acquire(spec, robot.machine, folder, ConsentPrompt(options.yes))
     if options.json:
         print_json(finished.model_dump(mode="json"))
     else:
@@ -57,7 +57,7 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
 
 
 def acquire_complete(
-    robot: RobotAccess, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent
+    robot: RobotAccess, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt
 ) -> Finished:
     """Runs `spec` for a use that needs the whole record. Raises AcquisitionFailedError for an incomplete one, too."""
     finished = robot.acquire(spec, machine, folder, consent)

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts import exit_codes
+from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError, ReachError, SafetyError, SpecError, TraceError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
 
 if TYPE_CHECKING:
     from daq.acquisition.messages import Finished
@@ -72,7 +73,7 @@ class LocalRobot:
         with self._controller():
             pass
 
-    def view(self) -> RobotView:
+    def state(self) -> RobotState:
         """The state that the board reports now."""
         from daq.contracts.limp import limp_joints
 
@@ -83,14 +84,16 @@ class LocalRobot:
         state = ", ".join(flag.name.lower().replace("_", " ") for flag in board.flags if flag.name) or "no flags"
         kind = "mock" if controller.identity.simulated else "REAL ARM"
         missed = f"{board.missed} set points missed since power-up"
-        return RobotView(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
+        return RobotState(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
 
     def gains(self) -> Mapping[int, Gain]:
         """Reads the board."""
         with self._connected() as controller:
             return controller.gains()
 
-    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+    def set_gains(
+        self, wanted: Mapping[int, Gain], consent: ConsentPrompt, written: Callable[[int, Gain], None]
+    ) -> str:
         """Raises SafetyError, and writes nothing, for a joint off its set point, which would jump there."""
         from daq.contracts.limp import limp_line, require_no_jump
 
@@ -107,20 +110,20 @@ class LocalRobot:
         with self._connected() as controller:
             return _process(controller)
 
-    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Switches and reads back. Raises SafetyError as `_switchable` does."""
         with self._switchable(while_stopped, consent) as controller:
             controller.write_outputs(1 << output, on << output)
             return _process(controller)
 
-    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Switches and reads back. Raises SafetyError as `_switchable` does."""
         with self._switchable(while_stopped, consent) as controller:
             controller.set_gripper(closed=closed)
             return _process(controller)
 
     @contextmanager
-    def _switchable(self, while_stopped: bool, consent: Consent) -> Iterator[Controller]:
+    def _switchable(self, while_stopped: bool, consent: ConsentPrompt) -> Iterator[Controller]:
         """The controller of an arm whose outputs may be switched now.
 
         Raises SafetyError without the operator's consent on a real arm, and if the arm is stopped, also if this happens
@@ -131,17 +134,17 @@ class LocalRobot:
 
     @contextmanager
     def _consented(
-        self, consent: Consent, check: Callable[[Controller], None] = lambda _controller: None
+        self, consent: ConsentPrompt, check: Callable[[Controller], None] = lambda _controller: None
     ) -> Iterator[Controller]:
         """The controller, with the operator's consent on a real arm. `check` runs before the operator is asked, and
         again afterwards. The port is free while the operator is asked, so that a stop gets through."""
         with self._connected() as controller:
             check(controller)
-            simulated = controller.identity.simulated
-            if simulated or consent.given:
+            identity = controller.identity
+            if not lacks_consent(identity, consent.given):
                 yield controller
                 return
-        consent.require(self.call.port, simulated=simulated)
+        consent.require(self.call.port, identity)
         with self._connected() as controller:
             check(controller)
             yield controller
@@ -152,7 +155,7 @@ class LocalRobot:
 
         return stop_configured(self.call, reached)
 
-    def reset(self, *, here: bool) -> ResetDone:
+    def reset(self, *, adopt_posture: bool) -> ResetDone:
         """Ends the stop that the board is in. Raises NotFrozenError."""
         from daq.contracts.limp import limp_line
         from firmware_protocol.commands import StatusFlag
@@ -160,7 +163,7 @@ class LocalRobot:
         with self._connected() as controller:
             status = controller.status()
             frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # this ends no stop that comes later
-            if here:
+            if adopt_posture:
                 # A second stop would change nothing: the board measures the posture when a stop begins.
                 controller.release(stop)
                 stopped = controller.stop()
@@ -169,13 +172,13 @@ class LocalRobot:
                 stop = controller.status().stop
             controller.release(stop)
             limp = limp_line(controller.gains())
-        if not frozen and not here:
+        if not frozen and not adopt_posture:
             return ResetDone("was not stopped", limp)
         holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
-        now = "; the set points are the posture measured now" if here else ""
+        now = "; the set points are the posture measured now" if adopt_posture else ""
         return ResetDone(f"released: {holds}{now}", limp)
 
-    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Runs the experiment in an acquisition process of its own."""
         from daq_cli.robot.local_run import acquire_locally
 
@@ -215,7 +218,7 @@ class LocalRobot:
 
         return load_program(name)
 
-    def teaching(self, consent: Consent) -> Teaching:
+    def teaching(self, consent: ConsentPrompt) -> Teaching:
         """Teaching with the port held by this process."""
         from daq_cli.robot.local_teaching import LocalTeaching
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.app.stop_keys import StopKeys
 from daq_cli.robot.answers import AcquisitionFailedError
@@ -23,7 +23,7 @@ class _NoConsentError(AcquisitionFailedError):
 
 
 def acquire_locally(
-    call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent
+    call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt
 ) -> Finished:
     """Runs `spec` and shows its progress. If a real arm needs consent and a person can be asked, it asks.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.limp import require_drive
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.app.keyboard import open_keyboard
 from daq_cli.robot.pendant import HELP, Pendant, StatusLine, announce_lead
@@ -35,7 +35,7 @@ class LocalTeaching:
 
     call: Invocation
     machine: Machine
-    consent: Consent
+    consent: ConsentPrompt
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
         """Drives until the pendant has ended."""
@@ -104,14 +104,13 @@ class LocalTeaching:
         """
         from daq.acquisition.owned import owned_robot
         from daq.config.robot_files import load_memory_map
-        from daq.runner import Consent as Agreed
-        from daq.runner import MissingConsentError
+        from daq.runner import Consent, MissingConsentError
 
         robot, memory_map = self.call.settings.robot.name, load_memory_map(self.call.settings.robot.memory_map)
         with ExitStack() as held:
 
             def hold(moves_real_arm: bool) -> OwnedRobot:
-                return held.enter_context(owned_robot(robot, self.call.port, memory_map, Agreed(moves_real_arm)))
+                return held.enter_context(owned_robot(robot, self.call.port, memory_map, Consent(moves_real_arm)))
 
             owned = self.consent.attempt(self.call.port, hold, MissingConsentError)
             try:

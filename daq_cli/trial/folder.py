@@ -12,10 +12,11 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 
 Stage = Literal["detect", "record", "diagnose", "score"]
@@ -23,10 +24,8 @@ STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score")
 _CAMPAIGN = "trial.json"
 
 
-class Asked(BaseModel):
+class Asked(FrozenRecord):
     """The options of a trial, which must be the same when it is resumed. `key` makes the names of its cases."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     format: Literal[1] = 1
     experiment: Literal["diagnostic", "ramp"]

@@ -158,7 +158,7 @@ def draw_arm(seed: int) -> HiddenArm:
 
 def _put_outside(random: Random, deviations: dict[str, float]) -> None:
     """Moves some constants outside their stated tolerance."""
-    candidates = [tolerance for tolerance in tolerances() if tolerance.name.startswith(("m2", "m3", "torque", "rotor"))]
+    candidates = [tolerance for tolerance in tolerances() if tolerance.dynamic]
     for tolerance in random.sample(candidates, _WRONG_PRIORS):
         deviations[tolerance.name] = random.choice((-1, 1)) * random.uniform(*_OUTSIDE) * tolerance.drawn
 

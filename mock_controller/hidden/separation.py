@@ -96,10 +96,11 @@ class Tangents:
 
 
 def _reach(name: str) -> tuple[float, float]:
-    """Bounds of a tolerance parameter's change: fractions, seconds or counts."""
-    if name.startswith("linearity"):
+    """Bounds of a tolerance parameter's change: fractions or seconds; none for counts of a sensor's curve."""
+    known = next((tolerance for tolerance in tolerances() if tolerance.name == name), None)
+    if known is None:
         return -math.inf, math.inf
-    return (-_EARLIEST_S, _EARLIEST_S) if name == "computing_delay" else (_LEAST_FRACTION, _MOST_FRACTION)
+    return (-_EARLIEST_S, _EARLIEST_S) if known.is_time else (_LEAST_FRACTION, _MOST_FRACTION)
 
 
 @dataclass(frozen=True)
@@ -314,8 +315,7 @@ def _directions(plant: PlantParameters, board: BoardParameters, priors: Priors) 
     found = []
     for tolerance in tolerances():
         deviation = tolerance.stated if priors == "stated" else tolerance.drawn
-        late = tolerance.name == "computing_delay"
-        step = _DELAY_STEP_S if late else min(deviation, _LARGEST_STEP)
+        step = _DELAY_STEP_S if tolerance.is_time else min(deviation, _LARGEST_STEP)
         moved = {tolerance.name: step}
         parts = LoopParts(deviating_plant(plant, moved), deviating_board(flat, moved), (), 0)
         found.append(_Direction(tolerance.name, deviation, deviation / step, parts))

@@ -7,7 +7,7 @@ deviates by a smooth curve; for a refit it is represented by three harmonics (`L
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from math import cos, pi, sin
@@ -24,6 +24,7 @@ _MODELLED = (1, 2, 3)
 _MASSES = ("m1", "m2", "m3", "m_load")
 _LENGTHS = ("r1", "a2", "a3")
 _JOINT_CONSTANTS = ("resistance", "torque_constant", "back_emf_constant", "rotor_inertia", "viscous_friction")
+_DYNAMIC = ("m2", "m3", "torque_constant", "rotor_inertia")
 _MOST = 2.0
 """Truncation of drawn deviations, in standard deviations."""
 _STEP_S = 1e-3
@@ -33,11 +34,17 @@ HARMONICS = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Tolerance:
-    """One quantity that may deviate; standard deviations as stated to others, and as drawn (fraction, or s)."""
+    """One quantity that may deviate; standard deviations as stated to others, and as drawn, in its unit.
+
+    `is_time`: they are in s, not fractions of the value. `dynamic`: a mass, torque constant or rotor inertia that shows
+    in every motion.
+    """
 
     name: str
     stated: float
     drawn: float
+    is_time: bool = field(default=False, repr=False)
+    dynamic: bool = field(default=False, repr=False)
 
 
 @cache
@@ -51,10 +58,12 @@ def tolerances() -> tuple[Tolerance, ...]:
         return stated, drawn
 
     mass, length = of_table("mass"), of_table("length")
-    found = [Tolerance(name, *mass) for name in _MASSES] + [Tolerance(name, *length) for name in _LENGTHS]
+    found = [Tolerance(name, *mass, dynamic=name in _DYNAMIC) for name in _MASSES] + [
+        Tolerance(name, *length) for name in _LENGTHS
+    ]
     for table in (*_JOINT_CONSTANTS, "coulomb_arm"):
-        found += [Tolerance(f"{table}_{joint}", *of_table(table)) for joint in _MODELLED]
-    found.append(Tolerance("computing_delay", *of_table("computing_delay", "s")))
+        found += [Tolerance(f"{table}_{joint}", *of_table(table), dynamic=table in _DYNAMIC) for joint in _MODELLED]
+    found.append(Tolerance("computing_delay", *of_table("computing_delay", "s"), is_time=True))
     reader.finish()
     return tuple(found)
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.frozen import FrozenRecord
 from model.dynamics.inertial_influence import PARAMETERS, State, acting_parameters, parameter_name
 from model.kinematics.chain import Chain
 
 
-class Influence(BaseModel):
+class Influence(FrozenRecord):
     """Parameters that act on one joint's torque, by the dynamics and as published; names such as m3, c2x, I3zz."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     table: str
     joint: int

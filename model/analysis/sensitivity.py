@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -17,11 +17,7 @@ from model.simulation.simulate import sensitivities
 from model.validation.expected_deviation import expected_deviation
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class SensitivityCurve(_Part):
+class SensitivityCurve(FrozenRecord):
     """Change of each joint's reading (rad, m) along a run when one parameter changes by its expected deviation.
 
     `by_joint` has one series per modelled joint; `rms` is over all of them.
@@ -45,7 +41,7 @@ class SensitivityCurve(_Part):
         return largest.index(max(largest))
 
 
-class SensitivityCurves(_Part):
+class SensitivityCurves(FrozenRecord):
     """Curves of several parameters, the strongest first."""
 
     model: str

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.dynamics import recursive
@@ -21,11 +21,7 @@ from model.validation import differentiation
 Series = tuple[float, ...]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class InertiaElement(_Part):
+class InertiaElement(FrozenRecord):
     """D_ij along a motion, kg·m² (or kg), joints from 1: translation and rotation of the bodies, and rotors.
 
     `translation` is what the masses at their centres give, `rotation` their moments about their centres.
@@ -39,7 +35,7 @@ class InertiaElement(_Part):
     rotor: float
 
 
-class InertialTorque(_Part):
+class InertialTorque(FrozenRecord):
     """D_ij q̈_j: torque (N·m) at joint `at` from the acceleration of joint `of`; an interaction where they differ."""
 
     at: int
@@ -47,7 +43,7 @@ class InertialTorque(_Part):
     values: Series
 
 
-class GravityTorque(_Part):
+class GravityTorque(FrozenRecord):
     """Torque of gravity (N·m) at a joint: all bodies, and by link (from 1; the load belongs to the last)."""
 
     joint: int
@@ -55,14 +51,14 @@ class GravityTorque(_Part):
     by_link: tuple[Series, ...]
 
 
-class SpeedTorque(_Part):
+class SpeedTorque(FrozenRecord):
     """Centrifugal and Coriolis torque H (N·m) at a joint."""
 
     joint: int
     values: Series
 
 
-class TorqueAnalysis(_Part):
+class TorqueAnalysis(FrozenRecord):
     """Figures 7.12 to 7.14 for any machine and motion. `source` says where the motion comes from."""
 
     model: str

@@ -6,14 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from daq.contracts.frozen import FrozenRecord
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class JointAgreement(_Part):
+class JointAgreement(FrozenRecord):
     """One joint over one or more traces.
 
     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
@@ -40,7 +36,7 @@ class JointAgreement(_Part):
         return None if self.count is None else self.floor / self.count
 
 
-class TraceAgreement(_Part):
+class TraceAgreement(FrozenRecord):
     """One trace; `held_out` tells whether the model was fitted to it, None where nothing was fitted."""
 
     trace: str
@@ -54,7 +50,7 @@ class TraceAgreement(_Part):
         return sum(j.rmse**2 for j in self.joints)
 
 
-class ModelAgreement(_Part):
+class ModelAgreement(FrozenRecord):
     """One model on all traces: `held_out` pools those that are marked so, `in_sample` the others; None for none."""
 
     label: str

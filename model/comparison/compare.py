@@ -33,6 +33,12 @@ class TraceSignals:
     measured: Floats
     simulated: tuple[Floats, ...]
     set_point: Floats | None
+    signal: Signal = "position"
+
+    @property
+    def quantity(self) -> str:
+        """What is measured, in a word."""
+        return "position" if self.signal == "position" else "speed"
 
 
 @dataclass(frozen=True)
@@ -89,7 +95,7 @@ def compare(
     agreements = []
     for place, (label, model) in enumerate(models):
         own = tuple(
-            _agreement(record, simulated[k][place], floor, units, model, _role(record, held_out))
+            _agreement(record, simulated[k][place], floor, model, signal, _role(record, held_out))
             for k, record in enumerate(records)
         )
         agreements.append(
@@ -119,9 +125,9 @@ def _units(model: Model, signal: Signal) -> tuple[str, ...]:
 
 
 def _agreement(
-    record: Record, simulated: Floats, floor: Floats, units: tuple[str, ...], model: Model, held_out: bool | None
+    record: Record, simulated: Floats, floor: Floats, model: Model, signal: Signal, held_out: bool | None
 ) -> TraceAgreement:
-    left = record.measured - simulated
+    left, units = record.measured - simulated, _units(model, signal)
     joints = []
     for column, joint in enumerate(model.machine.modelled_joints):
         sensor = model.machine.joint(joint).sensor
@@ -134,7 +140,7 @@ def _agreement(
                 rmse=float(np.sqrt(square)),
                 largest=float(np.abs(left[:, column]).max()),
                 floor=float(floor[column]),
-                count=resolution(sensor) if sensor is not None and not units[column].endswith("/s") else None,
+                count=resolution(sensor) if sensor is not None and signal == "position" else None,
                 share=square / motion if motion > 9 * floor[column] ** 2 else None,
             )
         )
@@ -153,4 +159,4 @@ def _signals(
     wanted = None
     if trace.set_point is not None and signal == "position":
         wanted = trace.set_point[:, [trace.column(j) for j in joints]]
-    return TraceSignals(record.name, held_out, joints, units, trace.time, record.measured, simulated, wanted)
+    return TraceSignals(record.name, held_out, joints, units, trace.time, record.measured, simulated, wanted, signal)

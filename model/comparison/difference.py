@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydantic import BaseModel, ConfigDict
-
+from daq.contracts.frozen import FrozenRecord
 from model.machine_model.model import Model
 
 SAME = 1e-12
 """Relative difference below which two values are the same number."""
 
 
-class ParameterDifference(BaseModel):
+class ParameterDifference(FrozenRecord):
     """One parameter with its value in each model, None where a model does not have it.
 
     `deviations` is the spread of the values in expected deviations; None where a model lacks the
     parameter or no deviation is expected.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
     unit: str

@@ -11,10 +11,10 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace, TraceRecord
 from model.arrays import Floats
@@ -41,11 +41,7 @@ FOLLOWING_SHARE = 0.6
 arm that is slower than the model."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ParameterGain(_Part):
+class ParameterGain(FrozenRecord):
     """Width of a parameter's 95 % interval (high − low, in its unit) without and with the proposed experiments."""
 
     name: str
@@ -59,7 +55,7 @@ class ParameterGain(_Part):
         return self.after / self.before
 
 
-class InformationGain(_Part):
+class InformationGain(FrozenRecord):
     """What proposed experiments would add. `nats`: half the log of the ratio of the determinants of information."""
 
     parameters: tuple[ParameterGain, ...]

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from model.arrays import Floats
 from model.design.drawn_experiments import drawn_experiment
@@ -26,10 +27,8 @@ from model.fitting.unknowns import Unknown, scales
 from model.machine_model.model import Model
 
 
-class DesignOptions(BaseModel):
+class DesignOptions(FrozenRecord):
     """How to search: `experiments` of `duration` s each are chosen from `candidates` drawn with `seed`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     experiments: Annotated[int, Field(ge=1, le=50)] = 4
     duration: Annotated[float, Field(ge=1.0, le=600.0)] = 12.0
@@ -37,14 +36,12 @@ class DesignOptions(BaseModel):
     seed: Annotated[int, Field(ge=0)] = 0
 
 
-class DesignedExperiments(BaseModel):
+class DesignedExperiments(FrozenRecord):
     """The chosen experiments, the one that adds most first, and the information that they give together.
 
     `nats[i]` is the information of the first i+1 experiments, beyond that of the priors. `refused` counts candidates
     outside the limits.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     specs: tuple[ExperimentSpec, ...]
     gain: InformationGain

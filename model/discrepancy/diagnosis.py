@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import FrozenRecord
 from model.discrepancy.grounds import ControllerProof, Method, Note, Reason, Refusal
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -29,11 +30,7 @@ FEWEST_BINS = 5
 three."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class FoundValue(_Part):
+class FoundValue(FrozenRecord):
     """One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it.
 
     `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine). Both
@@ -53,7 +50,7 @@ class FoundValue(_Part):
         return cls(value=value, low=low, high=high, unit=p.unit, part=p.part, joints=p.joints)
 
 
-class Candidate(_Part):
+class Candidate(FrozenRecord):
     """An effect that was tried.
 
     `evidence` is the fall of −2 log posterior less the cost of its own parameters (BIC; for a tone's frequency the
@@ -70,7 +67,7 @@ class Candidate(_Part):
     parameters: dict[str, FoundValue] = {}
 
 
-class SignalError(_Part):
+class SignalError(FrozenRecord):
     """Root mean square of measurement − simulation of one joint. `floor`: of the measurement's own noise."""
 
     joint: int
@@ -80,7 +77,7 @@ class SignalError(_Part):
     floor: float
 
 
-class PhaseCell(_Part):
+class PhaseCell(FrozenRecord):
     """One cell of the map of disagreement: mean square of the weighted residual (1: no more than noise) of a joint in
     a stretch of time and phase of motion; `significance` in standard deviations."""
 
@@ -93,7 +90,7 @@ class PhaseCell(_Part):
     trace: int = 0
 
 
-class Dependence(_Part):
+class Dependence(FrozenRecord):
     """Mean residual of a joint against a quantity, in bins: what a person would plot."""
 
     joint: int
@@ -105,7 +102,7 @@ class Dependence(_Part):
     significance: float
 
 
-class MovingParameter(_Part):
+class MovingParameter(FrozenRecord):
     """The distortion method's α(t): a parameter that would have to move, how much, and with what it moves."""
 
     parameter: str
@@ -114,7 +111,7 @@ class MovingParameter(_Part):
     correlation: float
 
 
-class WorstPlace(_Part):
+class WorstPlace(FrozenRecord):
     """The joint and phase of motion with the largest residual, `ratio` times its noise. `rms`, `floor`: of the residual
     and of the noise, in `unit`, in that phase or over the `whole_record`."""
 
@@ -127,7 +124,7 @@ class WorstPlace(_Part):
     whole_record: bool = False
 
 
-class Where(_Part):
+class Where(FrozenRecord):
     """Where simulation and measurement disagree, for a step before it: a one-line summary, and the numbers behind it.
 
     `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells.
@@ -142,7 +139,7 @@ class Where(_Part):
     worst: WorstPlace | None = None
 
 
-class RemainingShape(_Part):
+class RemainingShape(FrozenRecord):
     """What none of the known effects explains, as a torque at a joint against something, so that a person can invent
     the effect: torque (N·m, N) in bins of `against`, with its standard deviation."""
 
@@ -162,7 +159,7 @@ class RemainingShape(_Part):
         return sum(torque is not None for torque in self.torque)
 
 
-class Step(_Part):
+class Step(FrozenRecord):
     """One step of the workflow: what was found, what adding it did. `reason` and `rejected_because` are written from
     the data beside them."""
 
@@ -194,7 +191,7 @@ class Step(_Part):
     refusal: Refusal | None = None
 
 
-class DifferencePlace(_Part):
+class DifferencePlace(FrozenRecord):
     """Where two candidates would differ most on an experiment: `share` of the difference's square is there.
     `other_joint`: it is not the joint of the effect."""
 
@@ -204,7 +201,7 @@ class DifferencePlace(_Part):
     other_joint: bool
 
 
-class NextExperiment(_Part):
+class NextExperiment(FrozenRecord):
     """The experiment that best separates what is left, within the arm's limits."""
 
     name: str
@@ -225,7 +222,7 @@ class NextExperiment(_Part):
     """nats that it would add on the arm's parameters, where there are no candidates to separate."""
 
 
-class Suspicion(_Part):
+class Suspicion(FrozenRecord):
     """An effect that more of the same motion would show or refute: its evidence, held-out records included, the
     evidence `needed` to name it, and the `seconds` that are still to be recorded for that."""
 
@@ -236,7 +233,7 @@ class Suspicion(_Part):
     seconds: float
 
 
-class Acquired(_Part):
+class Acquired(FrozenRecord):
     """An experiment that was asked for and run in the course of the diagnosis."""
 
     experiment: str
@@ -249,7 +246,7 @@ class Acquired(_Part):
     reason: str
 
 
-class Diagnosis(_Part):
+class Diagnosis(FrozenRecord):
     """The whole answer."""
 
     format: Annotated[int, Field(ge=1)] = ANSWER_FORMAT

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
-
+from daq.contracts.frozen import FrozenRecord
 from model.discrepancy.numbers import ReadingUnits
 
 Method = Literal["output-error", "inverse-dynamics"]
@@ -55,11 +55,7 @@ NoteKind = Literal[
 RefusalKind = Literal["diverges", "error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class NamedEffect(_Part):
+class NamedEffect(FrozenRecord):
     """An effect, its joints (none: of the whole machine), and its evidence."""
 
     effect: str
@@ -67,7 +63,7 @@ class NamedEffect(_Part):
     evidence: float
 
 
-class Pattern(_Part):
+class Pattern(FrozenRecord):
     """A pattern in the residual of one joint, with the numbers that a person would read off a plot, in SI units.
 
     `share`: of the residual's mean square that the pattern takes off.
@@ -78,7 +74,7 @@ class Pattern(_Part):
     share: float = 0.0
 
 
-class ErrorFall(_Part):
+class ErrorFall(FrozenRecord):
     """Root mean square error of a joint without an effect and with it, in `unit`."""
 
     before: float
@@ -86,7 +82,7 @@ class ErrorFall(_Part):
     unit: str
 
 
-class Reason(_Part):
+class Reason(FrozenRecord):
     """What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and place.
 
     By simulation: the `pattern` that `joint` shows most clearly, in `units`, and the fall of its error, `rms`. By
@@ -103,14 +99,26 @@ class Reason(_Part):
     rival: NamedEffect | None = None
 
 
-class ControllerProof(_Part):
+class ControllerEffect(StrEnum):
+    """Effects of the controller, which its own recorded numbers prove or exclude."""
+
+    WRONG_GAIN = "wrong_gain"
+    LOST_SET_POINTS = "lost_set_points"
+
+    @property
+    def part(self) -> str:
+        """The effect's only number."""
+        return "relative" if self is ControllerEffect.WRONG_GAIN else "share"
+
+
+class ControllerProof(FrozenRecord):
     """The controller's own recorded numbers prove an effect: so many `samples`, `of` those looked at, show it."""
 
     samples: int
     of: int
 
 
-class Refusal(_Part):
+class Refusal(FrozenRecord):
     """Why an effect was not taken into the model. `joints`: those that it leaves unexplained."""
 
     kind: RefusalKind
@@ -118,7 +126,7 @@ class Refusal(_Part):
     joints: tuple[int, ...] = ()
 
 
-class Note(_Part):
+class Note(FrozenRecord):
     """An assumption or limit of an answer. `warning`: it speaks against the whole answer and is read before it."""
 
     kind: NoteKind

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from model.units import with_unit
+
 
 def plain(value: float, digits: int = 2) -> str:
     """A number with so many significant digits: 720, −0.15, 0.00008."""
@@ -39,8 +41,8 @@ class ReadingUnits:
     def size(self, value: float) -> str:
         """The magnitude of a residual, with its unit."""
         if self.unread(value):
-            return f"less than {_with_unit(plain(self._least_shown, 1), self.unit)}"
-        return _with_unit(plain(abs(value) * self.factor), self.unit)
+            return f"less than {with_unit(plain(self._least_shown, 1), self.unit)}"
+        return with_unit(plain(abs(value) * self.factor), self.unit)
 
     def signed(self, value: float) -> str:
         """A residual with sign and unit."""
@@ -58,11 +60,11 @@ class ReadingUnits:
 
     def place(self, value: float) -> str:
         """A position with its unit."""
-        return _with_unit(plain(value * self.factor, 3), self.place_unit)
+        return with_unit(plain(value * self.factor, 3), self.place_unit)
 
     def speed(self, value: float) -> str:
         """A speed with its unit."""
-        return f"{_with_unit(plain(abs(value) * self.factor), self.place_unit)}/s"
+        return f"{with_unit(plain(abs(value) * self.factor), self.place_unit)}/s"
 
     def cycles(self, value: float) -> str:
         """How often something repeats over the position, from radians of phase per rad (m)."""
@@ -80,7 +82,3 @@ class ReadingUnits:
         least = self.least * self.factor
         step = 10.0 ** math.floor(math.log10(least))
         return math.ceil(least / step - 1e-9) * step
-
-
-def _with_unit(number: str, unit: str) -> str:
-    return f"{number}{'' if unit.startswith('°') else ' '}{unit}"

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from model.effects.library import effect
 
 if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 
-class DiagnosisOptions(BaseModel):
+class DiagnosisOptions(FrozenRecord):
     """Options of a diagnosis; the defaults suit traces of a machine with a known controller.
 
     effects: candidates by name; None for the whole library and loaded effects of the user's own.
@@ -22,8 +23,6 @@ class DiagnosisOptions(BaseModel):
     fitted: candidates per step that are fitted after the probes.
     polished: how many of the best fits are taken to their ends.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     effects: tuple[str, ...] | None = None
     joints: tuple[int, ...] | None = None

@@ -91,15 +91,15 @@ def unexplained(
     return tuple(dict.fromkeys(found))
 
 
-def first_to_withdraw(steps: Sequence[Step], left: Sequence[int]) -> int | None:
+def first_to_withdraw(steps: Sequence[Step], unexplained_joints: Sequence[int]) -> int | None:
     """Index of the first adopted step on a joint that stays unexplained: from there the search was on a wrong way."""
     for k, step in enumerate(steps):
-        if step.adopted and (not step.joints or set(step.joints) & set(left)):
+        if step.adopted and (not step.joints or set(step.joints) & set(unexplained_joints)):
             return k
     return None
 
 
-def withdrawn(step: Step, left: Sequence[int]) -> Step:
+def withdrawn(step: Step, unexplained_joints: Sequence[int]) -> Step:
     """The step, not taken into the model after all."""
-    why = Refusal(kind="only-resembles", joints=tuple(left))
+    why = Refusal(kind="only-resembles", joints=tuple(unexplained_joints))
     return step.model_copy(update={"adopted": False, "refusal": why}) if step.adopted else step

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.effects import EffectName, effect_names
+from daq.contracts.frozen import FrozenRecord
+from model import layout as at
 
 
 @dataclass(frozen=True)
@@ -85,10 +86,15 @@ class EffectParameter:
         return evaluate_size(chosen, scale)
 
 
-class EffectFile(BaseModel):
-    """The file that an effect of the user's own comes from: its name, and the first digits of its SHA-256."""
+class Tone(StrEnum):
+    """What a torque of sine and cosine repeats over; the value is the parameter that says how often."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    OVER_POSITION = "cycles"
+    OVER_TIME = "frequency"
+
+
+class EffectFile(FrozenRecord):
+    """The file that an effect of the user's own comes from: its name, and the first digits of its SHA-256."""
 
     name: str
     sha256: str
@@ -107,6 +113,7 @@ class Effect:
         whole_machine: it belongs to the machine, not to a joint.
         group: first part of its parameters' names when it belongs to the whole machine.
         joints: on which it may act; empty for any.
+        tone: what it repeats over, if it is a tone: no trial size can find one, a spectrum proposes its rate.
         family, torque, file: of an effect of the user's own (`model.effects.own`).
     """
 
@@ -118,9 +125,15 @@ class Effect:
     whole_machine: bool = False
     group: str = "base"
     joints: tuple[int, ...] = ()
+    tone: Tone | None = None
     family: str = ""
     torque: Callable[..., Any] | None = None
     file: EffectFile | None = None
+
+    @property
+    def is_flexible(self) -> bool:
+        """Whether rotor and link move apart, which takes short steps of integration."""
+        return self.flag == at.HAS_FLEXIBILITY
 
     @property
     def shared_name(self) -> EffectName:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter
+from model.effects.effect import Effect, EffectParameter, Tone
 
 EXTERNAL = (
     Effect(
@@ -29,6 +29,7 @@ EXTERNAL = (
         "periodic_disturbance",
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",
         source="harmonic force",
+        tone=Tone.OVER_TIME,
         parameters=(
             EffectParameter(
                 "sine",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter, JointScale
+from model.effects.effect import Effect, EffectParameter, JointScale, Tone
 
 CONTACT_RATE = 1500.0
 """Highest natural frequency (rad/s) of parts in contact, which steps of 1 ms can follow (RK4 is stable up to 2785)."""
@@ -32,6 +32,7 @@ TRANSMISSION = (
         "torque_ripple",
         physics="τ = a sin(N q) + b cos(N q)",
         source="cogging of motor or gear, first harmonic",
+        tone=Tone.OVER_POSITION,
         parameters=(
             EffectParameter(
                 "sine",

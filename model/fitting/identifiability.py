@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.jobs import ParameterWords
 from model.arrays import Floats
 from model.fitting.covariance import inverse
@@ -27,11 +27,7 @@ WEAKEST_PRIOR = 1e3
 """Deviation of a very wide prior, in natural sizes: it only keeps the arithmetic finite where the data say nothing."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ParameterVerdict(_Part):
+class ParameterVerdict(FrozenRecord):
     """What the data say about one parameter.
 
     `data_deviation` is what the data alone give, all other parameters being free too, `alone` if all others were
@@ -47,7 +43,7 @@ class ParameterVerdict(_Part):
     expected_deviation: float | None
 
 
-class Member(_Part):
+class Member(FrozenRecord):
     """A parameter's part in a combination: its change relative to its own value (or, at zero, in its unit)."""
 
     name: str
@@ -55,7 +51,7 @@ class Member(_Part):
     relative: bool
 
 
-class Combination(_Part):
+class Combination(FrozenRecord):
     """Changes that leave the records as they are, within the noise."""
 
     text: str
@@ -65,7 +61,7 @@ class Combination(_Part):
     """Its deviation by the data alone, in natural sizes of its largest member; None where they say nothing."""
 
 
-class IdentifiabilityReport(_Part):
+class IdentifiabilityReport(FrozenRecord):
     """What the data of a fit determine, and what they do not."""
 
     parameters: tuple[ParameterVerdict, ...]

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import Field, FiniteFloat
+
+from daq.contracts.frozen import FrozenRecord
 
 Bound = FiniteFloat | None
 
 
-class Prior(BaseModel):
+class Prior(FrozenRecord):
     """What is expected of a parameter before any data: Gaussian, in its unit."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     expected: FiniteFloat
     deviation: Annotated[FiniteFloat, Field(gt=0)]
 
 
-class FitOptions(BaseModel):
+class FitOptions(FrozenRecord):
     """How a fit is to be done; the defaults suit traces of a known machine.
 
     parameters: names or patterns (`joint2.*`, `*.mass`) of what to find; None: every number with an expected deviation
@@ -34,8 +34,6 @@ class FitOptions(BaseModel):
     friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
     whiten: take out the correlation of the residual before weighing it.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     parameters: tuple[str, ...] | None = None
     held: tuple[str, ...] = ()

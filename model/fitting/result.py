@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
@@ -20,11 +21,7 @@ RESULT_FORMAT = 1
 """Version of the file; a reader refuses newer ones."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class FittedParameter(_Part):
+class FittedParameter(FrozenRecord):
     """One parameter after a fit.
 
     `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter;
@@ -46,7 +43,7 @@ class FittedParameter(_Part):
     at_bound: Literal["low", "high"] | None
 
 
-class JointError(_Part):
+class JointError(FrozenRecord):
     """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
     itself."""
 
@@ -57,7 +54,7 @@ class JointError(_Part):
     floor: float
 
 
-class FitResult(_Part):
+class FitResult(FrozenRecord):
     """What a fit found. `names` and `covariance` are of everything that was free, nuisances included."""
 
     format: Annotated[int, Field(ge=1)] = RESULT_FORMAT

@@ -10,6 +10,7 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from model.arrays import Floats
 from model.machine_model.parameter import Kind, Parameter
+from model.units import torque_power
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,6 @@ class Unknown:
             return abs(self.start)
         width = self.high - self.low
         return width if math.isfinite(width) else 1.0
-
-
-def torque_power(unit: str) -> int:
-    """Power with which a unit contains torque (or mass): what scales when all torques are scaled together."""
-    above, _, below = unit.replace("(", "").replace(")", "").partition("/")
-    return int("kg" in above or "N" in above) - int("kg" in below or "N" in below)
 
 
 def scales(unknowns: tuple[Unknown, ...]) -> Floats:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -38,11 +38,9 @@ LONGEST_MEMORY = 40
 """Samples over which the whitening of residual torques looks back, at most: a low-passed residual is correlated."""
 
 
-class TorqueError(BaseModel):
+class TorqueError(FrozenRecord):
     """Errors of one trace: root mean square of each joint's residual torque and of its recorded torque; `share` is
     √(Σ residual² / Σ torque²) over all joints."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     trace: str
     held_out: bool
@@ -51,11 +49,9 @@ class TorqueError(BaseModel):
     share: float
 
 
-class TorqueFit(BaseModel):
+class TorqueFit(FrozenRecord):
     """The result of a fit of torques. `in_sample` and `held_out` are √(Σ residual² / Σ torque²) over all joints and
     compared samples."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     model: Model
     parameters: tuple[FittedParameter, ...]

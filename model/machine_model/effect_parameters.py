@@ -12,6 +12,7 @@ from model.effects.effect import Effect, EffectParameter, JointScale, evaluate_s
 from model.effects.library import effect
 from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Kind, Parameter
+from model.units import sliding
 
 
 def effect_parameters(
@@ -45,7 +46,7 @@ def effect_parameters(
             own = _parameter(kind, p, scale, place)
             if known is not None:
                 own = _with_known(own, known)
-            unit = own.unit.replace("N·m", "N").replace("rad", "m") if first.kind == "prismatic" else own.unit
+            unit = sliding(own.unit) if first.kind == "prismatic" else own.unit
             slots = tuple(at.slot(j, p.column + beyond) for j in group)
             found.append(replace(own, unit=unit, slots=slots, joints=group))
     return tuple(found)

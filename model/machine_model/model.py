@@ -12,8 +12,6 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     FiniteFloat,
     SerializerFunctionWrapHandler,
@@ -22,9 +20,10 @@ from pydantic import (
 )
 
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from model import layout as at
-from model.effects.effect import EffectFile
+from model.effects.effect import EffectFile, Tone
 from model.effects.library import effect, effect_from
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.nominal import base_parameters, joint_scale, nominal_vector
@@ -41,11 +40,7 @@ FRICTION_OF_MACHINE = {
 """Effects that a machine file gives values for, and its entries for them."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class EffectUse(_Part):
+class EffectUse(FrozenRecord):
     """An effect in a model: on which joints (none for the whole machine), with values of their own or shared ones.
 
     `file` is the one that an effect of the user's own needs, as it was when the model was made.
@@ -65,7 +60,7 @@ class EffectUse(_Part):
         return data
 
 
-class Lineage(_Part):
+class Lineage(FrozenRecord):
     """Where a model comes from: identity of the model it was made from, traces and a summary of the fit."""
 
     parent: str | None = None
@@ -74,7 +69,7 @@ class Lineage(_Part):
     note: str = ""
 
 
-class Model(_Part):
+class Model(FrozenRecord):
     """A machine with effects and parameter values.
 
     `values` holds the parameters that differ from the machine file and from the effects' starting values, by name.
@@ -102,6 +97,13 @@ class Model(_Part):
         if unknown := sorted(set(self.values) - set(self.by_name)):
             raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
         return self
+
+    @property
+    def disturbances(self) -> tuple[tuple[Parameter, Parameter], ...]:
+        """Sine and cosine of every torque that repeats over time; where joints share one, only that of the first."""
+        own = [p for p in self.parameters if p.effect is not None and effect(p.effect).tone is Tone.OVER_TIME]
+        cosines = {p.joints: p for p in own if p.part == "cosine"}
+        return tuple((p, cosines[p.joints]) for p in own if p.part == "sine" and p.joints in cosines)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

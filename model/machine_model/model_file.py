@@ -27,23 +27,27 @@ def load_model(path: Path) -> Model:
 
     Raises SpecError, in one line, for no such file, another kind of file, or a model of a newer version.
     """
-    data = parse_json(read_text(path, f"model {path}"), f"model {path}")
+    return model_of(parse_json(read_text(path, f"model {path}"), f"model {path}"), str(path))
+
+
+def model_of(data: Any, called: str) -> Model:
+    """The model in the data of a file, likewise. called: what messages call the file."""
     if isinstance(data, dict) and isinstance(data.get("model"), dict):
         data = data["model"]
     if not isinstance(data, dict) or "machine" not in data:
-        raise SpecError(f"model {path}: is neither a model nor the result of a fit")
-    _check_version(path, data.get("format"))
+        raise SpecError(f"model {called}: is neither a model nor the result of a fit")
+    _check_version(called, data.get("format"))
     try:
         return Model.model_validate(data)
     except ValidationError as error:
         first = first_invalid(error)
-        raise SpecError(f"model {path}: {first.where('model')}: {first.message}") from error
+        raise SpecError(f"model {called}: {first.where('model')}: {first.message}") from error
 
 
-def _check_version(path: Path, version: Any) -> None:
+def _check_version(called: str, version: Any) -> None:
     if not isinstance(version, int) or version < 1:
-        raise SpecError(f"model {path}: says no version (format {shown(version)})")
+        raise SpecError(f"model {called}: says no version (format {shown(version)})")
     if version > MODEL_FORMAT:
         raise SpecError(
-            f"model {path}: has format {version}, this version of the program reads up to {MODEL_FORMAT}; update it"
+            f"model {called}: has format {version}, this version of the program reads up to {MODEL_FORMAT}; update it"
         )

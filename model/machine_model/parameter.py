@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from model import layout as at
+from model.effects.effect import Tone
+from model.effects.library import effect
 
 
 class Kind(StrEnum):
@@ -82,6 +84,17 @@ class Parameter:
         if self.kind is Kind.INITIAL_VELOCITY:
             return self.joints[0] - 1, 1
         return None
+
+    @property
+    def is_gain_error(self) -> bool:
+        """Whether it says by how much a gain of the controller is wrong."""
+        return any(at.column(slot) == at.GAIN_ERROR for slot in self.slots if slot >= at.SHARED)
+
+    @property
+    def rate_of(self) -> Tone | None:
+        """The kind of tone whose cycles or frequency it is; None for any other number."""
+        tone = None if self.effect is None else effect(self.effect).tone
+        return tone if self.part == tone else None
 
     @property
     def sets_torque_scale(self) -> bool:

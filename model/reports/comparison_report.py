@@ -9,7 +9,7 @@ from model.comparison.compare import Comparison
 from model.comparison.difference import ParameterDifference
 from model.reports.motion import ROLES, agreement_table, motion_section
 from model.reports.page import Cell, Report, Section, Table, cells, effect_list, listed, numbers
-from model.reports.units import squared
+from model.units import squared
 
 
 def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:

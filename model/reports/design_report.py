@@ -15,7 +15,7 @@ from model.design.information import InformationGain, ParameterGain
 from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, effect_list, listed
-from model.reports.units import joint_unit, shown_unit
+from model.units import joint_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ from model.discrepancy.diagnosis import Dependence, Phase, PhaseCell, Where
 from model.discrepancy.localisation.statistics import chance_significance
 from model.reports.figures import COLOURS, QUIET, baseline, drawn, panels
 from model.reports.page import Picture
-from model.reports.units import shown_unit
+from model.units import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
 from model.reports.page import Picture
-from model.reports.units import shown_unit
+from model.units import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

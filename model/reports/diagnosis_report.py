@@ -13,11 +13,13 @@ from model.discrepancy.diagnosis import (
     Step,
     clear_shape,
 )
+from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
+from model.effects.names import capitalised
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks
-from model.reports.diagnosis_words import Compared, compared, headline
+from model.reports.diagnosis_words import Compared, compared
 from model.reports.motion import motion_section
 from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed
 
@@ -55,7 +57,8 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     sections.append(_next(found.next_experiment, found.verdict))
     if found.notes:
         sections.append(Section("What to know about this answer", (Points(found.notes),)))
-    return Report(headline(found), found.summary, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
+    title = capitalised(headline(found))
+    return Report(title, found.summary, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
 
 
 def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:

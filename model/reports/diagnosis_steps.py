@@ -11,7 +11,7 @@ from model.reports.diagnosis_pictures import error_picture, evidence_picture
 from model.reports.diagnosis_words import Compared, distortion, gap, gone
 from model.reports.numbers import column, estimate
 from model.reports.page import Block, Cell, Section, Table, Text, cells
-from model.reports.units import shown_unit, with_unit
+from model.units import shown_unit, with_unit
 
 WITHOUT_AND_WITH = "without the effect", "with it"
 """Names of a step's two errors; the tolerance parameters are fitted for both."""

@@ -1,18 +1,14 @@
-"""Words of a diagnosis's page: its headline, and what its numbers are of."""
+"""Words of a diagnosis's report: what its numbers are of, and what its steps did."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from model.discrepancy.diagnosis import Diagnosis, FoundValue, SignalError, Step
-from model.discrepancy.explanation.effect_words import words_of
-from model.effects.names import capitalised, placed
-from model.reports.numbers import estimate
-from model.reports.units import shown_unit, with_unit
+from model.discrepancy.diagnosis import Diagnosis, SignalError, Step
+from model.discrepancy.explanation.renderer import percent_gone, removed_words
 
 NOTABLE = 1.5
 """Ratio of an error to its noise, from which the share that is gone means something."""
-NO_LAW = "none of the known effects explains what is left"
 
 
 @dataclass(frozen=True)
@@ -53,44 +49,13 @@ def compared(found: Diagnosis) -> Compared:
     return FORCES if slides else TORQUES
 
 
-def headline(found: Diagnosis) -> str:
-    """The effects found, with joints and sizes; or that none was found, or none that is known."""
-    if found.verdict == "nothing-significant":
-        return "Nothing that the held-out traces confirm" if found.steps else "Nothing significant"
-    if found.verdict == "suspected":
-        return found.summary.removesuffix(".")
-    findings = [_finding(s) for s in found.steps if s.adopted]
-    if found.verdict == "unknown-effect":
-        findings.append(NO_LAW)
-    return capitalised("; ".join(findings)) or "Several effects that cannot be told apart"
-
-
-def _finding(step: Step) -> str:
-    if step.group:
-        return "one of: " + " or ".join(placed(c.effect, c.joints) for c in step.group)
-    if step.effect is None:
-        return "an effect without a name"
-    size = words_of(step.effect).size
-    values = [v for v in step.parameters.values() if v.part == size]
-    return ", ".join([placed(step.effect, step.joints), *(_size(v) for v in values)])
-
-
-def _size(v: FoundValue) -> str:
-    factor, unit = shown_unit("" if v.unit == "1" else v.unit)
-    low, high = (None if bound is None else factor * bound for bound in (v.low, v.high))
-    value, interval = estimate(factor * v.value, low, high, digits=1)
-    shown = with_unit(value, unit) if unit else value
-    return shown if interval is None else f"{shown} ({interval})"
-
-
 def gap(step: Step) -> str:
     """What an adopted step does on traces that it was not fitted to."""
     if step.proof is not None:
         return "Taken into the model: the recorded numbers of the controller prove it, and nothing was fitted for it."
     if step.excess_removed_holdout is None:
         return "Taken into the model. No trace was held out to judge it by."
-    share = _percent(step.excess_removed_holdout, 1) or "all"
-    return f"Taken into the model: on traces it was not fitted to, {share} of the variance beyond noise is gone."
+    return f"Taken into the model: {removed_words(step.excess_removed_holdout)}."
 
 
 def gone(e: SignalError) -> str:
@@ -98,14 +63,7 @@ def gone(e: SignalError) -> str:
     if e.before < NOTABLE * e.floor:
         return "–"
     share = (e.before**2 - e.after**2) / (e.before**2 - e.floor**2)
-    return _percent(share, 1 if share > 0.99 else 0) or "all of it"
-
-
-def _percent(share: float, places: int) -> str | None:
-    """A share in percent; None for all of it. A share below all is never rounded up to 100 %."""
-    if share >= 1.0:
-        return None
-    return f"{min(100 * share, 100 - 10**-places):.{places}f} %".replace("-", "−")
+    return percent_gone(share, 1 if share > 0.99 else 0)
 
 
 def distortion(before: float, after: float) -> str:

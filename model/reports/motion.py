@@ -22,7 +22,7 @@ from model.reports.figures import (
 )
 from model.reports.motion_closer import closer_picture
 from model.reports.page import Cell, Picture, Section, Table, cells
-from model.reports.units import shown_unit, with_unit
+from model.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,7 +119,7 @@ def _joint(
     for axes in (above, below):
         axes.margins(x=0.01)
     if first:
-        above.set_ylabel(f"position / {unit}" if not unit.endswith("/s") else f"speed / {unit}")
+        above.set_ylabel(f"{one.quantity} / {unit}")
         below.set_ylabel(f"residual / {unit}")
 
 

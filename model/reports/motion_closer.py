@@ -11,7 +11,7 @@ from model.arrays import Floats
 from model.comparison.compare import TraceSignals
 from model.reports.figures import INK, MODEL_COLOURS, QUIET, baseline, drawn, panels
 from model.reports.page import Picture
-from model.reports.units import shown_unit
+from model.units import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
             above.plot(time, simulated[window, column] * factor, color=colour, lw=1.3, label=label)
             below.plot(time, (one.measured - simulated)[window, column] * factor, color=colour, lw=0.8)
         above.plot(time, one.measured[window, column] * factor, color=INK, lw=0.7, label="measured")
-        for axes, what in ((above, "position" if not unit.endswith("/s") else "speed"), (below, "residual")):
+        for axes, what in ((above, one.quantity), (below, "residual")):
             axes.set_ylabel(f"{what} / {unit}")
             axes.set_xlabel("time / s")
             axes.margins(x=0.01)

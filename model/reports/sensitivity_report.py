@@ -10,7 +10,7 @@ import numpy as np
 from model.analysis.sensitivity import SensitivityCurve, SensitivityCurves
 from model.reports.figures import COLOURS, baseline, drawn, panels, saved, thinned
 from model.reports.page import Cell, Picture, Report, Section, Table, cells, numbers
-from model.reports.units import joint_unit, shown_unit, with_unit
+from model.units import joint_unit, shown_unit, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

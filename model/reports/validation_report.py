@@ -9,7 +9,7 @@ import numpy as np
 
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed, numbers
-from model.reports.units import joint_unit, squared
+from model.units import joint_unit, squared
 from model.validation.criterion import Curve, Fidelity
 from model.validation.variation import TimeDomain, Variation
 

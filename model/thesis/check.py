@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from daq.contracts.frozen import FrozenRecord
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Check(_Part):
+class Check(FrozenRecord):
     """`holds`: whether our result agrees with the source's statement. `ours` and `published` are one line each."""
 
     name: str
@@ -18,7 +14,7 @@ class Check(_Part):
     published: str
 
 
-class Choice(_Part):
+class Choice(FrozenRecord):
     """A number that the source does not give, what was taken for it, and why."""
 
     what: str

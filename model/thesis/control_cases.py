@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from model.arrays import Floats
 from model.thesis.check import Check, Choice
@@ -31,11 +31,7 @@ BackEmf = Literal["tabled", "plant"]
 Triple = tuple[float, float, float]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ControlCase(_Part):
+class ControlCase(FrozenRecord):
     """One run. Angles in rad, one series per joint.
 
     `back_emf`: whether the law compensates the back-EMF with its own table's constants or with the plant's.
@@ -59,7 +55,7 @@ class ControlCase(_Part):
     volts: tuple[tuple[float, ...], ...]
 
 
-class ControlChapter(_Part):
+class ControlChapter(FrozenRecord):
     """Chapter 8's runs, with what the source says of them and what had to be chosen."""
 
     cases: tuple[ControlCase, ...]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace
 from model.analysis.influence import Influence, influences
@@ -23,10 +23,8 @@ from model.thesis.tables import (
 )
 
 
-class TorqueFigures(BaseModel):
+class TorqueFigures(FrozenRecord):
     """Torques along the simulated motion of a trace's set points, and what the source states of them."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     analysis: TorqueAnalysis
     checks: tuple[Check, ...]

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel, Progress, silent
 from daq.contracts.trace import Trace
@@ -17,7 +16,7 @@ from model.fitting.options import FitOptions, Prior
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.thesis.check import Check, Choice
-from model.thesis.published_models import FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
+from model.thesis.published_models import BACK_EMF_SYMBOLS, FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
 from model.thesis.tables import (
     BASIC,
     DATA_SHEET_BACK_EMF_2,
@@ -61,11 +60,7 @@ PLAIN = FitOptions(
 """Options of a fit to the source's squared error, which has no priors, weights, nuisances or noise."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class LadderStep(_Part):
+class LadderStep(FrozenRecord):
     """One model: fitted values by the source's symbols beside the published ones, errors (rad²), Σλ²."""
 
     name: str
@@ -81,7 +76,7 @@ class LadderStep(_Part):
     seconds: float
 
 
-class Ladder(_Part):
+class Ladder(FrozenRecord):
     """The four models fitted by one method to the same traces, from the unoptimised model's error on."""
 
     method: Method
@@ -195,7 +190,7 @@ def _prior(symbol: str) -> Prior:
 
 
 def _bounds(symbol: str) -> tuple[float, float]:
-    if symbol.startswith("Kb"):
+    if symbol in BACK_EMF_SYMBOLS:
         return 0.0, LARGEST_BACK_EMF
     if symbol in FRICTION_SYMBOLS:
         return 0.0, LARGEST_FRICTION_ARM if symbol == "μ̃" else LARGEST_VISCOUS

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import math
 
-from pydantic import BaseModel, ConfigDict
-
+from daq.contracts.frozen import FrozenRecord
 from model.thesis.tables import LADDER, PublishedModel
 from model.validation.criterion import contribution
 from model.validation.expected_deviation import Basis, Convention, deviation_share
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class RecomputedFidelity(_Part):
+class RecomputedFidelity(FrozenRecord):
     """Σλ² of one published model from its values and standard deviations, beside the published sum.
 
     `contributions` are λ² by symbol; zero where the printed deviation is very large.

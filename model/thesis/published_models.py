@@ -8,6 +8,7 @@ from model.thesis.tables import DATA_SHEET_BACK_EMF_2, SHARED_BACK_EMF, SYMBOLS,
 
 PARAMETER = {symbol.name: symbol.parameter for symbol in SYMBOLS}
 """Names of parameters in a model, by the symbols of the source."""
+BACK_EMF_SYMBOLS = ("Kb1-3", "Kb2")
 FRICTION_SYMBOLS = ("v_eff1", "v_eff2", "v_eff3", "μ̃")
 
 

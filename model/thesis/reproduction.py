@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Progress, silent
 from daq.contracts.trace import Trace
 from model.analysis.influence import Influence
@@ -20,11 +19,7 @@ RECOMPUTED_TOLERANCE = 0.03
 """Largest relative difference at which Σλ² recomputed from the tables counts as the published one."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Reproduction(_Part):
+class Reproduction(FrozenRecord):
     """The source, reproduced. `fidelity` holds both conventions of τ′, the source's first."""
 
     fidelity: tuple[RecomputedFidelity, ...]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator
 
 from daq.contracts.documents import parse_toml
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 from model.trial.arms import KINDS, LOAD_CYCLE, LOADS, drawn_arms
 from model.trial.truth import DETECTABLE
@@ -15,11 +16,7 @@ from model.trial.truth import DETECTABLE
 Experiment = Literal["diagnostic", "ramp"]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Run(_Part):
+class Run(FrozenRecord):
     """One table of the trial: how many arms of each kind, by which experiment, whether more may be asked for."""
 
     experiment: Experiment = "diagnostic"
@@ -35,7 +32,7 @@ class Run(_Part):
         return cases
 
 
-class Registration(_Part):
+class Registration(FrozenRecord):
     """A registration file.
 
     `hashes`: SHA-256 of files and folders of the source tree, by path. `versions`: of libraries; the first

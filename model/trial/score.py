@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
-
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Diagnosis, Step, Verdict
 from model.discrepancy.verdict import excess_removed as share_removed
@@ -19,11 +18,7 @@ FIRST = 3
 Place = Literal["named", "group", "unknown-effect", "nothing-significant", "failed"]
 
 
-class _Scored(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Covered(_Scored):
+class Covered(FrozenRecord):
     """A stated interval and the true value, both in the model's conventions."""
 
     parameter: str
@@ -38,7 +33,7 @@ class Covered(_Scored):
         return self.low <= self.truth <= self.high
 
 
-class Score(_Scored):
+class Score(FrozenRecord):
     """The score of one answer. None means that the question does not arise for this case.
 
     `named_right`: every effect that was there was named, and no other. `merged_right`: the same with all friction kinds

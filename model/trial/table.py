@@ -6,18 +6,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.frozen import FrozenRecord
 from model.trial.rates import Rate, rate
 from model.trial.score import Score
 from model.trial.truth import is_mock_friction
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Line(_Part):
+class Line(FrozenRecord):
     """One line of the table: what it counts, the rate, and the rate to be reached (None: only reported)."""
 
     what: str
@@ -25,7 +21,7 @@ class Line(_Part):
     reach: str | None = None
 
 
-class Quantiles(_Part):
+class Quantiles(FrozenRecord):
     """Quantiles of a quantity over cases."""
 
     cases: int
@@ -35,7 +31,7 @@ class Quantiles(_Part):
     largest: float | None
 
 
-class EffectLine(_Part):
+class EffectLine(FrozenRecord):
     """One effect: cases, how many are detectable, and of those how many were named, placed, and found at the joint."""
 
     effect: str
@@ -48,7 +44,7 @@ class EffectLine(_Part):
     """What was answered instead of the right name, and how often."""
 
 
-class TrialTable(_Part):
+class TrialTable(FrozenRecord):
     """The whole table."""
 
     cases: int

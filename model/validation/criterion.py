@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import math
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from model.validation.expected_deviation import Basis, Convention
 
 DAMPING_RATIO = 0.5
 """ζ of the associate system (section 7.2.2)."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ParameterDistortion(_Part):
+class ParameterDistortion(FrozenRecord):
     """How one parameter alone would have to vary to explain the residual.
 
     `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
@@ -41,7 +36,7 @@ class ParameterDistortion(_Part):
         return self.required is None
 
 
-class Curve(_Part):
+class Curve(FrozenRecord):
     """Mean squared error (rad², None where a run diverged) against one parameter's value, the others held."""
 
     name: str
@@ -50,7 +45,7 @@ class Curve(_Part):
     errors: tuple[float | None, ...]
 
 
-class Fidelity(_Part):
+class Fidelity(FrozenRecord):
     """The transfer-function form of the distortion method for one model and its traces.
 
     `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum.

@@ -28,7 +28,7 @@ SHORTEST = 12
 
 
 @dataclass(frozen=True)
-class Observation:
+class SmoothedTrace:
     """A trace as the time-domain form uses it.
 
     motion: smoothed. acceleration: (k, n) rad/s², with the same smoothing. usable: (k, n) where a joint moves and
@@ -42,7 +42,7 @@ class Observation:
     usable: Mask
 
 
-def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Observation:
+def smooth(model: Model, trace: Trace, smoothing: float | None = None) -> SmoothedTrace:
     """The smoothed motion of a trace; `smoothing`: standard deviation of the kernel in s, by default chosen from noise.
 
     Raises:
@@ -74,7 +74,7 @@ def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Obser
     complete = ~_spread(~present, reach)
     complete[:reach] = complete[len(complete) - reach :] = False
     moving = np.abs(speed) > MOVING * deviation * gain.speed
-    return Observation(motion, d.accelerations(position, inputs.period), noise, moving & complete[:, None])
+    return SmoothedTrace(motion, d.accelerations(position, inputs.period), noise, moving & complete[:, None])
 
 
 def position_noise(model: Model) -> Floats:

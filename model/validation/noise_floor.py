@@ -1,7 +1,7 @@
 """The noise floor of the time-domain form: the residual (rad/s²) that remains for records made by the model itself.
 
 Three causes add up, and only the first follows from a formula. (1) Noise and rounding of the readings are amplified by
-differentiation and by the model's dependence on speed (`measured_motion.observe`). (2) Between two samples the drive
+differentiation and by the model's dependence on speed (`measured_motion.smooth`). (2) Between two samples the drive
 steps and the speed differs from what the samples show. (3) Where a motion turns, friction changes sign, and one count
 of noise decides when. The model therefore takes the arm's place: it repeats the record's set points with noise drawn
 anew and readings rounded, and the same differentiation is applied to the result.
@@ -22,7 +22,7 @@ from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
-from model.validation.measured_motion import Observation, observe
+from model.validation.measured_motion import SmoothedTrace, smooth
 
 FEWEST, MOST = 12, 40
 """Least and largest number of replicas of a record."""
@@ -31,25 +31,25 @@ SECONDS = 400.0
 SEED = 1991
 
 
-def noise_floor(model: Model, trace: Trace, observation: Observation) -> tuple[Floats, bool]:
+def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Floats, bool]:
     """Root mean square (n,) of each joint's acceleration residual if the model is right, rad/s² (m/s²).
 
     It is the median over simulated records. Also returned is whether they could be simulated. If not, and on a joint
-    that does not move in them, the floor is the readings' noise alone, as `observation` has it.
+    that does not move in them, the floor is the readings' noise alone, as `smoothed` has it.
     """
-    smoothing = observation.motion.width * observation.motion.period
+    smoothing = smoothed.motion.width * smoothed.motion.period
     rng = np.random.default_rng(SEED)
     replicas = int(np.clip(SECONDS / (trace.time[-1] - trace.time[0]), FEWEST, MOST))
     sizes = np.zeros((replicas, model.joint_count))
     try:
         for replica in sizes:
-            own = observe(model, _made_by(model, trace, rng), smoothing)
+            own = smooth(model, _made_by(model, trace, rng), smoothing)
             left = np.where(own.usable, own.acceleration - expected_accelerations(model, own.motion, ())[0], 0.0)
             replica[:] = np.sqrt((left**2).sum(axis=0) / np.maximum(own.usable.sum(axis=0), 1))
     except DaqError:
-        return observation.noise, False
+        return smoothed.noise, False
     median = np.median(sizes, axis=0)
-    return np.where(median > 0, median, observation.noise), True
+    return np.where(median > 0, median, smoothed.noise), True
 
 
 def _made_by(model: Model, trace: Trace, rng: np.random.Generator) -> Trace:

@@ -8,23 +8,23 @@ from numpy.typing import NDArray
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import gravity_loads
-from model.validation.measured_motion import Observation
+from model.validation.measured_motion import SmoothedTrace
 from model.validation.variation import Correlation
 
 FEWEST = 6
 """Least number of independent samples for a correlation."""
 
 
-def regressors(model: Model, observation: Observation) -> dict[str, Floats]:
+def regressors(model: Model, smoothed: SmoothedTrace) -> dict[str, Floats]:
     """Every regressor (k, n) of the modelled joints along a motion."""
-    motion = observation.motion
+    motion = smoothed.motion
     return {
         "position": motion.position,
         "speed": motion.speed,
         "magnitude of speed": np.abs(motion.speed),
         "direction": np.sign(motion.speed),
         "load": gravity_loads(model, motion.position),
-        "acceleration": observation.acceleration,
+        "acceleration": smoothed.acceleration,
         "drive": motion.drive,
         "time": np.repeat(motion.time[:, None], motion.position.shape[1], axis=1),
     }

@@ -13,7 +13,7 @@ from model.arrays import Floats, Mask
 from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
-from model.validation.measured_motion import Observation, observe
+from model.validation.measured_motion import SmoothedTrace, smooth
 from model.validation.noise_floor import noise_floor
 from model.validation.regressors import correlations, regressors
 from model.validation.variation import JointResidual, TimeDomain, Variation
@@ -31,7 +31,7 @@ class _Equations:
     """
 
     model: Model
-    observation: Observation
+    smoothed: SmoothedTrace
     names: tuple[str, ...]
     residual: Floats
     jacobian: Floats
@@ -60,13 +60,13 @@ def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    observation = observe(model, trace)
-    floor, simulated = noise_floor(model, trace, observation)
-    observation = replace(observation, noise=floor)
-    equations = _equations(model, observation, tuple(names))
+    smoothed = smooth(model, trace)
+    floor, simulated = noise_floor(model, trace, smoothed)
+    smoothed = replace(smoothed, noise=floor)
+    equations = _equations(model, smoothed, tuple(names))
     solution = _solve(equations)
-    known = regressors(model, observation)
-    motion = observation.motion
+    known = regressors(model, smoothed)
+    motion = smoothed.motion
     return TimeDomain(
         model=model.identity,
         trace=trace.record.trace_id,
@@ -79,24 +79,24 @@ def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain
     )
 
 
-def _equations(model: Model, observation: Observation, names: tuple[str, ...]) -> _Equations:
-    expected, jacobian = expected_accelerations(model, observation.motion, names)
-    residual = np.where(observation.usable, observation.acceleration - expected, 0.0)
-    jacobian = np.moveaxis(jacobian, 0, 2) * observation.usable[:, :, None]
+def _equations(model: Model, smoothed: SmoothedTrace, names: tuple[str, ...]) -> _Equations:
+    expected, jacobian = expected_accelerations(model, smoothed.motion, names)
+    residual = np.where(smoothed.usable, smoothed.acceleration - expected, 0.0)
+    jacobian = np.moveaxis(jacobian, 0, 2) * smoothed.usable[:, :, None]
     deviations = np.array([expected_deviation(model.parameter(n), "source")[0] for n in names])
-    return _Equations(model, observation, names, residual, jacobian, deviations)
+    return _Equations(model, smoothed, names, residual, jacobian, deviations)
 
 
 def _solve(given: _Equations) -> _Solution:
     """α = S Jᵀ (J S Jᵀ + R)⁻¹ r at every sample, with S = τ′² and R the noise; its noise through the same gain."""
-    observation, deviations = given.observation, given.deviations
+    smoothed, deviations = given.smoothed, given.deviations
     scaled = given.jacobian * deviations
-    noise = np.diag(observation.noise**2)
+    noise = np.diag(smoothed.noise**2)
     spread = scaled @ np.swapaxes(scaled, 1, 2) + noise
     gain = np.swapaxes(np.linalg.solve(spread, scaled), 1, 2)
     alpha = deviations * np.einsum("kpj,kj->kp", gain, given.residual)
-    band = deviations * np.sqrt(np.einsum("kpj,j,kpj->kp", gain, observation.noise**2, gain))
-    seen = (np.abs(scaled) > 1e-9 * np.abs(scaled).max(initial=1e-300)) & observation.usable[:, :, None]
+    band = deviations * np.sqrt(np.einsum("kpj,j,kpj->kp", gain, smoothed.noise**2, gain))
+    seen = (np.abs(scaled) > 1e-9 * np.abs(scaled).max(initial=1e-300)) & smoothed.usable[:, :, None]
     return _Solution(alpha, band, seen.any(axis=1))
 
 
@@ -119,15 +119,15 @@ def _variation(given: _Equations, solution: _Solution, k: int, known: dict[str, 
         significant=float((np.abs(alpha[active]) > SIGNIFICANT * band[active]).mean()) if some else 0.0,
         alone_constant=constant,
         alone_varying=varying,
-        against=correlations(alpha, active, known, own, given.observation.motion.width),
+        against=correlations(alpha, active, known, own, given.smoothed.motion.width),
     )
 
 
 def _alone(given: _Equations, k: int) -> tuple[float, float]:
     """Shares of the residual's energy, less noise, that one parameter explains: as a constant, and varying."""
-    noise = given.observation.noise
+    noise = given.smoothed.noise
     r, j = given.residual / noise, given.jacobian[:, :, k] / noise
-    energy = float((r**2).sum()) - float(given.observation.usable.sum())
+    energy = float((r**2).sum()) - float(given.smoothed.usable.sum())
     squares = (j**2).sum(axis=1)
     if energy <= 0 or squares.max(initial=0.0) == 0.0:
         return 0.0, 0.0
@@ -139,14 +139,14 @@ def _alone(given: _Equations, k: int) -> tuple[float, float]:
 
 
 def _joint(given: _Equations, j: int, known: dict[str, Floats]) -> JointResidual:
-    observation, values = given.observation, given.residual[:, j]
-    usable = observation.usable[:, j]
+    smoothed, values = given.smoothed, given.residual[:, j]
+    usable = smoothed.usable[:, j]
     return JointResidual(
         joint=given.model.machine.modelled_joints[j],
         values=_optional(values, usable),
-        noise=float(observation.noise[j]),
+        noise=float(smoothed.noise[j]),
         rms=float(np.sqrt((values[usable] ** 2).mean())) if usable.any() else 0.0,
-        against=correlations(values, usable, known, [j], observation.motion.width),
+        against=correlations(values, usable, known, [j], smoothed.motion.width),
     )
 
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
-
+from daq.contracts.frozen import FrozenRecord
 from model.validation.expected_deviation import Convention
 
 REGRESSORS = ("position", "speed", "magnitude of speed", "direction", "load", "acceleration", "drive", "time")
 """Names of the regressors; load is the gravity torque on the joint (N·m, or N)."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Correlation(_Part):
+class Correlation(FrozenRecord):
     """Pearson's correlation with one regressor of one joint. `noise` is that of independent signals (1σ)."""
 
     regressor: str
@@ -28,7 +23,7 @@ class Correlation(_Part):
         return abs(self.value) > 3 * self.noise
 
 
-class Variation(_Part):
+class Variation(FrozenRecord):
     """α(t) of one parameter, where all parameters together vary as little as explains the motion.
 
     `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
@@ -57,7 +52,7 @@ class Variation(_Part):
         return self.deviation <= self.expected
 
 
-class JointResidual(_Part):
+class JointResidual(FrozenRecord):
     """Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
 
     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
@@ -75,7 +70,7 @@ class JointResidual(_Part):
         return self.rms / self.noise
 
 
-class TimeDomain(_Part):
+class TimeDomain(FrozenRecord):
     """The time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in s."""
 
     model: str

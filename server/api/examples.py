@@ -28,6 +28,7 @@ from daq.contracts.service.jobs import (
     CompareRequest,
     DiagnoseRequest,
     EffectChoice,
+    EffectInModel,
     FitRequest,
     Job,
     KnownEffect,
@@ -312,8 +313,10 @@ def _models() -> list[BaseModel]:
         progress=0.35,
         progress_text="12 evaluations",
     )
+    used = EffectInModel(name="coulomb_friction", joints=(2, 3), called="Coulomb friction, joints 2+3")
     effect = KnownEffect(
         name="coulomb_friction",
+        called="Coulomb friction",
         family="friction",
         title="Coulomb friction",
         physics="τ = τ_c sign(q̇)",
@@ -329,7 +332,7 @@ def _models() -> list[BaseModel]:
         effect,
         entry,
         parameter,
-        ModelDetails(entry=entry, effects=fit.effects, parameters=(parameter,), ancestors=()),
+        ModelDetails(entry=entry, effects=(used,), parameters=(parameter,), ancestors=()),
         ModelChange(name="with friction - checked"),
         ModelLineage(machine="0a1b2c3d4e5f", models=(entry,), jobs=(job,)),
         _comparison(),

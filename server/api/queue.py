@@ -21,7 +21,7 @@ from server.api.dependencies import (
     Viewer,
 )
 from server.api.experiments import require_possible
-from server.problems import PROBLEMS, ProblemError
+from server.problems import PROBLEMS
 from server.queue.notices import Seen
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
@@ -57,10 +57,7 @@ def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
 @router.post("/queue/resume", tags=["queue"])
 def resume_queue(request: QueueResume, rig: RobotDep, seen: SeenDep, caller: Operator) -> QueueStatus:
     """Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`."""
-    identity = rig.robot.identity
-    if identity is not None and not identity.simulated and not request.moves_real_arm:
-        line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's consent"
-        raise ProblemError(409, "consent-needed", line, "is its workspace clear? then resume with moves_real_arm")
+    rig.require_consent(request.moves_real_arm, "is its workspace clear? then resume with moves_real_arm")
     rig.queue.resume(caller.name, moves_real_arm=request.moves_real_arm, seen=seen)
     return rig.queue.status()
 
@@ -127,10 +124,7 @@ async def get_control(rig: RobotDep, _: Viewer) -> Control:
 @router.post("/control", tags=["control"], status_code=201)
 def take_control(request: ControlRequest, rig: RobotDep, services: ServicesDep, caller: Operator) -> ControlLease:
     """Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused."""
-    identity = rig.robot.identity
-    if identity is not None and not identity.simulated and not request.moves_real_arm:
-        line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's consent"
-        raise ProblemError(409, "consent-needed", line, "is its workspace clear? then try again with moves_real_arm")
+    rig.require_consent(request.moves_real_arm, "is its workspace clear? then try again with moves_real_arm")
     lease = rig.control.take(caller.name, moves_real_arm=request.moves_real_arm)
     services.record_event(rig.robot.name, "control", f"{caller.name} took control", actor=caller.name)
     return lease

@@ -19,8 +19,9 @@ from server.problems import ProblemError
 from server.services import Services
 
 WAITING_OR_RUNNING: tuple[JobState, ...] = ("queued", "running")
-TIMES_OF_THE_LINK = "round_trip_"
-"""Prefix of the link's figures that are times (s), not counts."""
+ROUND_TRIPS = {f"round_trip_{figure}_s": f"round_trip_{figure}" for figure in ("mean", "p50", "p99", "max")}
+ROUND_TRIPS["round_trip_count"] = "round_trip_count"
+"""Labels of the times of the link, by the names of its figures."""
 
 
 class StateMetrics(Collector):
@@ -46,8 +47,9 @@ class StateMetrics(Collector):
         for rig in self._services.robots():
             name, arm = rig.robot.name, rig.robot.arm
             for counter, value in (arm.counters if arm else {}).items():
-                if counter.startswith(TIMES_OF_THE_LINK):
-                    times.add_metric((name, counter.removesuffix("_s")), value)
+                figure = ROUND_TRIPS.get(counter)
+                if figure is not None:
+                    times.add_metric((name, figure), value)
                 else:
                     link.add_metric((name, counter), value)
             connected.add_metric((name,), rig.robot.connection == "connected")

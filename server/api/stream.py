@@ -28,7 +28,6 @@ MESSAGES_A_SECOND, MESSAGES_AT_ONCE = 100.0, 500.0
 NOT_ALLOWED = 1008
 TOO_SLOW = 1013
 """Close code: try again later."""
-GOING_AWAY = 1001
 LOOK_EVERY = 1.0
 """Time (s) between two checks whether a client that reads nothing must be dropped."""
 ADVICE = "docs/service.md describes the messages of this socket"

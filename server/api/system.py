@@ -18,6 +18,7 @@ from daq.traces.room import RESERVE
 from server.access.caller import caller_of
 from server.api.dependencies import ServicesDep, Viewer
 from server.catalogue.room import free_room
+from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
 from server.services import Services
@@ -97,7 +98,7 @@ def _checks(services: Services) -> dict[str, str]:
             _require_writable(file.parent)
         services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
-        checks["database"] = " ".join(str(error).split())[:200]
+        checks["database"] = one_line(error)
     try:
         _require_writable(services.settings.traces.folder)
         free = shutil.disk_usage(services.settings.traces.folder).free

@@ -13,6 +13,7 @@ from typing import IO, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 from server.backup.places import DATABASE, NAMES, BackupError
 
@@ -26,10 +27,8 @@ DAMAGED = (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, Unic
 Progress = Callable[[float, str], None]
 
 
-class Entry(BaseModel):
+class Entry(FrozenRecord):
     """One file of a backup."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
     size: Annotated[int, Field(ge=0)]

@@ -6,26 +6,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.catalogue import TraceSummary
 
 
-class _Message(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Limits(_Message):
+class Limits(FrozenRecord):
     """What one order may use: `memory` in bytes, and time in s."""
 
     memory: int
     seconds: float
 
 
-class ReadUpload(_Message):
+class ReadUpload(FrozenRecord):
     """Reads an uploaded file as a trace. `folder`: where the trace made from a CSV file is written."""
 
     kind: Literal["upload"] = "upload"
@@ -34,7 +31,7 @@ class ReadUpload(_Message):
     limits: TraceLimits = DEFAULT_TRACE_LIMITS
 
 
-class WorkOutMotion(_Message):
+class WorkOutMotion(FrozenRecord):
     """Plans an experiment and checks it against the machine's limits. `most_shown`: the number of set points in the
     answer, at most."""
 
@@ -48,7 +45,7 @@ Order = Annotated[ReadUpload | WorkOutMotion, Field(discriminator="kind")]
 ORDER: TypeAdapter[ReadUpload | WorkOutMotion] = TypeAdapter(Order)
 
 
-class UploadedTrace(_Message):
+class UploadedTrace(FrozenRecord):
     """An uploaded file that is a trace: its path, the name that it gets, and its summary."""
 
     path: Path
@@ -56,7 +53,7 @@ class UploadedTrace(_Message):
     summary: TraceSummary
 
 
-class Answer(_Message):
+class Answer(FrozenRecord):
     """The answer to an order.
 
     problem:   what is wrong with the input, in one line; empty if nothing is

@@ -27,7 +27,7 @@ class Ending:
     trace_not_in_catalogue: bool = False
 
     @property
-    def holds_queue(self) -> bool:
+    def pauses_queue(self) -> bool:
         """Whether a person must look at the arm before the next experiment runs: always, except after a completed plan
         whose trace is in the catalogue, or after a plan refused before anything moved."""
         return self.trace_not_in_catalogue or self.event not in (Event.COMPLETED, Event.REFUSED)

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from model.comparison.difference import differences
-from model.discrepancy.explanation.renderer import where_with_summary
+from model.discrepancy.explanation.renderer import not_a_finding, where_with_summary
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
+from model.effects.names import placed
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.parameter_words import words_by_name
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
-from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
+from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere, TriedEffect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,22 +26,22 @@ if TYPE_CHECKING:
     from daq.contracts.service.jobs import ParameterWords
     from daq.contracts.trace import Trace
     from model.comparison.compare import Comparison
-    from model.discrepancy.diagnosis import Diagnosis, Step
+    from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
     from model.machine_model.model import Model
 
 
-def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: GivenWhere | None = None) -> DiagnosisData:
+def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: Where | None = None) -> DiagnosisData:
     """Returns the answer with the data of its plots. `comparison`: of the models before and after, if they can be
-    simulated."""
+    simulated. `given`: where the given model disagrees with the traces, likewise."""
     return DiagnosisData(
         **{
             **dict(found),
-            "steps": tuple(_step(step) for step in found.steps),
-            "candidates": tuple(one.model_dump() for one in found.candidates),
+            "steps": tuple(_step(found, step) for step in found.steps),
+            "candidates": tuple(map(_tried, found.candidates)),
             "models": () if comparison is None else comparison.models,
             "signals": () if comparison is None else overlays(comparison),
             "differences": differences((found.model_before, found.model_after)),
-            "given": given,
+            "given": None if given is None else GivenWhere(where=given, **_beside_map(found, given)),
             "words": _words(found),
         }
     )
@@ -58,7 +59,7 @@ def _words(found: Diagnosis) -> dict[str, ParameterWords]:
     return words_by_name([*found.model_before.parameters, *found.model_after.parameters, *rejected])
 
 
-def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
+def where_given(model: Model, traces: Sequence[Trace]) -> Where | None:
     """Returns where a model disagrees with traces before anything is fitted; None if its simulation does not stay
     finite. Raises TraceError, SpecError for traces that cannot be simulated."""
     records = records_of(traces, model.machine, "position")
@@ -68,11 +69,19 @@ def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
         return None
     driven = traces if all(trace.drive is not None for trace in traces) else ()
     floor = noise_floor(records, model.machine, "position")
-    where = where_with_summary(locate(Residuals(model, records, left, floor), driven))
-    return GivenWhere(where=where, chance=chance_significance(len(where.cells)))
+    return where_with_summary(locate(Residuals(model, records, left, floor), driven))
 
 
-def _step(step: Step) -> DiagnosisStep:
-    fields = {name: getattr(step, name) for name in type(step).model_fields}
-    tried = {name: tuple(one.model_dump() for one in fields[name]) for name in ("candidates", "group")}
-    return DiagnosisStep(**{**fields, **tried}, chance=chance_significance(len(step.where.cells)))
+def _step(found: Diagnosis, step: Step) -> DiagnosisStep:
+    tried = {"candidates": tuple(map(_tried, step.candidates)), "group": tuple(map(_tried, step.group))}
+    called = "nothing" if step.effect is None else placed(step.effect, step.joints)
+    return DiagnosisStep(**{**dict(step), **tried, "called": called, **_beside_map(found, step.where)})
+
+
+def _tried(one: Candidate) -> TriedEffect:
+    return TriedEffect(**dict(one), called=placed(one.effect, one.joints))
+
+
+def _beside_map(found: Diagnosis, where: Where) -> dict[str, Any]:
+    """What is told beside a map of disagreement."""
+    return {"chance": chance_significance(len(where.cells)), "not_a_finding": not_a_finding(found, where)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from daq.contracts.service.jobs import KnownEffect
 from model.effects.library import library
+from model.effects.names import effect_name
 
 
 def known_effects() -> tuple[KnownEffect, ...]:
@@ -11,6 +12,7 @@ def known_effects() -> tuple[KnownEffect, ...]:
     return tuple(
         KnownEffect(
             name=one.name,
+            called=effect_name(one.name),
             family=one.shared_name.family,
             title=one.shared_name.line,
             physics=one.physics,

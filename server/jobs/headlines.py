@@ -1,22 +1,17 @@
-"""The result of a job in one line, for lists. Pure."""
+"""The result of a fit, a validation or a comparison in one line, for lists. Pure."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from model.effects.names import placed
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from model.comparison.agreement import JointAgreement
     from model.comparison.compare import Comparison
-    from model.discrepancy.diagnosis import Candidate, Diagnosis, Step
     from model.fitting.result import FitResult
     from model.validation.criterion import Fidelity
-
-UNDECIDED_SHOWN = 3
 
 
 def of_fit(found: FitResult, comparison: Comparison) -> str:
@@ -39,28 +34,6 @@ def of_comparison(found: Comparison) -> str:
     """Says the error of each model over all traces."""
     errors = [f"{m.label} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
     return f"error {'; '.join(errors)}"
-
-
-def of_diagnosis(found: Diagnosis) -> str:
-    """Says the verdict and the effects that it names."""
-    if found.verdict == "named":
-        return f"named: {'; '.join(_named(s) for s in found.steps if s.adopted)}"
-    if found.verdict == "ambiguous":
-        return "; ".join(_group(s) if s.group else _named(s) for s in found.steps if s.adopted)
-    if found.verdict == "suspected" and found.suspicion is not None:
-        return f"suspected: {placed(found.suspicion.effect, found.suspicion.joints)}"
-    return "nothing significant" if found.verdict == "nothing-significant" else "an unknown effect"
-
-
-def _group(step: Step) -> str:
-    """The first members of a group, and how many more there are."""
-    names = [_named(one) for one in step.group]
-    more = "" if len(names) <= UNDECIDED_SHOWN else f" or {len(names) - UNDECIDED_SHOWN} more"
-    return f"one of: {' or '.join(names[:UNDECIDED_SHOWN])}{more}"
-
-
-def _named(one: Step | Candidate) -> str:
-    return placed(one.effect or "", one.joints)
 
 
 def _error(joints: Sequence[JointAgreement]) -> str:

@@ -9,9 +9,10 @@ from typing import Any
 from daq.contracts.documents import parse_json
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
-from daq.contracts.service.jobs import MACHINE, EffectChoice, ModelDetails, ModelParameter
-from model.machine_model.model import Model, base_model
-from model.machine_model.model_file import load_model, save_model
+from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
+from model.effects.names import placed
+from model.machine_model.model import EffectUse, Model, base_model
+from model.machine_model.model_file import load_model, model_of, save_model
 from model.machine_model.parameter_words import words_of
 from server.clock import Clock
 from server.problems import ProblemError
@@ -34,7 +35,9 @@ class Models:
 
     def take_in(self, path: Path, name: str, by: str, job: str | None) -> str:
         """Adds a model from its file, and returns its number. Adding it again changes nothing. Raises SpecError."""
-        model = load_model(path)
+        return self._keep(load_model(path), name, by, job)
+
+    def _keep(self, model: Model, name: str, by: str, job: str | None) -> str:
         self.folder.mkdir(parents=True, exist_ok=True)
         file = f"{model.identity}.json"
         part = self.folder / f"{file}.part"
@@ -69,16 +72,10 @@ class Models:
         if _has_program(data):
             line = "this model has effects that are programs of a user: a service does not run those"
             raise ProblemError(422, "not-a-model", line, "use it with the command line")
-        self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / f"upload-{os.urandom(6).hex()}.json"
-        path.write_bytes(text)
         try:
-            return self.take_in(path, name, by, None)
+            return self._keep(model_of(data, "upload"), name, by, None)
         except SpecError as error:
-            line = str(error).replace(str(path), "upload")
-            raise ProblemError(422, "not-a-model", line, AS_FITTED) from error
-        finally:
-            path.unlink(missing_ok=True)
+            raise ProblemError(422, "not-a-model", str(error), AS_FITTED) from error
 
     def path_of(self, identity: str) -> Path:
         """Returns a model's file. Raises a 404."""
@@ -94,7 +91,7 @@ class Models:
         model = load_model(self.path_of(identity))
         return ModelDetails(
             entry=entry,
-            effects=tuple(EffectChoice(name=use.name, joints=use.joints) for use in model.effects),
+            effects=tuple(map(_effect, model.effects)),
             parameters=_parameters(model),
             ancestors=self.store.ancestors(self._robot, identity),
         )
@@ -111,6 +108,10 @@ class Models:
         """Deletes a model's row and file. Raises a 404, 409."""
         file = self.store.remove(self._robot, identity)
         (self.folder / file).unlink(missing_ok=True)
+
+
+def _effect(use: EffectUse) -> EffectInModel:
+    return EffectInModel(name=use.name, joints=use.joints, called=placed(use.name, use.joints))
 
 
 def _parameters(model: Model) -> tuple[ModelParameter, ...]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.jobs import ParameterWords
 from model.comparison.agreement import ModelAgreement
 from model.comparison.difference import ParameterDifference
@@ -20,11 +21,7 @@ Row = tuple[float | None, ...]
 """One signal of one joint; None for samples at which a simulation was not finite."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Overlay(_Part):
+class Overlay(FrozenRecord):
     """One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
 
     `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
@@ -53,7 +50,7 @@ class FitData(FitResult):
     undetermined: tuple[str, ...] = ()
 
 
-class ValidationData(_Part):
+class ValidationData(FrozenRecord):
     """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
     same curves), and for each trace, thinned, how parameters would have to vary with time."""
 
@@ -63,7 +60,7 @@ class ValidationData(_Part):
     words: Words = Field(default_factory=dict)
 
 
-class ComparisonData(_Part):
+class ComparisonData(FrozenRecord):
     """Models compared on the same traces."""
 
     models: tuple[ModelAgreement, ...]
@@ -73,23 +70,29 @@ class ComparisonData(_Part):
 
 
 class TriedEffect(Candidate):
-    """An effect that the diagnosis tried."""
+    """An effect that the diagnosis tried. `called`: the effect and its joints as people write them."""
+
+    called: str
 
 
 class DiagnosisStep(Step):
-    """One step of the workflow."""
+    """One step of the workflow. `called`: what was added, as people write it."""
 
+    called: str
     candidates: tuple[TriedEffect, ...]
     group: tuple[TriedEffect, ...] = ()
     chance: float
     """Significance that noise alone exceeds in any cell of `where` in one record out of a hundred."""
+    not_a_finding: str
+    """Why the dependences in `where` are no finding; empty where the diagnosis names one."""
 
 
-class GivenWhere(_Part):
-    """Where the given model disagrees with the traces; `chance` as in a step."""
+class GivenWhere(FrozenRecord):
+    """Where the given model disagrees with the traces; `chance` and `not_a_finding` as in a step."""
 
     where: Where
     chance: float
+    not_a_finding: str
 
 
 class DiagnosisData(Diagnosis):
@@ -106,7 +109,7 @@ class DiagnosisData(Diagnosis):
     words: Words = Field(default_factory=dict)
 
 
-class FitJobResult(_Part):
+class FitJobResult(FrozenRecord):
     """Result of a fit."""
 
     id: str
@@ -114,7 +117,7 @@ class FitJobResult(_Part):
     data: FitData
 
 
-class ValidationJobResult(_Part):
+class ValidationJobResult(FrozenRecord):
     """Result of a validation."""
 
     id: str
@@ -122,7 +125,7 @@ class ValidationJobResult(_Part):
     data: ValidationData
 
 
-class ComparisonJobResult(_Part):
+class ComparisonJobResult(FrozenRecord):
     """Result of a comparison."""
 
     id: str
@@ -130,7 +133,7 @@ class ComparisonJobResult(_Part):
     data: ComparisonData
 
 
-class DiagnosisJobResult(_Part):
+class DiagnosisJobResult(FrozenRecord):
     """Result of a diagnosis."""
 
     id: str

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import BaseModel, ConfigDict
-
 from daq.contracts.errors import DaqError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import (
@@ -22,7 +21,7 @@ from daq.contracts.service.jobs import (
 )
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
-from server.jobs.headlines import of_comparison, of_diagnosis, of_fit, of_validation
+from server.jobs.headlines import of_comparison, of_fit, of_validation
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
 
 if TYPE_CHECKING:
@@ -44,10 +43,8 @@ MAP_SHARE, REPORT_SHARE = 0.94, 0.98
 """Share of the progress before the map of disagreement of a diagnosis, and before the report."""
 
 
-class Task(BaseModel):
+class Task(FrozenRecord):
     """The input of a worker: the request, and the files of the traces and models that it names."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     request: JobRequest
     machine: Machine
@@ -202,6 +199,7 @@ class _Worker:
     def diagnose(self, request: DiagnoseRequest) -> Ended:
         """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
+        from model.discrepancy.explanation.headline import headline
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
@@ -233,7 +231,7 @@ class _Worker:
             self._keep_model(found.model_after)
         result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given))
         report = diagnosis_report(found, comparison)
-        return self._done(result, report, of_diagnosis(found), found.model_after if changed else None)
+        return self._done(result, report, headline(found), found.model_after if changed else None)
 
     def _compared(
         self,

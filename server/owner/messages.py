@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, TypeAdapter
+from pydantic import Field, StrictBool, TypeAdapter
 
 from daq.acquisition.messages import EventHappened, Finished, Progress
 from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
@@ -21,14 +22,10 @@ BEGINS_WITHIN = 5.0
 """Time (s) after which an order that moves the arm is refused: the process may have been suspended meanwhile."""
 
 
-class _Message(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
 # ---- to the owner
 
 
-class Open(_Message):
+class Open(FrozenRecord):
     """The first line: which robot to open, and where."""
 
     kind: Literal["open"] = "open"
@@ -41,7 +38,7 @@ class Open(_Message):
     """Text of a memory map file; None for the one in the package."""
 
 
-class _Request(_Message):
+class _Request(FrozenRecord):
     """A request. The answer has the same `number`."""
 
     number: int
@@ -78,7 +75,7 @@ class JogBegin(_LongRequest):
     kind: Literal["jog_begin"] = "jog_begin"
 
 
-class JogDrive(_Message):
+class JogDrive(FrozenRecord):
     """Drives joints at these velocities (rad/s) for 0.3 s at most; replaces the command before. It has no answer.
     `said`: when the client's command arrived (s, this computer's monotonic clock); a delayed command moves nothing."""
 
@@ -103,13 +100,13 @@ class LeadBegin(_LongRequest):
     joints: tuple[int, ...]
 
 
-class Finish(_Message):
+class Finish(FrozenRecord):
     """Ends jogging or leading in good order. No answer of its own."""
 
     kind: Literal["finish"] = "finish"
 
 
-class HaltRun(_Message):
+class HaltRun(FrozenRecord):
     """Ends whatever runs with a stop, as the operator's cancel does. No answer of its own."""
 
     kind: Literal["halt"] = "halt"
@@ -158,7 +155,7 @@ class Reset(_QuickRequest):
     here: StrictBool
 
 
-class Close(_Message):
+class Close(FrozenRecord):
     """Frees the port, after a stop of running work."""
 
     kind: Literal["close"] = "close"
@@ -191,7 +188,7 @@ Quick = ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
 # ---- from the owner
 
 
-class Opened(_Message):
+class Opened(FrozenRecord):
     """The controller has answered, and the robot is connected."""
 
     kind: Literal["opened"] = "opened"
@@ -210,7 +207,7 @@ class LiveSample(ControlPeriod):
     """Delay (s) compared with the quickest samples."""
 
 
-class ArmReport(_Message):
+class ArmReport(FrozenRecord):
     """The state of the arm and of the link. It is sent when it changes, and once a second."""
 
     kind: Literal["arm"] = "arm"
@@ -222,14 +219,14 @@ class ArmReport(_Message):
     counters: dict[str, float]
 
 
-class TeachingText(_Message):
+class TeachingText(FrozenRecord):
     """A line for the person who is teaching."""
 
     kind: Literal["told"] = "told"
     text: str
 
 
-class Answer(_Message):
+class Answer(FrozenRecord):
     """The answer to a request. `problem` is empty if it was carried out; `exit_code` is that of the command line."""
 
     kind: Literal["answer"] = "answer"
@@ -241,7 +238,7 @@ class Answer(_Message):
     """The end of an experiment that left a trace."""
 
 
-class CannotOpen(_Message):
+class CannotOpen(FrozenRecord):
     """The robot could not be reached; the process ends."""
 
     kind: Literal["cannot_open"] = "cannot_open"

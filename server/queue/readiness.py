@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from daq.contracts.consent import lacks_consent
 from daq.contracts.service.robot import RobotIdentity
 from server.owner.messages import ArmReport
 
@@ -45,7 +46,7 @@ def what_is_missing(now: Circumstances) -> Missing | None:
         (cause != "", Missing(f"the arm is {state}", cause)),
         (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
         (
-            not now.identity.simulated and not now.consent,
+            lacks_consent(now.identity, now.consent),
             Missing("an operator must allow the queue to move this arm: pause it, then resume it (moves_real_arm)"),
         ),
         (

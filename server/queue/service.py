@@ -8,13 +8,15 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
+from daq.acquisition.messages import EventHappened, Progress
+from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
 from daq.contracts.service.queue import QueueStatus
 from server.experiments.endings import Ending, ending_of
 from server.experiments.order import next_due
 from server.experiments.states import Event, IllegalEventError, advance
-from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
+from server.owner.messages import Answer, ArmReport, HaltRun, Opened, Report, RunExperiment
 from server.problems import ProblemError, conflict
 from server.queue.attendance import Attendance
 from server.queue.context import QueueContext
@@ -138,6 +140,17 @@ class QueueService:
         self._attendance.say()
         self.wake()
 
+    def on_report(self, report: Report) -> None:
+        """Hears what the owner of the robot's port reports."""
+        if isinstance(report, Progress):
+            self.progressed(report.fraction, report.text)
+        elif isinstance(report, ArmReport):
+            self.on_arm_report(report)
+        elif isinstance(report, Opened):
+            self.connection_made()
+        elif isinstance(report, EventHappened):
+            self.wake()
+
     def on_arm_report(self, arm: ArmReport) -> None:
         """Handles a report of the arm: a stop, a fault or a lost link pauses the queue. Must not block."""
         self.notices.arm_reported(arm)
@@ -255,8 +268,7 @@ class QueueService:
         return self._consented_connection == self.notices.seen.connections
 
     def _needs_attendance(self) -> bool:
-        identity = self._context.robot.identity
-        return identity is not None and not identity.simulated and not self._context.unattended
+        return lacks_consent(self._context.robot.identity, self._context.unattended)
 
     def _work(self) -> None:
         told = ""
@@ -358,7 +370,7 @@ class QueueService:
             ending = self._with_stop_reason(ending, self._running)
             state = advance("running", ending.event)
             why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
-            paused = ending.holds_queue and self._pause(why)  # first, so that clients told of the end find it paused
+            paused = ending.pauses_queue and self._pause(why)  # first, so that clients told of the end find it paused
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()

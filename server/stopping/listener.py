@@ -43,7 +43,7 @@ class StopListener:
     """Listens until closed. `stops`: by robot; `on_stop`: called with the robot, the stop's result, and who asked."""
 
     def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> None:
-        self._server = _Server(listener, _handler(gate, stops, on_stop))
+        self._server = _Server(listener, gate, stops, on_stop)
         self._thread = threading.Thread(target=self._server.serve_forever, name="stop-listener", daemon=True)
         self._thread.start()
 
@@ -58,8 +58,9 @@ class StopListener:
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
-    def __init__(self, listener: socket.socket, handler: type[BaseHTTPRequestHandler]) -> None:
-        super().__init__(listener.getsockname()[:2], handler, bind_and_activate=False)
+    def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> None:
+        super().__init__(listener.getsockname()[:2], _Handler, bind_and_activate=False)
+        self.gate, self.stops, self.on_stop = gate, stops, on_stop
         self.socket.close()
         self.socket = listener
         self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
@@ -128,89 +129,91 @@ class _Bounded(io.RawIOBase):
         super().close()
 
 
-def _handler(gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
-        server_version = "daq"
-        sys_version = ""
-        timeout = READ_WITHIN
+class _Handler(BaseHTTPRequestHandler):
+    """Answers one request with what the server knows."""
 
-        def setup(self) -> None:
-            """Sets up as the base class does, but limits what is read to the size of a request."""
-            super().setup()
-            self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))
+    server: _Server
+    protocol_version = "HTTP/1.1"
+    server_version = "daq"
+    sys_version = ""
+    timeout = READ_WITHIN
 
-        def do_POST(self) -> None:
-            """Carries out the stop."""
-            self._read_body()
-            try:
-                robot, caller = self._admitted()
-            except TokensCannotBeReadError as error:
-                problem = ProblemError(503, "database", f"the tokens cannot be read: {error}", "try again")
-                self._answer(problem.status, details_of(problem), MEDIA_TYPE)
-                return
-            except ProblemError as problem:
-                self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
-                return
-            result = stops[robot]()
-            on_stop(robot, result, caller)  # before the answer: the client may be gone, and the stop has been made
-            self._answer(200, result, "application/json")
+    def setup(self) -> None:
+        """Sets up as the base class does, but limits what is read to the size of a request."""
+        super().setup()
+        self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))
 
-        def do_OPTIONS(self) -> None:
-            """Answers whether the service's page may ask. It is at another port, and so of another origin."""
-            headers = {"Access-Control-Allow-Methods": "POST", "Access-Control-Allow-Headers": "authorization"}
-            self._answer(204, None, "", headers if gate.is_from_here(self._headers()) else {})
-
-        def do_GET(self) -> None:
-            """Refuses every other method."""
-            problem = ProblemError(405, "no-such-method", f"{self.command} {self.path[:100]}: a stop is a POST")
+    def do_POST(self) -> None:
+        """Carries out the stop."""
+        self._read_body()
+        try:
+            robot, caller = self._admitted()
+        except TokensCannotBeReadError as error:
+            problem = ProblemError(503, "database", f"the tokens cannot be read: {error}", "try again")
             self._answer(problem.status, details_of(problem), MEDIA_TYPE)
+            return
+        except ProblemError as problem:
+            self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
+            return
+        result = self.server.stops[robot]()
+        self.server.on_stop(
+            robot, result, caller
+        )  # before the answer: the client may be gone, and the stop has been made
+        self._answer(200, result, "application/json")
 
-        do_PUT = do_PATCH = do_DELETE = do_HEAD = do_GET
+    def do_OPTIONS(self) -> None:
+        """Answers whether the service's page may ask. It is at another port, and so of another origin."""
+        headers = {"Access-Control-Allow-Methods": "POST", "Access-Control-Allow-Headers": "authorization"}
+        self._answer(204, None, "", headers if self.server.gate.is_from_here(self._headers()) else {})
 
-        def log_message(self, format: str, *args: object) -> None:
-            """Writes to the service's log."""
-            log.debug(format, *args)
+    def do_GET(self) -> None:
+        """Refuses every other method."""
+        problem = ProblemError(405, "no-such-method", f"{self.command} {self.path[:100]}: a stop is a POST")
+        self._answer(problem.status, details_of(problem), MEDIA_TYPE)
 
-        def _admitted(self) -> tuple[str, Caller]:
-            found = ADDRESS.fullmatch(self.path)
-            caller = gate.admit(self._headers())
-            if found is None or found[1] not in stops:
-                raise not_found(f"address {self.path[:100]}", "this port takes POST /api/v1/robots/{robot}/stop alone")
-            return found[1], caller
+    do_PUT = do_PATCH = do_DELETE = do_HEAD = do_GET
 
-        def _headers(self) -> dict[str, str]:
-            return {name.lower(): value for name, value in self.headers.items()}
+    def log_message(self, format: str, *args: object) -> None:
+        """Writes to the service's log."""
+        log.debug(format, *args)
 
-        def _read_body(self) -> None:
-            length = self.headers.get("Content-Length", "0")
-            if length.isdecimal() and 0 < int(length) <= LONGEST_BODY:
-                self.rfile.read(int(length))
+    def _admitted(self) -> tuple[str, Caller]:
+        found = ADDRESS.fullmatch(self.path)
+        caller = self.server.gate.admit(self._headers())
+        if found is None or found[1] not in self.server.stops:
+            raise not_found(f"address {self.path[:100]}", "this port takes POST /api/v1/robots/{robot}/stop alone")
+        return found[1], caller
 
-        def _answer(
-            self,
-            status: int,
-            body: StopResult | ProblemDetails | None,
-            kind: str,
-            more: Mapping[str, str] | None = None,
-        ) -> None:
-            content = b"" if body is None else body.model_dump_json().encode()
-            headers = {
-                "Content-Length": str(len(content)),
-                "Connection": "close",
-                "Cache-Control": "no-store",
-                "X-Content-Type-Options": "nosniff",
-                **({"Content-Type": kind} if kind else {}),
-                **(more or {}),
-            }
-            origin = self.headers.get("Origin")
-            if origin is not None and gate.is_from_here(self._headers()):
-                headers |= {"Access-Control-Allow-Origin": origin, "Vary": "Origin"}
-            self.send_response(status)
-            for name, value in headers.items():
-                self.send_header(name, value)
-            self.end_headers()
-            self.wfile.write(content)
-            self.close_connection = True
+    def _headers(self) -> dict[str, str]:
+        return {name.lower(): value for name, value in self.headers.items()}
 
-    return Handler
+    def _read_body(self) -> None:
+        length = self.headers.get("Content-Length", "0")
+        if length.isdecimal() and 0 < int(length) <= LONGEST_BODY:
+            self.rfile.read(int(length))
+
+    def _answer(
+        self,
+        status: int,
+        body: StopResult | ProblemDetails | None,
+        kind: str,
+        more: Mapping[str, str] | None = None,
+    ) -> None:
+        content = b"" if body is None else body.model_dump_json().encode()
+        headers = {
+            "Content-Length": str(len(content)),
+            "Connection": "close",
+            "Cache-Control": "no-store",
+            "X-Content-Type-Options": "nosniff",
+            **({"Content-Type": kind} if kind else {}),
+            **(more or {}),
+        }
+        origin = self.headers.get("Origin")
+        if origin is not None and self.server.gate.is_from_here(self._headers()):
+            headers |= {"Access-Control-Allow-Origin": origin, "Vary": "Origin"}
+        self.send_response(status)
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(content)
+        self.close_connection = True

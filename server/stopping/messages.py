@@ -5,19 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.queue import Role
-
-
-class _Message(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
 
 # ---- to the listener
 
 
-class Begin(_Message):
+class Begin(FrozenRecord):
     """The first line. `descriptor`: the listening socket, which it inherits. `urls`: each robot's port."""
 
     kind: Literal["begin"] = "begin"
@@ -33,14 +29,14 @@ class Begin(_Message):
     """Name and role of each valid token, by its digest; None while the service has not read them."""
 
 
-class Known(_Message):
+class Known(FrozenRecord):
     """The tokens, as in `Begin`, once the service has read them."""
 
     kind: Literal["known"] = "known"
     tokens: dict[str, tuple[str, Role]]
 
 
-class Owned(_Message):
+class Owned(FrozenRecord):
     """Which process owns a robot's port now; None if none does. `terminal`: the pseudo-terminal at which the robot was
     reached, by number, time of creation and holder, as `daq.transport` knows it."""
 
@@ -53,13 +49,13 @@ class Owned(_Message):
 # ---- from the listener
 
 
-class Ready(_Message):
+class Ready(FrozenRecord):
     """The listener takes requests now."""
 
     kind: Literal["ready"] = "ready"
 
 
-class Stopped(_Message):
+class Stopped(FrozenRecord):
     """A stop that was requested, its result in one line, and who requested it."""
 
     kind: Literal["stopped"] = "stopped"

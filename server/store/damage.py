@@ -23,8 +23,7 @@ def require_sound(engine: Engine, place: str) -> None:
             for rows in (ExperimentRow, JobRow):
                 _require_known_states(connection, rows, place)
     except DatabaseError as error:
-        line = line_of(error)
-        raise DamagedError(f"database {place}: {line}; {advice_of(line)}") from error
+        raise DamagedError(f"database {place}: {line_of(error)}; {advice_of(error)}") from error
 
 
 def _require_whole(connection: Connection, place: str) -> None:

@@ -70,11 +70,10 @@ class Store:
                 command.upgrade(config, "head")
                 connection.commit()
         except OperationalError as error:
-            line = line_of(error)
-            raise StoreError(f"database {self.place}: cannot be opened: {line}; {advice_of(line)}") from error
+            line = f"database {self.place}: cannot be opened: {line_of(error)}"
+            raise StoreError(f"{line}; {advice_of(error)}") from error
         except DatabaseError as error:
-            line = line_of(error)
-            raise StoreError(f"database {self.place}: {line}; {advice_of(line)}") from error
+            raise StoreError(f"database {self.place}: {line_of(error)}; {advice_of(error)}") from error
         except Exception as error:
             line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
             raise StoreError(f"{line}; {BRING_BACK}") from error

@@ -15,18 +15,18 @@ from tests.daq_cli.invoke import CommandLine
 
 
 @pytest.fixture(autouse=True)
-def nobodys_desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Working folder, configuration folder and stop sockets in an empty place."""
-    desk = tmp_path / "desk"
-    desk.mkdir()
-    monkeypatch.chdir(desk)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
     for name in [name for name in os.environ if name.startswith("DAQ_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
     monkeypatch.setenv("DAQ_RUNTIME_FOLDER", str(tmp_path / "run"))
     monkeypatch.setenv("COLUMNS", "500")
     console.cache_clear()
-    yield desk
+    yield folder
     console.cache_clear()
 
 

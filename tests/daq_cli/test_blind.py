@@ -320,25 +320,25 @@ def git(folder: Path, *words: str) -> str:
 
 
 def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_registered(
-    daq: CommandLine, nobodys_desk: Path
+    daq: CommandLine, empty_folder: Path
 ) -> None:
     path = "model/trial"
     digest = tree_hashes([path])[path]
     begun = 'version = 1\ntitle = "t"\ndetectable = 5.0\nruns.diagnostic.cases.clean = 1\n'
     text = begun + to_register() + "\n"
-    file = nobodys_desk / "registration.toml"
+    file = empty_folder / "registration.toml"
     file.write_text(text, "utf-8")
-    git(nobodys_desk, "init", "-q")
+    git(empty_folder, "init", "-q")
     words = ("blind", "--folder", "trial", "--registration", file, "--until", "detect")
     daq(*words).complains(2, "is not committed as it stands")
-    git(nobodys_desk, "add", file.name)
-    git(nobodys_desk, "commit", "-q", "-m", "registered")
+    git(empty_folder, "add", file.name)
+    git(empty_folder, "commit", "-q", "-m", "registered")
     daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
     daq(*words, "--cases", "1").complains(2, "--cases and --registration")
     daq(*words, "--acquire").complains(2, "--acquire and --registration")
     daq(*words, "--kinds", "clean").complains(2, "--kinds and --registration")
     daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
-    kept = nobodys_desk / "registration-diagnostic.md"
+    kept = empty_folder / "registration-diagnostic.md"
     kept.write_text("a table", "utf-8")
     daq(*words).complains(2, "registration-diagnostic.md: this run has been made")
     kept.unlink()

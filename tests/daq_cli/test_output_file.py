@@ -13,18 +13,18 @@ from daq.contracts.errors import SpecError
 from daq_cli.app.output_file import replacing
 
 
-def test_the_old_file_stays_until_the_new_one_is_whole(nobodys_desk: Path) -> None:
-    path = nobodys_desk / "model.json"
+def test_the_old_file_stays_until_the_new_one_is_whole(empty_folder: Path) -> None:
+    path = empty_folder / "model.json"
     path.write_text("old")
     with replacing(path) as part:
         part.write_text("new")
         assert path.read_text() == "old"
     assert path.read_text() == "new"
-    assert list(nobodys_desk.iterdir()) == [path]
+    assert list(empty_folder.iterdir()) == [path]
 
 
-def test_the_old_file_stays_when_the_new_one_fails(nobodys_desk: Path) -> None:
-    path = nobodys_desk / "model.json"
+def test_the_old_file_stays_when_the_new_one_fails(empty_folder: Path) -> None:
+    path = empty_folder / "model.json"
     path.write_text("old")
 
     def half_way() -> None:
@@ -35,7 +35,7 @@ def test_the_old_file_stays_when_the_new_one_fails(nobodys_desk: Path) -> None:
     with pytest.raises(SpecError, match=r"model\.json: cannot be written: No space left on device"):
         half_way()
     assert path.read_text() == "old"
-    assert list(nobodys_desk.iterdir()) == [path]
+    assert list(empty_folder.iterdir()) == [path]
 
 
 def test_a_symbolic_link_stays_a_link(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def test_a_run_is_recorded_and_printed_for_people(daq: CommandLine, port: str) -
 
 
 def test_a_dry_run_connects_to_nothing_and_leaves_nothing(
-    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, nobodys_desk: Path
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, empty_folder: Path
 ) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("a dry run starts no process")
@@ -50,7 +50,7 @@ def test_a_dry_run_connects_to_nothing_and_leaves_nothing(
     data = json.loads(daq("--port", "serial:///dev/nowhere", "run", "ramp", "--dry-run", "--json").out)
     assert data["violations"] == []
     assert data["preview"]["period"] == 0.02
-    assert not list(nobodys_desk.iterdir())
+    assert not list(empty_folder.iterdir())
 
 
 def test_an_experiment_is_read_from_json_and_toml(daq: CommandLine) -> None:

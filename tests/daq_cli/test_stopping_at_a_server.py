@@ -22,7 +22,7 @@ from daq.contracts.service.robot import RobotIdentity, RobotStatus, RobotSummary
 from daq.contracts.service.teaching import TaughtPath, TeachingStatus
 from daq.teaching import RecordedPath
 from daq.teaching.program import Program, Wait
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.robot.remote import companion
 from daq_cli.robot.remote.companion import Companion
 from daq_cli.robot.remote.run import acquire_remotely
@@ -171,7 +171,7 @@ def test_confirming_that_an_operator_is_present_delays_no_stop() -> None:
     assert robot.patience[0] == companion.ANSWER_WITHIN
 
 
-class Agreeing(Consent):
+class Agreeing(ConsentPrompt):
     """An operator who agrees when asked."""
 
     def agreed(self, url: str) -> bool:

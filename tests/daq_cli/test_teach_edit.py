@@ -16,9 +16,9 @@ EDIT = ("teach", "edit")
 
 
 @pytest.fixture(autouse=True)
-def taught(nobodys_desk: Path) -> Path:
+def taught(empty_folder: Path) -> Path:
     """Step, wait, step, gripper."""
-    del nobodys_desk
+    del empty_folder
     program = {
         "name": "pick",
         "instructions": [

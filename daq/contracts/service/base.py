@@ -5,13 +5,13 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Annotated, Generic, TypeVar
 
-from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, AwareDatetime, Field
+
+from daq.contracts.frozen import FrozenRecord
 
 
-class Wire(BaseModel):
+class Wire(FrozenRecord):
     """A message of the service. Unknown fields are refused, never ignored."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _has_utc(moment: datetime) -> datetime:

@@ -100,6 +100,8 @@ class KnownEffect(Wire):
     """An effect of the library, which a fit may add and a diagnosis considers."""
 
     name: str
+    called: str
+    """The name as people write it."""
     family: str
     title: str
     """One line for people."""
@@ -191,11 +193,17 @@ class ModelParameter(Wire):
     deviation: float | None
 
 
+class EffectInModel(EffectChoice):
+    """An effect of a model. `called`: the effect and its joints as people write them."""
+
+    called: str
+
+
 class ModelDetails(Wire):
     """A model: its effects, its parameters, and the models from which it was made, the nearest first."""
 
     entry: ModelEntry
-    effects: tuple[EffectChoice, ...]
+    effects: tuple[EffectInModel, ...]
     parameters: tuple[ModelParameter, ...]
     ancestors: tuple[ModelEntry, ...]
 

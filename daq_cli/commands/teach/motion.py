@@ -10,7 +10,7 @@ import typer
 
 from daq.contracts.errors import SpecError
 from daq_cli.app import completion
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption
 from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
 from daq_cli.commands.teach import edit, programs
@@ -55,7 +55,7 @@ def jog(
         line.tell(f"posture {len(kept)} kept")
 
     try:
-        robot.teaching(Consent(yes)).jog(pendant, keep, line)
+        robot.teaching(ConsentPrompt(yes)).jog(pendant, keep, line)
     finally:
         line.close()
         if program is not None and kept:
@@ -89,7 +89,7 @@ def step(
         first = first_invalid(error)
         raise SpecError(f"step: {first.where()} = {first.value:.5g} rad or rad/s: {first.message}") from error
     program = Program(name="step", machine=robot.machine.name, instructions=(instruction,))
-    print(robot.teaching(Consent(yes)).perform(program))
+    print(robot.teaching(ConsentPrompt(yes)).perform(program))
 
 
 @app.command("program")
@@ -103,7 +103,7 @@ def run_file(
     """Carry out a taught program: steps, paths, waits, process signals."""
     robot = robot_of(context)
     program = robot.program(file)
-    print(robot.teaching(Consent(yes)).perform(program))
+    print(robot.teaching(ConsentPrompt(yes)).perform(program))
 
 
 @app.command()
@@ -139,7 +139,7 @@ def lead(
         save_path(path, output)
         print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
 
-    robot_of(context).teaching(Consent(yes)).lead(led, seconds, keep)
+    robot_of(context).teaching(ConsentPrompt(yes)).lead(led, seconds, keep)
 
 
 @app.command()

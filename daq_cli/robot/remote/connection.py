@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from daq_cli.app.consent import Consent
+from daq.contracts.consent import lacks_consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 
 if TYPE_CHECKING:
@@ -33,15 +34,14 @@ def connected_status(robot: Robot) -> RobotStatus:
     return status if status.identity is not None else robot.connect()
 
 
-def require_consent(status: RobotStatus, consent: Consent) -> bool:
+def require_consent(status: RobotStatus, consent: ConsentPrompt) -> bool:
     """Returns whether the robot is a real arm, for which it asks the operator. Raises SafetyError without consent."""
-    real = status.identity is not None and not status.identity.simulated
-    consent.require(f"{status.robot} at the server ({status.port})", simulated=not real)
-    return real
+    consent.require(f"{status.robot} at the server ({status.port})", status.identity)
+    return lacks_consent(status.identity, given=False)
 
 
 @contextmanager
-def controlled(call: Invocation, consent: Consent) -> Iterator[tuple[Robot, HeldControl]]:
+def controlled(call: Invocation, consent: ConsentPrompt) -> Iterator[tuple[Robot, HeldControl]]:
     """The robot, with control of it, which is given back afterwards. On a real arm the operator is asked.
 
     Raises ServiceError, SafetyError.

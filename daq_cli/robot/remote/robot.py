@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
@@ -45,21 +45,23 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             connected_status(robot)
 
-    def view(self) -> RobotView:
+    def state(self) -> RobotState:
         """Returns the state as the service knows it, with the age of the sample."""
         from daq.contracts.status import report_of
 
         with remote_robot(self.call) as robot:
             found = robot.status()
             gains = robot.gains().gains if found.limp else {}
-        return RobotView(report_of(found, self.server), _headline(found), gains)
+        return RobotState(report_of(found, self.server), _headline(found), gains)
 
     def gains(self) -> Mapping[int, Gain]:
         """The gains that the service has read."""
         with remote_robot(self.call) as robot:
             return robot.gains().gains
 
-    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+    def set_gains(
+        self, wanted: Mapping[int, Gain], consent: ConsentPrompt, written: Callable[[int, Gain], None]
+    ) -> str:
         """Writes gains. The service refuses a joint off its set point."""
         from daq.contracts.limp import limp_line
 
@@ -74,12 +76,12 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return robot.process()
 
-    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             return control.set_output(output, on=on, while_stopped=while_stopped)
 
-    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
         """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             return control.set_gripper(closed=closed, while_stopped=while_stopped)
@@ -91,12 +93,12 @@ class RemoteRobot:
 
         return stop_at_server(self.call)
 
-    def reset(self, *, here: bool) -> ResetDone:
+    def reset(self, *, adopt_posture: bool) -> ResetDone:
         """Has the service end the stop."""
         with remote_robot(self.call) as robot:
-            return ResetDone(robot.reset(here=here).text)
+            return ResetDone(robot.reset(here=adopt_posture).text)
 
-    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Queues the experiment at the service."""
         del machine  # the service has its own
         from daq_cli.robot.remote.run import acquire_remotely
@@ -138,7 +140,7 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return kept_program(robot, str(name))
 
-    def teaching(self, consent: Consent) -> Teaching:
+    def teaching(self, consent: ConsentPrompt) -> Teaching:
         """Returns teaching with control of the service's robot."""
         from daq_cli.robot.remote.teach import RemoteTeaching
 

@@ -10,7 +10,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError, TraceError
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.stop_keys import StopKeys
 from daq_cli.robot.answers import AcquisitionFailedError
 from daq_cli.robot.remote.companion import Companion
@@ -36,7 +36,7 @@ FAILED_POLLS = 5
 """Number of failed polls after which the service counts as lost."""
 
 
-def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: Consent) -> Finished:
+def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: ConsentPrompt) -> Finished:
     """Queues `spec`, follows it to its end, and downloads its trace into `folder`.
 
     Ctrl-C cancels it, or stops the arm while it runs. Raises AcquisitionFailedError, and ServiceError if the service

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.candidates.library import TONES, Hypothesis
+from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.tones import tones_tried
 from model.discrepancy.output_error.calibration import Calibration
@@ -265,7 +265,7 @@ def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:
 def price_of(observation: Observation, hypothesis: Hypothesis) -> float:
     """The cost of a candidate's free parameters, in evidence."""
     count = len(hypothesis.free)
-    if hypothesis.name not in TONES:
+    if hypothesis.tone is None:
         return count * math.log(observation.samples)
     of_frequency = 2 * math.log(tones_tried(observation, hypothesis))
     return of_frequency + (count - 1) * math.log(observation.samples)

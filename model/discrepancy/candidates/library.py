@@ -7,14 +7,11 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from model import layout as at
+from model.effects.effect import Tone
 from model.effects.library import effect, library
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-TONES = ("torque_ripple", "periodic_disturbance")
-"""Effects with a frequency, which no trial size can find: a spectrum proposes it."""
-FLEXIBLE = ("backlash", "joint_compliance")
-"""Effects that take five times as long to simulate: they are tried only on joints where something is wrong."""
 TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
     "joint_compliance": (0.15, 0.5, 1.5),
@@ -63,6 +60,11 @@ class Hypothesis:
     bounds: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
+    def tone(self) -> Tone | None:
+        """What it repeats over, if it is a tone."""
+        return effect(self.name).tone
+
+    @property
     def main(self) -> tuple[Parameter, ...]:
         """The free parameters that have a value at which the effect is absent."""
         return tuple(p for p in self.free if p.null is not None)
@@ -81,7 +83,7 @@ def hypotheses(
     names = tuple(library()) if effects is None else tuple(effect(name).name for name in effects)
     found: list[Hypothesis] = []
     for name in names:
-        if name in TONES:
+        if effect(name).tone is not None:
             continue
         places = ((),) if effect(name).whole_machine else tuple((j,) for j in joints or model.machine.modelled_joints)
         for place in places:
@@ -180,7 +182,7 @@ def _hypothesis(
     """The model with the effect; where it has the effect already, with a prior, the prior is lifted."""
     wider = place.model
     if any(place.has_law(use.name, use.joints) for use in wider.effects):
-        if place.law in TONES or place.law == "stribeck_friction":
+        if effect(place.law).tone is not None or place.law == "stribeck_friction":
             return None
         free = tuple(p for p in wider.parameters if place.has_law(p.effect, p.joints) and p.null is not None)
     else:

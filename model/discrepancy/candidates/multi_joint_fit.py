@@ -14,7 +14,7 @@ import numpy as np
 
 from daq.contracts.progress import Cancel, stop_if
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, nearest, refit, restart
-from model.discrepancy.candidates.library import TONES, Hypothesis, on_joints
+from model.discrepancy.candidates.library import Hypothesis, on_joints
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.thresholds import Thresholds
 
@@ -116,7 +116,7 @@ def _alike(singles: Sequence[CandidateFit], thresholds: Thresholds) -> list[list
     suited = [
         r
         for r in singles
-        if r.evidence >= thresholds.significant and len(r.hypothesis.joints) == 1 and r.hypothesis.name not in TONES
+        if r.evidence >= thresholds.significant and len(r.hypothesis.joints) == 1 and r.hypothesis.tone is None
     ]
     sets: list[list[CandidateFit]] = []
     for _, group in groupby(sorted(suited, key=lambda r: _law(r.hypothesis)), key=lambda r: _law(r.hypothesis)):

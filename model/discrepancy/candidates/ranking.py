@@ -20,13 +20,14 @@ from model.discrepancy.candidates.candidate_fit import (
     restart,
     same_answer,
 )
-from model.discrepancy.candidates.library import FLEXIBLE, TONES, hypotheses
+from model.discrepancy.candidates.library import hypotheses
 from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, keep_promising, probe
 from model.discrepancy.candidates.tones import propose_tones
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
+from model.effects.library import effect
 from model.effects.names import effect_on
 
 FLAGGED_SHARE = 0.1
@@ -83,14 +84,15 @@ def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe
         if h.name not in case.excluded and not {p.name for p in h.main} <= free  # what has been added is free already
     ]
     every = keep_promising(point, every, earlier, REMEMBERED * thresholds.interesting)
-    probes = probe(point, [h for h in every if h.name not in FLEXIBLE])
+    flexible = [h for h in every if effect(h.name).is_flexible]  # five times as long to simulate
+    probes = probe(point, [h for h in every if not effect(h.name).is_flexible])
     stop_if(cancel)
     joints = options.joints or point.model.machine.modelled_joints
-    if options.effects is None or set(TONES) & set(options.effects):
+    if options.effects is None or any(effect(name).tone for name in options.effects):
         tones = propose_tones(point, joints)
         probes += [t for t in tones if options.effects is None or t.hypothesis.name in options.effects]
     flagged = _flagged_joints(probes, joints, thresholds.interesting)
-    probes += probe(point, [h for h in every if h.name in FLEXIBLE and h.joints[0] in flagged])
+    probes += probe(point, [h for h in flexible if h.joints[0] in flagged])
     probes.sort(key=lambda p: -p.gain)
     return probes
 

@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 
 from model.arrays import Floats
-from model.discrepancy.candidates.library import TONES, Hypothesis, tone
+from model.discrepancy.candidates.library import Hypothesis, tone
 from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
 from model.discrepancy.output_error.search import Point
+from model.effects.effect import Tone
+from model.effects.library import effect, library
 from model.fitting.records import Record, resolution
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
 RESPONSE = 1.5
 """Length of the impulse response, s: a simulation that is given most of the record decays slowly."""
-SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
-"""The parameter of each effect that a spectrum finds."""
-TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}
+TRIAL_RATES = {Tone.OVER_POSITION: (23.0, 47.0), Tone.OVER_TIME: (0.7, 2.1, 4.3)}
 """Rates of the tones that the response is fitted to: rad of phase per unit of the joint's travel; Hz."""
 MOST_TONES = 500
 """Tones tried of one effect on one joint, unless the record is so long that tones between them would be missed."""
@@ -52,8 +52,8 @@ def propose_tones(point: Point, joints: Sequence[int]) -> list[Probe]:
         if shown_by is None:
             continue
         response = torque_response(point, joint, shown_by)
-        for name in absent:
-            best = _best_tone(point, clear, name, joint, response)
+        for name, over in absent.items():
+            best = _best_tone(point, clear, name, over, joint, response)
             if best is not None:
                 found.append(best)
     return sorted(found, key=lambda p: -p.gain)
@@ -74,8 +74,9 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
     """
     machine = observation.machine
     column = machine.modelled_joints.index(joint)
-    high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.part == SHAPES[name])
-    if name == "torque_ripple":
+    over = effect(name).tone
+    high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.part == over)
+    if over is Tone.OVER_POSITION:
         travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
         sensor = machine.joint(joint).sensor
         if sensor is not None and sensor.measures == "position":
@@ -123,16 +124,16 @@ def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
         model = model.with_effect(name, (joint,))
     begun = point.of(model)
     states, sizes, waves = [observation.state(begun)], [], []
-    for name in absent:
-        for value in TRIAL_RATES[name]:
+    for name, over in absent.items():
+        for value in TRIAL_RATES[over]:
             state = observation.state(begun)
-            state[0][list(model.parameter(f"joint{joint}.{name}.{SHAPES[name]}").slots)] = value
+            state[0][list(model.parameter(f"joint{joint}.{name}.{over}").slots)] = value
             sine = model.parameter(f"joint{joint}.{name}.sine")
             size = DIFFERENCE * (sine.deviation or 1.0)
             state[0][list(sine.slots)] += size
             states.append(state)
             sizes.append(size)
-            waves.append(np.sin(_phase(point, name, column, np.array([value]), record)[0]))
+            waves.append(np.sin(_phase(point, over, column, np.array([value]), record)[0]))
     shown = observation.readings(model, states)[record][..., column]
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
     count = _samples(observation.records[record])
@@ -144,9 +145,10 @@ def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
     return np.asarray(np.linalg.solve(gram, regressor.T @ target))
 
 
-def _absent(model: Model, joint: int) -> list[str]:
-    """The kinds of tones that a joint does not have."""
-    return [name for name in TONES if not any(u.name == name and joint in u.joints for u in model.effects)]
+def _absent(model: Model, joint: int) -> dict[str, Tone]:
+    """The effects that are tones and that a joint does not have."""
+    known = {name: own.tone for name, own in library().items() if own.tone is not None}
+    return {n: t for n, t in known.items() if not any(u.name == n and joint in u.joints for u in model.effects)}
 
 
 def _lagged(wave: Floats, count: int) -> Floats:
@@ -154,10 +156,10 @@ def _lagged(wave: Floats, count: int) -> Floats:
     return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, count)[:, ::-1])
 
 
-def _phase(point: Point, name: str, column: int, values: Floats, record: int = 0) -> Floats:
+def _phase(point: Point, over: Tone, column: int, values: Floats, record: int = 0) -> Floats:
     """Phase (k, m) of tones of the given cycles or frequencies along a record."""
     source = point.observation.records[record]
-    if name == "torque_ripple":
+    if over is Tone.OVER_POSITION:
         angle = source.measured[:, column] - point.residuals[record][:, column]
         return values[:, None] * angle[None]
     time = (source.inputs.rows + 0.0) * source.inputs.period
@@ -165,12 +167,12 @@ def _phase(point: Point, name: str, column: int, values: Floats, record: int = 0
 
 
 def _passed(
-    point: Point, name: str, column: int, values: Floats, response: Floats, record: int
+    point: Point, over: Tone, column: int, values: Floats, response: Floats, record: int
 ) -> NDArray[np.complex128]:
     """Readings (k, m) that tones of unit torque cause, the cosine as real part and the sine as imaginary part."""
     source = point.observation.records[record]
-    waves = np.exp(1j * _phase(point, name, column, values, record))
-    if name == "torque_ripple":
+    waves = np.exp(1j * _phase(point, over, column, values, record))
+    if over is Tone.OVER_POSITION:
         samples = waves.shape[1]
         room = next_fast_len(samples + len(response) - 1)
         waves = ifft(fft(waves, room, axis=1) * fft(response, room), axis=1)[:, :samples]
@@ -180,7 +182,7 @@ def _passed(
     return np.concatenate([waves[:, run] for run in source.runs], axis=1)
 
 
-def _best_tone(point: Point, clear: Projection, name: str, joint: int, response: Floats) -> Probe | None:
+def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: int, response: Floats) -> Probe | None:
     """The tone that explains most of what is left, once the tolerance parameters have moved too."""
     observation = point.observation
     column = point.model.machine.modelled_joints.index(joint)
@@ -188,7 +190,7 @@ def _best_tone(point: Point, clear: Projection, name: str, joint: int, response:
     columns = np.arange(column, len(point.weighted), len(observation.deviations))
     best, shown = None, np.zeros_like(point.weighted)
     for own in np.array_split(rates, math.ceil(len(rates) * len(columns) / BLOCK)) if len(rates) else ():
-        waves = [_passed(point, name, column, own, response, t) for t in range(len(observation.records))]
+        waves = [_passed(point, over, column, own, response, t) for t in range(len(observation.records))]
         both = np.concatenate(waves, axis=1) / observation.deviations[column]
         sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
         gains, first, second = _explained(clear, sine, cosine, columns)
@@ -199,7 +201,7 @@ def _best_tone(point: Point, clear: Projection, name: str, joint: int, response:
     if best is None:
         return None
     gain, in_sine, in_cosine, rate = best
-    found = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, SHAPES[name]: rate})
+    found = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, over: rate})
     return None if found is None else Probe(found, gain, found.trials[0], clear.moves(shown), shown)
 
 

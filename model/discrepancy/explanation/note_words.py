@@ -63,8 +63,7 @@ def _resting_left_out(_: Values) -> str:
 def _stated_numbers_moved(v: Values) -> str:
     numbers = v["numbers"]
     listed = ", ".join(
-        f"{n['name']} {_with_unit(n['value'], n['unit'])} ({n['deviations']:.0f} deviations; "
-        f"{n['expected']:.4g} stated)"
+        f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.0f} deviations; {n['expected']:.4g} stated)"
         for n in numbers
     )
     subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
@@ -109,7 +108,7 @@ def _unfinished_record(v: Values) -> str:
     )
 
 
-def _with_unit(value: float, unit: str) -> str:
+def _rounded(value: float, unit: str) -> str:
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 

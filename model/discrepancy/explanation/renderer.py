@@ -22,6 +22,7 @@ from model.discrepancy.diagnosis import (
     Phase,
     RemainingShape,
     Step,
+    Suspicion,
     Where,
     clear_shape,
     in_order,
@@ -29,9 +30,9 @@ from model.discrepancy.diagnosis import (
 from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.pattern_words import pattern_words
-from model.discrepancy.grounds import NamedEffect, Reason, Refusal
+from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
 from model.discrepancy.numbers import from_to, plain
-from model.effects.names import capitalised, effect_on, joints_in_words
+from model.effects.names import capitalised, effect_on, joints_in_words, placed
 
 NOTICEABLE = 0.98
 """Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
@@ -148,12 +149,16 @@ def summary(answer: Diagnosis) -> str:
 
 def _suspected(answer: Diagnosis) -> str:
     """What is suspected, and how much more of the motion would settle it."""
-    found = answer.suspicion
-    if found is None:
+    if answer.suspicion is None:
         return "Suspected: an effect that these traces do not show clearly."
+    return f"Suspected: {suspicion_words(answer.suspicion)}."
+
+
+def suspicion_words(found: Suspicion) -> str:
+    """A suspicion as a clause."""
     return (
-        f"Suspected: {_called(found.effect, found.joints)}, evidence {found.evidence:.0f} of {found.needed:.0f}; "
-        f"{found.seconds:.0f} s more of this motion would settle it."
+        f"{_called(found.effect, found.joints)}, evidence {found.evidence:.0f} of {found.needed:.0f}; "
+        f"{found.seconds:.0f} s more of this motion would settle it"
     )
 
 
@@ -264,7 +269,7 @@ def _proof(step: Step) -> str:
     """What the controller's own recorded numbers prove, as a clause."""
     assert step.proof is not None
     joint, samples, of = step.joints[0], step.proof.samples, step.proof.of
-    if step.effect == "wrong_gain":
+    if step.effect == ControllerEffect.WRONG_GAIN:
         ratio = 1 + next(iter(step.parameters.values())).value
         share = f"{samples} of {of} samples"
         return f"joint {joint}: the recorded power is {ratio:.3f} times the gain times the recorded error ({share})"
@@ -318,15 +323,45 @@ def _beaten(rival: NamedEffect, step: Step) -> str:
 def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:
     """“, 0.93° (0.90 to 0.96)”, or nothing where the effect has no single size."""
     value = size_of(effect, parameters, joint)
-    if value is None:
-        return ""
+    return "" if value is None else f", {size_words(value)}"
+
+
+def size_words(value: FoundValue) -> str:
+    """“0.93° (0.90 to 0.96)”: an estimate in the units that people read, with its interval if it has one."""
     factor, unit = {"rad": (math.degrees(1.0), "°"), "1": (100.0, " %"), "s": (1e3, " ms"), "H": (1e3, " mH")}.get(
         value.unit, (1.0, f" {value.unit}")
     )
     interval = ""
     if value.low is not None and value.high is not None:
         interval = f" ({plain(value.low * factor, 3)} to {plain(value.high * factor, 3)})"
-    return f", {plain(value.value * factor, 3)}{unit}{interval}"
+    return f"{plain(value.value * factor, 3)}{unit}{interval}"
+
+
+def removed_words(share: float) -> str:
+    """The share of the held-out variance beyond noise that a step removed: all of it, where the error is below its
+    floor. A clause."""
+    if share < 0:
+        return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
+    return f"{percent_gone(share, 1)} of the held-out variance beyond noise is gone"
+
+
+def percent_gone(share: float, places: int) -> str:
+    """A share in percent; “all” for all of it. A share below all is never rounded up to 100 %."""
+    if share >= 1.0:
+        return "all"
+    return f"{min(100 * share, 100 - 10**-places):.{places}f} %".replace("-", "−")
+
+
+def not_a_finding(answer: Diagnosis, where: Where) -> str:
+    """Why a residual that goes with something is no finding; empty where the answer names one."""
+    if answer.verdict != "nothing-significant":
+        return ""
+    certain = "σ says how certain the dependence is, not how large: no joint is off by more than noise. "
+    tried = sorted((c for s in answer.steps for c in s.candidates), key=lambda c: -c.evidence)[:1]
+    needed = [] if answer.significant is None else [f"an effect is named from evidence {answer.significant:.0f} on"]
+    best = [f"the best, {placed(c.effect, c.joints)}, has evidence {c.evidence:.0f}" for c in tried]
+    because = f": {'; '.join((*needed, *best))}" if needed or best else ""
+    return f"{'' if where.joint is not None else certain}This is not a finding{because}."
 
 
 def _called(effect: str, joints: Sequence[int]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from daq.contracts.machine import DcMotor, NoController
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
 from model.effects.library import library
@@ -26,7 +26,6 @@ UNSEEN = "damping"
 """Part of an effect that torques do not show: a transmission's damping acts in its vibration, above every cutoff."""
 MOTOR_EFFECTS = ("back_emf_error", "resistance_drift", "motor_inductance")
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
-ROTOR_EFFECTS = ("backlash", "joint_compliance")
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
@@ -111,7 +110,7 @@ class _Place:
         return every if every.size else np.zeros(1)
 
 
-def list_trials(model: Model, now: BalanceFit, case: Case) -> Iterator[Trial]:
+def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once."""
     names = case.options.effects
     for name, effect in library().items():
@@ -162,12 +161,13 @@ def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
         "centre_of_mass": model.vector[row + at.A] != 0.0,
         "load_dependent_friction": falls,
         **dict.fromkeys(MOTOR_EFFECTS, isinstance(joint.drive, DcMotor)),
-        **dict.fromkeys(ROTOR_EFFECTS, model.vector[row + at.ROTOR_INERTIA] > 0),
         **dict.fromkeys(
             SENSOR_EFFECTS,
             joint.sensor is not None and joint.sensor.measures == "position" and joint.sensor.linearity is not None,
         ),
     }
+    if effect.is_flexible and not model.vector[row + at.ROTOR_INERTIA] > 0:
+        return False
     return bool(needs.get(effect.name, True)) and (not effect.joints or set(joints) <= set(effect.joints))
 
 

@@ -18,7 +18,7 @@ FLOOR_SHARE = 0.3
 
 
 @dataclass(frozen=True)
-class Case:
+class TorqueCase:
     """The records of a diagnosis, and how it is to be done.
 
     records, held_out: motions that are fitted to, and that are not. noise: (n,) standard deviation of a residual torque

@@ -17,7 +17,7 @@ from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
@@ -73,7 +73,7 @@ def diagnose_torques(
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     records = recorded_motions(traces, model.machine, cutoff)
     repeats = repeated_noise(records, TorqueBalance(model, records).residual({}))
-    case = Case(
+    case = TorqueCase(
         records,
         recorded_motions(held_out, model.machine, cutoff),
         np.maximum(torque_noise(model, traces, cutoff), repeats),
@@ -99,7 +99,7 @@ class _Workflow:
     """State of a diagnosis: model and fit so far, the steps taken, and the ranking of a step that added nothing."""
 
     model: Model
-    case: Case
+    case: TorqueCase
     progress: Progress
     cancel: Cancel
     added: frozenset[str] = frozenset()

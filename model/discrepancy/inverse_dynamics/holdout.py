@@ -29,7 +29,6 @@ AFFECTED = 0.01
 """Share by which a joint's mean square must have fallen in the fit to count as one on which the effect acts."""
 MORE_THAN_NOISE = 1.1
 """Least residual, in noise floors, of a joint on which something may be missing."""
-DISTURBANCE = "periodic_disturbance"
 
 
 def mean_squares(stretches: Stretches, residual: Sequence[Floats]) -> Floats:
@@ -119,14 +118,10 @@ def _residuals(model: Model, values: Mapping[str, float], records: Sequence[Reco
 def _with_own_phases(balance: TorqueBalance, values: Mapping[str, float]) -> dict[str, float]:
     """The values with the sine and cosine of every disturbance turned to the phase that explains most."""
     turned = dict(values)
-    parts = [p for p in balance.model.parameters if p.effect == DISTURBANCE]
-    for sine in (p for p in parts if p.part == "sine"):
-        cosine = next((p for p in parts if p.part == "cosine" and p.joints == sine.joints), None)
-        if cosine is None:  # shared under another name: what is said of it there holds everywhere
-            continue
-        size = math.hypot(*(values.get(p.name, p.value) for p in (sine, cosine)))
+    for pair in balance.model.disturbances:
+        size = math.hypot(*(values.get(p.name, p.value) for p in pair))
         if size > 0.0:
-            turned |= _turned(balance, turned, (sine, cosine), size)
+            turned |= _turned(balance, turned, pair, size)
     return turned
 
 

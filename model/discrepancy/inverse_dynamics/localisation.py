@@ -17,7 +17,7 @@ from model.discrepancy.diagnosis import (
     Where,
     WorstPlace,
 )
-from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import torque_unit
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.localisation.dependence import AGAINST, Quantities, dependence
@@ -56,7 +56,7 @@ def phases(record: RecordedMotion, joint: int) -> list[Phase]:
     return found
 
 
-def locate(now: BalanceFit, case: Case) -> Where:
+def locate(now: BalanceFit, case: TorqueCase) -> Where:
     """Map of the residual, in units of its noise, and the quantities that it depends on."""
     model, records, residual, floor = now.balance.model, now.balance.records, now.residual, case.noise
     cells: list[PhaseCell] = []
@@ -106,7 +106,7 @@ def locate(now: BalanceFit, case: Case) -> Where:
     )
 
 
-def remaining_shapes(now: BalanceFit, case: Case) -> tuple[RemainingShape, ...]:
+def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape, ...]:
     """Per joint, the dependence that explains most of a torque beyond noise, where there is a significant one."""
     model, found = now.balance.model, []
     for j, joint in enumerate(model.machine.modelled_joints):
@@ -139,7 +139,7 @@ def _time(record: RecordedMotion, row: int) -> float:
     return round(float(record.time[record.edge] + row * record.every * record.period - record.time[0]), 4)
 
 
-def _bins(now: BalanceFit, case: Case, j: int) -> list[tuple[AgainstWhat, Bins, str]]:
+def _bins(now: BalanceFit, case: TorqueCase, j: int) -> list[tuple[AgainstWhat, Bins, str]]:
     """Dependences of the residual of joint index `j`: quantity, bins, unit of the quantity."""
     model, records, residual = now.balance.model, now.balance.records, now.residual
     joint = model.machine.joint(model.machine.modelled_joints[j])

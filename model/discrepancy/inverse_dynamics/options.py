@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import Field, FiniteFloat
 
+from daq.contracts.frozen import FrozenRecord
 from model.discrepancy.options import DiagnosisOptions
 
 
-class TorqueOptions(BaseModel):
+class TorqueOptions(FrozenRecord):
     """How to diagnose from torques.
 
     cutoff: of the low-pass, Hz; None: the highest at which noise of the acceleration stays small.
@@ -23,8 +24,6 @@ class TorqueOptions(BaseModel):
     least_margin: least lead in evidence over every other answer, for an effect to be named alone.
     least_share: least share by which the mean square of the torque on held-out records must fall.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     cutoff: Annotated[FiniteFloat, Field(gt=0)] | None = None
     effects: tuple[str, ...] | None = None

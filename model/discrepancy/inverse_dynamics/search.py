@@ -10,7 +10,7 @@ import numpy as np
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
-from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
@@ -72,7 +72,7 @@ class Findings:
     probed: tuple[Probe, ...]
 
 
-def search(model: Model, now: BalanceFit, case: Case, progress: Progress, cancel: Cancel) -> Findings:
+def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, cancel: Cancel) -> Findings:
     """Try every effect that the model lacks against the residuals of a fit.
 
     Raises CancelledError when asked to end.

@@ -34,7 +34,7 @@ ROUGHEST, SMOOTHEST = 1e-6, 1e6
 """Bounds of the weight of smoothness, relative to that of the data."""
 TRIALS = 16
 """Bisections between them."""
-LEAST_EXCESS = 1.1
+LEAST_MEAN_SQUARE = 1.1
 """Mean square of the weighted residual below which there is nothing to explain."""
 LEAST_EXPLAINED = 0.05
 """Least share of the torque's variance that a dependence must explain to be reported."""
@@ -54,7 +54,7 @@ def remaining_shapes(residuals: Residuals) -> tuple[RemainingShape, ...]:
     known = quantities(residuals.motions)
     found = []
     for j, joint in enumerate(machine.modelled_joints):
-        if np.mean(np.square(residuals.of_joint(j))) < LEAST_EXCESS * residuals.deviations[j] ** 2:
+        if np.mean(np.square(residuals.of_joint(j))) < LEAST_MEAN_SQUARE * residuals.deviations[j] ** 2:
             continue
         torque = np.concatenate(_torques(residuals, j))
         size = float(np.sqrt(np.mean(torque**2)))

@@ -19,7 +19,7 @@ from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
-from model.discrepancy.grounds import ControllerProof
+from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.sampled_controller import controller_numbers, with_errors
 from model.drives.controller import POWER_MAX
@@ -41,7 +41,7 @@ LEAST_SAMPLES = 20
 class ControllerFinding:
     """A violation: effect, joint, its parameter with a 95 % interval, and how many samples show it."""
 
-    effect: str
+    effect: ControllerEffect
     joint: int
     value: float
     low: float
@@ -81,10 +81,10 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
     traces = with_errors(traces, machine)
     joints = [_JointRecords(tuple(traces), machine, joint) for joint in machine.modelled_joints]
     checks = {
-        "wrong_gain": all(own.error_and_power is not None for own in joints),
-        "lost_set_points": all(_is_conclusive(own.losses) for own in joints),
+        ControllerEffect.WRONG_GAIN: all(own.error_and_power is not None for own in joints),
+        ControllerEffect.LOST_SET_POINTS: all(_is_conclusive(own.losses) for own in joints),
     }
-    return tuple(name for name, judged in checks.items() if judged)
+    return tuple(effect.value for effect, judged in checks.items() if judged)
 
 
 def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
@@ -94,13 +94,13 @@ def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
     Raises SpecError for a gain error beyond the bounds of the effect.
     """
     for finding in findings:
-        if finding.effect == "wrong_gain":
+        if finding.effect is ControllerEffect.WRONG_GAIN:
             place = at.slot(finding.joint, at.GAIN_ERROR)
             stated = [p.name for p in model.parameters if place in p.slots]
             model = (
                 model.with_values({stated[0]: finding.value})
                 if stated
-                else model.with_effect("wrong_gain", (finding.joint,), {"relative": finding.value})
+                else model.with_effect(finding.effect.value, (finding.joint,), {finding.effect.part: finding.value})
             )
     return model
 
@@ -201,18 +201,18 @@ class _JointRecords:
 
 def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
     """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its errors are zero."""
-    part = "relative" if finding.effect == "wrong_gain" else "share"
-    name = f"joint{finding.joint}.{finding.effect}.{part}"
+    part, effect = finding.effect.part, finding.effect.value
+    name = f"joint{finding.joint}.{effect}.{part}"
     value = FoundValue(
         value=finding.value, low=finding.low, high=finding.high, unit="1", part=part, joints=(finding.joint,)
     )
     evidence = float(finding.samples)
     proof = Candidate(
-        effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
+        effect=effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
     )
     quiet: Signals = tuple(np.zeros_like(r.measured) for r in observation.records)
     return Step(
-        effect=finding.effect,
+        effect=effect,
         joints=(finding.joint,),
         parameters={name: value},
         evidence=evidence,
@@ -237,7 +237,7 @@ def _lost_set_points(own: _JointRecords) -> ControllerFinding | None:
     if losses is None or not losses.violated or not losses.moved:
         return None
     share, (low, high) = losses.lost / losses.moved, _share_interval(losses.lost, losses.moved)
-    return ControllerFinding("lost_set_points", own.joint, share, low, high, losses.wrong, losses.moved)
+    return ControllerFinding(ControllerEffect.LOST_SET_POINTS, own.joint, share, low, high, losses.wrong, losses.moved)
 
 
 def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
@@ -255,7 +255,9 @@ def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
     if abs(relative - stated) < max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation):
         return None
     half, used = 2 * deviation, len(wanted)
-    return ControllerFinding("wrong_gain", own.joint, relative, relative - half, relative + half, used, used)
+    return ControllerFinding(
+        ControllerEffect.WRONG_GAIN, own.joint, relative, relative - half, relative + half, used, used
+    )
 
 
 def _share_interval(count: int, of: int) -> tuple[float, float]:

@@ -19,7 +19,6 @@ from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
 
-DISTURBANCE = "periodic_disturbance"
 BLOCK = 0.2
 """Time over which errors may be correlated, s."""
 START_STEPS = 8
@@ -115,15 +114,11 @@ def _values_here(point: Calibration, own: tuple[Unknown, ...]) -> Calibration:
 def _phases(point: Calibration) -> tuple[Unknown, ...]:
     """Sine and cosine of every periodic disturbance of a point, in pairs, free but for a prior of their amplitude."""
     fitted, found = point.by_name, []
-    tones = [p for p in point.model.parameters if p.effect == DISTURBANCE]
-    for sine in (p for p in tones if p.part == "sine"):
-        cosine = next((p for p in tones if p.part == "cosine" and p.joints == sine.joints), None)
-        if cosine is None:  # it shares the value of another joint's
-            continue
-        values = [float(fitted.get(p.name, p.value)) for p in (sine, cosine)]
+    for pair in point.model.disturbances:
+        values = [float(fitted.get(p.name, p.value)) for p in pair]
         size = math.hypot(*values)
         if size > 0.0:
-            found += [Unknown(p, v, deviation=size) for p, v in zip((sine, cosine), values, strict=True)]
+            found += [Unknown(p, v, deviation=size) for p, v in zip(pair, values, strict=True)]
     return tuple(found)
 
 

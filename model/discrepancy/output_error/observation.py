@@ -26,6 +26,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
+from model.effects.effect import Tone
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
@@ -62,8 +63,6 @@ BEND_TERMS = 8
 series must be able to describe a bend of a count or two there."""
 BEND_SHARE = 0.3
 """Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
-STIFF = ("backlash", "joint_compliance")
-"""Effects that make a gear flexible: with longer steps, derivatives of such models would be unstable."""
 CONTACT_STEP = 1e-3
 """Longest step of integration of models with play, s: parts in contact swing at up to 1500 rad/s, which steps of 2 ms
 cannot follow."""
@@ -313,8 +312,9 @@ def longest_step_of(model: Model) -> float:
 
 
 def step_of_derivatives(model: Model) -> float:
-    """Longest step of integration, s, of the runs that a finite difference compares."""
-    return STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
+    """Longest step of integration, s, of the runs that a finite difference compares: with longer ones, derivatives of a
+    model with a flexible gear would be unstable."""
+    return STEP if (model.flags & at.HAS_FLEXIBILITY).any() else COARSE_STEP
 
 
 def _difference(tried: Calibration, index: int, seconds: float) -> float:
@@ -324,9 +324,9 @@ def _difference(tried: Calibration, index: int, seconds: float) -> float:
     parameter = tried.model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
-    rate = (unknown.parameter.effect, unknown.parameter.part)
-    if rate in (("torque_ripple", "cycles"), ("periodic_disturbance", "frequency")):
-        size = TONE_DIFFERENCE / (1.0 if rate[1] == "cycles" else seconds)
+    over = unknown.parameter.rate_of
+    if over is not None:
+        size = TONE_DIFFERENCE / (1.0 if over is Tone.OVER_POSITION else seconds)
     if unknown.kind is Kind.INITIAL_POSITION:
         size /= LOOSE_START
     return -size if value + size > unknown.high else size

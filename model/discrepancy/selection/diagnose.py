@@ -21,7 +21,7 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, W
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
-from model.discrepancy.grounds import Note
+from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
@@ -47,8 +47,6 @@ from model.machine_model.model import Lineage, Model
 
 MOST_REFUSALS = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
-CONTROLLER_EFFECTS = ("wrong_gain", "lost_set_points")
-"""Effects of the controller, which do not show where the recorded drive is the input: its own numbers tell them."""
 FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 FIRST_STEPS = 6
@@ -70,7 +68,8 @@ def diagnose_by_simulation(
     findings = check_controller(traces, model.machine, model)
     excluded = settled_by_records(traces, model.machine)
     traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
-    if any(f.effect == "lost_set_points" for f in findings):  # the set points that were used are known to the count
+    if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
+        # The set points that were used are known to the count.
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
     if isinstance(model.machine.controller, SampledPid):
         traces, holdout = (tuple(map(thinned, some)) for some in (traces, holdout))
@@ -78,7 +77,8 @@ def diagnose_by_simulation(
     known = with_findings(model, findings)
     given = _given_point(*observe(known, traces))
     if given.observation.drive_is_input:
-        excluded = CONTROLLER_EFFECTS  # the plant gets the drive that was recorded, whatever the controller has done
+        # The plant gets the drive that was recorded, whatever the controller has done.
+        excluded = tuple(effect.value for effect in ControllerEffect)
     fitted = judge(_fit_tolerances(given))
     case = build_case(model, given, fitted.point, traces, hold_out(known, holdout), options, excluded)
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
@@ -122,7 +122,7 @@ class _Search:
 def _given_point(observation: Observation, given: Calibration) -> Point:
     """The model as it was given; its derivatives are left at zero. Wrong gains, which the controller's own numbers
     prove, stay as they are."""
-    free = [k for k, u in enumerate(given.unknowns) if u.parameter.effect != "wrong_gain"]
+    free = [k for k, u in enumerate(given.unknowns) if not u.parameter.is_gain_error]
     return point_at(observation, given.only(free), np.zeros((len(free), observation.samples)))
 
 
@@ -197,10 +197,10 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
 def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: ExperimentChooser | None) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
-    left = _unexplained_joints(case, found, looked)
-    answered = verdict((*proved, *found.steps), unexplained=bool(left))
+    joints = _unexplained_joints(case, found, looked)
+    answered = verdict((*proved, *found.steps), unexplained=bool(joints))
     if answered == "unknown-effect":
-        found = _withdraw(found, left)
+        found = _withdraw(found, joints)
     current, steps = update_to_last_fit(found.current, found.steps)
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
@@ -220,7 +220,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
         verdict=answered,
         summary=UNWRITTEN,
         method="output-error",
-        unexplained_joints=left if unknown else (),
+        unexplained_joints=joints if unknown else (),
         worse_held_out=worse_held_out(held) if unknown else (),
         steps=(*proved, *found.steps),
         where=where,
@@ -262,12 +262,12 @@ def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tupl
     return tuple(sorted({*left, *closer, *places}))
 
 
-def _withdraw(found: _Search, left: Sequence[int]) -> _Search:
+def _withdraw(found: _Search, unexplained_joints: Sequence[int]) -> _Search:
     """The search before its first step on a joint that stays unexplained."""
-    wrong = first_to_withdraw(found.steps, left)
+    wrong = first_to_withdraw(found.steps, unexplained_joints)
     if wrong is None:
         return found
-    steps = (*found.steps[:wrong], *(withdrawn(s, left) for s in found.steps[wrong:]))
+    steps = (*found.steps[:wrong], *(withdrawn(s, unexplained_joints) for s in found.steps[wrong:]))
     return replace(found, current=found.before[wrong], steps=steps, tried=None)  # it was tried against another point
 
 

@@ -1,4 +1,4 @@
-"""The command line of models: the same empty desk as for every other command, and traces of pretended rigs."""
+"""The command line of models: the same empty folder as for every other command, and traces of pretended rigs."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.daq_cli.conftest import daq, nobodys_desk
+from tests.daq_cli.conftest import daq, empty_folder
 
-__all__ = ["daq", "nobodys_desk"]
+__all__ = ["daq", "empty_folder"]
 
 ROOT = Path(__file__).parents[3]
 SINGLE_AXIS = ROOT / "examples" / "single_axis.toml"

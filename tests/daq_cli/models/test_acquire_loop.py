@@ -14,7 +14,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Outcome, Trace
 from daq.traces.reader import read_trace
-from daq_cli.app.consent import Consent
+from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.models.acquire_loop import Diagnose, LoopEnd, diagnose_and_acquire
 from daq_cli.robot.local import LocalRobot
@@ -115,7 +115,7 @@ class Arm(LocalRobot):
         self.moved: list[Machine] = []
         """The machines that the runs were for."""
 
-    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         self.moved.append(machine)
         samples = len(read_trace(self.trace))
         return Finished(
@@ -126,7 +126,7 @@ class Arm(LocalRobot):
 def loop(arm: LocalRobot, traces: list[Trace], budget: float, diagnose: Diagnose) -> LoopEnd:
     """The loop on traces of the shipped machine."""
     machine = load_machine("ma2000")
-    return diagnose_and_acquire(arm, machine, traces, None, budget, Consent(given=False), diagnose)
+    return diagnose_and_acquire(arm, machine, traces, None, budget, ConsentPrompt(given=False), diagnose)
 
 
 def test_remaining_robot_time_limits_further_experiments(ramp: Path) -> None:
@@ -152,7 +152,7 @@ def test_a_stopped_run_ends_the_loop_and_is_not_used(ramp: Path) -> None:
 def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
     machine = load_machine("ma2000").model_copy(update={"name": "bench"})
     with pytest.raises(SpecError, match="bench, the configured robot is ma2000"):
-        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, Consent(False), Answers(3.0))
+        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, ConsentPrompt(False), Answers(3.0))
 
 
 def test_experiments_stay_within_the_limits_of_the_configured_machine(ramp: Path) -> None:
@@ -174,7 +174,7 @@ def test_another_sensor_than_the_traces_is_refused(ramp: Path) -> None:
     joint = shipped.joint(2).model_copy(update={"sensor": sensor.model_copy(update={"at_zero": zero})})
     machine = shipped.model_copy(update={"joints": (shipped.joint(1), joint, *shipped.joints[2:])})
     with pytest.raises(SpecError, match="another sensor than in the traces on joint 2;"):
-        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, Consent(False), Answers(3.0))
+        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, ConsentPrompt(False), Answers(3.0))
 
 
 @pytest.mark.parametrize(("outcome", "code"), [("complete", 0), ("stopped", 6), ("fault", 5), ("interrupted", 5)])

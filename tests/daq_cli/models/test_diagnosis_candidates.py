@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from daq_cli.models.diagnosis_candidates import candidates_lines
+from daq_cli.models.diagnosis_text import candidates_lines
 from model.discrepancy.diagnosis import Candidate, Step, Where
 
 WHERE = Where(joint=None, phase=None, summary="", cells=(), dependences=())

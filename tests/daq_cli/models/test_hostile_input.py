@@ -22,9 +22,9 @@ READERS = {
 
 
 @pytest.fixture(autouse=True)
-def rig(nobodys_desk: Path) -> None:
+def rig(empty_folder: Path) -> None:
     """A trace and the machine that it is of."""
-    write_csv(nobodys_desk / "good.csv")
+    write_csv(empty_folder / "good.csv")
     Path("single.toml").write_text(SINGLE_AXIS.read_text("utf-8"))
 
 

@@ -10,8 +10,9 @@ import pytest
 from daq.contracts.service.jobs import ParameterWords
 from model.arrays import Floats
 from model.fitting.identifiability import judged, undetermined_in_words
-from model.fitting.unknowns import Unknown, torque_power
+from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
+from model.units import torque_power
 
 RANDOM = partial(np.random.default_rng, 5)
 

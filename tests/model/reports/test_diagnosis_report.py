@@ -10,7 +10,7 @@ from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import Acquired, Diagnosis, SignalError
 from model.discrepancy.grounds import ControllerProof
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
-from model.reports.diagnosis_words import TORQUES, compared, gap, gone, headline
+from model.reports.diagnosis_words import TORQUES, compared, gap, gone
 from model.reports.page import Picture, Report, Table, Text, html
 from tests.model.discrepancy.answers import EFFECT, an_answer
 
@@ -48,7 +48,7 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
     assert found.summary in text
     assert found.steps[0].reason in text
     assert "joint2.coulomb_friction.torque" in text
-    assert "98.2 % of the variance beyond noise is gone" in text
+    assert "98.2 % of the held-out variance beyond noise is gone" in text
     assert "6.4 standard deviations" in text
     # map, dependences, evidence, errors, two overlays and a closer look at each, remaining torque
     assert page.count("<svg") == 9
@@ -97,7 +97,7 @@ def test_an_answer_without_steps_has_a_page(answer: tuple[Diagnosis, Comparison]
         update={"verdict": "nothing-significant", "steps": (), "remaining": (), "next_experiment": None, "holdout": ()}
     )
     text = words(diagnosis_page(bare))
-    assert text.split()[:2] == ["Nothing", "significant"]
+    assert text.split()[:3] == ["The", "model", "explains"]
     assert "the model explains these traces within their noise" in text
     assert "none: nothing below was judged on other data" in text
     assert EFFECT not in text.split("model after")[0]
@@ -256,19 +256,9 @@ def test_what_has_no_clear_shape_is_not_told_as_one(answer: tuple[Diagnosis, Com
 def test_never_more_than_all_of_it_is_gone(answer: tuple[Diagnosis, Comparison]) -> None:
     below = SignalError(joint=1, unit="rad", before=10e-3, after=0.9e-3, floor=1e-3)
     nearly = below.model_copy(update={"after": 1.002e-3, "before": 1.0})
-    assert (gone(below), gone(nearly)) == ("all of it", "99.9 %")
+    assert (gone(below), gone(nearly)) == ("all", "99.9 %")
     step = answer[0].steps[0].model_copy(update={"excess_removed_holdout": 1.002})
-    assert gap(step).endswith("all of the variance beyond noise is gone.")
-
-
-def test_the_headline_is_what_was_found(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
-    assert headline(found) == "Coulomb friction, joint 2, 8.0 N·m (7.8 to 8.2)"
-    grouped = found.steps[0].model_copy(update={"group": found.steps[0].candidates[:2]})
-    undecided = found.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})
-    assert headline(undecided) == "One of: Coulomb friction, joint 2 or stiction, joint 2"
-    nothing_known = found.model_copy(update={"verdict": "unknown-effect", "steps": ()})
-    assert headline(nothing_known) == "None of the known effects explains what is left"
+    assert gap(step).endswith("all of the held-out variance beyond noise is gone.")
 
 
 @pytest.mark.usefixtures("undrawn")

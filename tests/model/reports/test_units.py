@@ -17,8 +17,8 @@ from model.discrepancy.diagnosis import SignalError
 from model.reports.comparison_report import comparison_report
 from model.reports.diagnosis_pictures import error_picture
 from model.reports.page import Table
-from model.reports.units import joint_unit, squared, with_unit
 from model.reports.validation_report import validation_report
+from model.units import joint_unit, squared, with_unit
 from model.validation.criterion import Fidelity, ParameterDistortion
 from model.validation.variation import JointResidual, TimeDomain, Variation
 

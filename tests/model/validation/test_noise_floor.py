@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from model.validation.acceleration_model import expected_accelerations
-from model.validation.measured_motion import observe
+from model.validation.measured_motion import smooth
 from model.validation.noise_floor import noise_floor
 from model.validation.time_domain import vary_in_time
 from tests.model.validation.synthetic import arm, multisine_trace, swinging_trace
@@ -21,10 +21,10 @@ def test_what_a_right_model_leaves_is_its_noise_floor() -> None:
     """The median over seeds that the floor was not drawn with, on every joint; benchmarks/noise_floor.py has more."""
     model, sizes = arm(), []
     first = swinging_trace(model, 4.0, SEEDS[0], held=True)
-    floor, simulated = noise_floor(model, first, observe(model, first))
+    floor, simulated = noise_floor(model, first, smooth(model, first))
     assert simulated
     for seed in SEEDS:
-        seen = observe(model, swinging_trace(model, 4.0, seed, held=True))
+        seen = smooth(model, swinging_trace(model, 4.0, seed, held=True))
         left = np.where(seen.usable, seen.acceleration - expected_accelerations(model, seen.motion, ())[0], 0.0)
         sizes.append(np.sqrt((left**2).sum(axis=0) / seen.usable.sum(axis=0)))
     assert np.median(sizes, axis=0) / floor == pytest.approx(np.ones(3), abs=0.1)
@@ -39,7 +39,7 @@ def test_noise_of_the_readings_comes_through_as_the_formula_says() -> None:
     residuals = []
     for _ in range(DRAWS):
         noise = deviation * rng.standard_normal(trace.position.shape)
-        seen = observe(model, replace(trace, position=trace.position + noise), 0.05)
+        seen = smooth(model, replace(trace, position=trace.position + noise), 0.05)
         residuals.append(seen.acceleration - expected_accelerations(model, seen.motion, ())[0])
     spread = np.array(residuals)[:, 20:-20].var(axis=0, ddof=1).mean(axis=0)
     assert np.sqrt(spread) == pytest.approx(seen.noise, rel=0.1)
@@ -58,7 +58,7 @@ def test_where_the_model_cannot_be_simulated_the_floor_is_that_of_the_readings_a
     model, trace = arm(), multisine_trace(arm(), 60.0)
     model = model.with_effect("spring_torque", (1,), {"stiffness": -80.0}).with_effect("back_emf_error", (1,))
     model = model.with_values({"joint1.back_emf_error.relative": -0.95})
-    seen = observe(model, trace)
+    seen = smooth(model, trace)
     floor, simulated = noise_floor(model, trace, seen)
     assert not simulated
     assert np.array_equal(floor, seen.noise)

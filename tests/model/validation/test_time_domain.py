@@ -10,7 +10,7 @@ import pytest
 from daq.contracts.errors import SpecError, TraceError
 from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
-from model.validation.measured_motion import observe
+from model.validation.measured_motion import smooth
 from model.validation.time_domain import vary_in_time
 from tests.model.validation.synthetic import arm, ramp_trace, swinging_trace
 
@@ -31,7 +31,7 @@ def test_a_right_model_leaves_little_but_noise(model: Model) -> None:
 
 
 def test_exact_derivatives_agree_with_finite_differences(model: Model) -> None:
-    motion = observe(model, swinging_trace(model, 2.0)).motion
+    motion = smooth(model, swinging_trace(model, 2.0)).motion
     names = (*NAMES, "controller.delay")
     _, exact = expected_accelerations(model, motion, names)
     for name, derivative in zip(names, exact, strict=True):

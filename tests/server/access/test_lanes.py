@@ -18,10 +18,10 @@ from server.problems import ProblemError
 
 def test_a_caller_has_a_few_turns_and_another_one_as_many() -> None:
     async def turns() -> None:
-        desk, over, begun = Lanes(), asyncio.Event(), []
+        lanes, over, begun = Lanes(), asyncio.Event(), []
 
         async def ask(caller: str) -> None:
-            async with desk.turn(caller):
+            async with lanes.turn(caller):
                 begun.append(caller)
                 await over.wait()
 
@@ -43,12 +43,12 @@ def test_a_caller_has_a_few_turns_and_another_one_as_many() -> None:
 
 def test_nobody_waits_for_ever() -> None:
     async def turns() -> None:
-        desk = Lanes(wait_at_most=0.001)
-        async with desk.turn("anna"), desk.turn("anna"):
+        lanes = Lanes(wait_at_most=0.001)
+        async with lanes.turn("anna"), lanes.turn("anna"):
             with pytest.raises(ProblemError, match="have waited for their turn"):
-                async with desk.turn("anna"):
+                async with lanes.turn("anna"):
                     raise AssertionError("there is no turn left")
-        async with desk.turn("anna"):
+        async with lanes.turn("anna"):
             pass
 
     asyncio.run(turns())

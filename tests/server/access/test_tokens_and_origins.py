@@ -28,7 +28,7 @@ from server.store.engine import Store
 from server.store.tables import TokenRow
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.desk import anothers_desk
+from tests.server.other_user import other_users_command_line
 from tests.server.service import Service, running_service
 
 
@@ -329,7 +329,7 @@ def test_a_body_that_is_too_large_is_not_read(service: Service) -> None:
 @pytest.fixture
 def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """The command of the user whose service it is."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         yield daq
 
 

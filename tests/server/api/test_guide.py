@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.daq_cli.invoke import CommandLine
-from tests.server.desk import anothers_desk
+from tests.server.other_user import other_users_command_line
 from tests.server.service import Service
 
 ROOT = Path(__file__).parents[3]
@@ -23,11 +23,11 @@ PROGRAMS = re.findall(r"^```python\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture
-def at_the_desk(
+def daq(
     service: Service, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[CommandLine]:
     """Whoever looks after the service, with its configuration."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         Path("daq.toml").write_text(
             f'[traces]\nfolder = "{service.folder}/traces"\n[server]\nfolder = "{service.folder}/service"\n'
         )
@@ -40,13 +40,13 @@ def _here(text: str, service: Service) -> str:
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=[block.split("\n")[0][:60] for block in BLOCKS])
-def test_what_the_guide_says_to_type_works(block: str, service: Service, at_the_desk: CommandLine) -> None:
+def test_what_the_guide_says_to_type_works(block: str, service: Service, daq: CommandLine) -> None:
     service.until_connected()
     for line in block.splitlines():
         assert line.startswith("$ ")
         words = shlex.split(_here(line.removeprefix("$ "), service))
         if words[0] == "daq":
-            said = at_the_desk(*words[1:])
+            said = daq(*words[1:])
             assert said.code == 0, (line, said)
         else:
             assert words[0] == "curl"

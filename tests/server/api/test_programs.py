@@ -19,7 +19,7 @@ from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.desk import anothers_desk
+from tests.server.other_user import other_users_command_line
 from tests.server.service import Service
 
 ROBOT = "ma2000"
@@ -177,8 +177,8 @@ def test_a_name_that_is_none_is_refused(empty: Service, name: str) -> None:
 @pytest.fixture
 def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """Another user's."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as desk:
-        yield desk
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
+        yield daq
 
 
 def test_the_command_line_keeps_lists_fetches_runs_and_deletes(

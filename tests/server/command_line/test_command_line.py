@@ -12,7 +12,7 @@ import pytest
 
 from daq.traces.reader import read_trace
 from tests.daq_cli.invoke import CommandLine, Said
-from tests.server.desk import anothers_desk, environment_in
+from tests.server.other_user import environment_in, other_users_command_line
 from tests.server.service import DAQ, Service
 
 RAMP = ["run", "ramp", "--joints", "1-3", "--amplitude", "3", "--duration", "0.2", "--settle", "0.1", "--hold", "0.1"]
@@ -22,7 +22,7 @@ Daq = Callable[..., Said]
 @pytest.fixture
 def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """The command of another user, in a folder of their own, who has no configuration."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         yield daq
 
 

@@ -11,16 +11,16 @@ import pytest
 from daq.teaching.program import Program, load_program
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.person import at_a_terminal
-from tests.server.desk import anothers_desk
+from tests.server.other_user import other_users_command_line
 from tests.server.service import Service
 
 RIGHT = b"\x1b[C"
 
 
 @pytest.fixture(autouse=True)
-def desk(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
+def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """Another user's."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         yield daq
 
 

@@ -10,7 +10,8 @@ import pytest
 from pydantic import TypeAdapter
 
 from model.comparison.compare import TraceSignals
-from model.discrepancy.diagnosis import Suspicion
+from model.discrepancy.diagnosis import Where
+from model.discrepancy.explanation.headline import headline
 from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import library
 from server.jobs import headlines
@@ -22,6 +23,8 @@ from tests.server.service import Service
 
 RAMP: dict[str, Any] = {"spec": {"name": "ramp"}}
 RESULTS: TypeAdapter[Any] = TypeAdapter(JobResult)
+
+NOWHERE = Where(joint=None, phase=None, summary="", cells=(), dependences=())
 
 
 def signals(samples: int) -> TraceSignals:
@@ -55,6 +58,7 @@ def test_a_diagnosis_is_told_with_its_pictures() -> None:
     found = diagnosis_data(answer, comparison)
     (step,) = found.steps
     assert step.where == answer.steps[0].where
+    assert step.called == step.candidates[0].called == "Coulomb friction, joint 2"
     assert [c.evidence for c in step.candidates] == [c.evidence for c in answer.steps[0].candidates]
     assert 2.0 < step.chance < 6.0
     assert [d.name for d in found.differences] == ["joint2.coulomb_friction.torque"]
@@ -75,23 +79,26 @@ def test_an_answer_from_before_it_told_what_is_significant_still_opens() -> None
     assert (opened.significant, opened.words) == (None, {})
 
 
-def test_headlines_name_what_was_found() -> None:
-    answer, comparison = an_answer(4.0)
-    step = answer.steps[0]
-    told = headlines.of_diagnosis
-    assert told(answer) == "named: Coulomb friction, joint 2"
-    undecided = answer.model_copy(
-        update={"verdict": "ambiguous", "steps": (step.model_copy(update={"group": step.candidates[:5]}),)}
+def test_why_a_clear_dependence_is_no_finding_is_told_with_what_came_nearest() -> None:
+    answer, _ = an_answer(4.0)
+    within_noise = NOWHERE.model_copy(update={"joint": None})
+    nothing = answer.model_copy(update={"verdict": "nothing-significant", "significant": 30.0})
+    given = diagnosis_data(nothing, None, within_noise).given
+    assert given is not None
+    best = max(c.evidence for c in answer.steps[0].candidates)
+    assert given.not_a_finding == (
+        "σ says how certain the dependence is, not how large: no joint is off by more than noise. This is not a "
+        "finding: an effect is named from evidence 30 on; the best, Coulomb friction, joint 2, has evidence "
+        f"{best:.0f}."
     )
-    assert told(undecided) == (
-        "one of: Coulomb friction, joint 2 or stiction, joint 2 or Stribeck friction, joint 2 or 2 more"
-    )
-    both = answer.model_copy(update={"verdict": "ambiguous", "steps": (undecided.steps[0], step)})
-    assert told(both).endswith(" or 2 more; Coulomb friction, joint 2")
-    assert told(answer.model_copy(update={"verdict": "nothing-significant"})) == "nothing significant"
-    doubt = Suspicion(effect="backlash", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
-    suspected = answer.model_copy(update={"verdict": "suspected", "steps": (), "suspicion": doubt})
-    assert told(suspected) == "suspected: backlash, joint 1"
+    (step,) = diagnosis_data(nothing.model_copy(update={"significant": None}), None).steps
+    assert step.not_a_finding.startswith("This is not a finding: the best, ")
+    (step,) = diagnosis_data(answer, None).steps
+    assert step.not_a_finding == ""
+
+
+def test_the_headline_of_a_comparison_tells_the_errors() -> None:
+    _, comparison = an_answer(4.0)
     assert headlines.of_comparison(comparison).startswith("error before ")
     assert len(overlays(comparison)) == 2
 
@@ -134,7 +141,7 @@ def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks
         "effects": ["coulomb_friction", "stribeck_friction"],
     }
     job, found = result_of(sound_service, request)
-    assert (found.verdict, job["headline"]) == ("nothing-significant", "nothing significant"), found.summary
+    assert (found.verdict, job["headline"]) == ("nothing-significant", headline(found)), found.summary
     assert found.significant == THRESHOLDS.significant
     assert found.next_experiment is not None, found.notes
     assert found.next_experiment.name == "diagnostic"

@@ -1,4 +1,4 @@
-"""The desk of jobs with an executor that tests hold by hand: what meets in one moment, and what goes wrong once."""
+"""The service of jobs with an executor that tests hold by hand: what meets in one moment, and what goes wrong once."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class HandExecutor(Executor):
 
 
 class Bench:
-    """A desk, its stores, at whose calls something may happen, and everything that it has told."""
+    """A service, its stores, at whose calls something may happen, and everything that it has told."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder / "jobs"
@@ -78,7 +78,7 @@ class Bench:
         self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
         self.changed = threading.Condition()
         self.told: list[Job] = []
-        self.desk = JobService(
+        self.service = JobService(
             JobContext(
                 robot="ma2000",
                 machine=MACHINE,
@@ -121,15 +121,15 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
-    """Its desk not yet begun: what is submitted waits."""
+    """Its service not yet begun: what is submitted waits."""
     made = Bench(tmp_path)
     yield made
-    made.desk.close(10)
+    made.service.close(10)
     made.store.close()
 
 
 def _submitted(bench: Bench) -> Job:
-    return bench.desk.submit(COMPARE, "anna", None)[0]
+    return bench.service.submit(COMPARE, "anna", None)[0]
 
 
 def test_a_job_is_running_before_a_worker_has_it(bench: Bench) -> None:
@@ -141,7 +141,7 @@ def test_a_job_is_running_before_a_worker_has_it(bench: Bench) -> None:
         return Ended()
 
     bench.carry_out = carry_out
-    bench.desk.start()
+    bench.service.start()
     assert bench.end_of(job).state == "done"
     assert seen == ["running"]
 
@@ -150,20 +150,20 @@ def test_a_job_that_is_cancelled_as_it_is_handed_over_is_told_to_end_and_the_nex
     def carry_out(folder: Path) -> Ended:
         if folder.name != first.id:
             return Ended()
-        assert bench.desk.cancel(first.id, "anna").state == "running"
+        assert bench.service.cancel(first.id, "anna").state == "running"
         return Ended(cancelled=(folder / CANCEL).exists())
 
     bench.carry_out = carry_out
     first, second = _submitted(bench), _submitted(bench)
-    bench.desk.start()
+    bench.service.start()
     assert bench.end_of(second).state == "done"
     assert bench.end_of(first).state == "cancelled"
 
 
 def test_a_job_that_is_cancelled_just_before_it_is_taken_is_never_computed(bench: Bench) -> None:
     first, second = _submitted(bench), _submitted(bench)
-    bench.jobs.after("waiting", lambda: bench.desk.cancel(first.id, "anna"))
-    bench.desk.start()
+    bench.jobs.after("waiting", lambda: bench.service.cancel(first.id, "anna"))
+    bench.service.start()
     assert bench.end_of(second).state == "done"
     assert bench.state_of(first) == "cancelled"
     assert bench.executor.given == [second.id]
@@ -172,7 +172,7 @@ def test_a_job_that_is_cancelled_just_before_it_is_taken_is_never_computed(bench
 def test_a_job_that_begins_while_it_is_being_cancelled_is_told_to_end(bench: Bench) -> None:
     job = _submitted(bench)
     bench.jobs.before("change", lambda: bench.jobs.change("ma2000", job.id, Event.TAKEN, bench.clock.utc()))
-    assert bench.desk.cancel(job.id, "anna").state == "running"
+    assert bench.service.cancel(job.id, "anna").state == "running"
     assert (bench.folder / job.id / CANCEL).exists()
 
 
@@ -186,7 +186,7 @@ def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> 
 
     bench.executor = Refusing(lambda _folder: Ended())
     first, second = _submitted(bench), _submitted(bench)
-    bench.desk.start()
+    bench.service.start()
     assert bench.end_of(second).state == "done"
     failed = bench.end_of(first)
     assert (failed.failure, failed.reason) == ("program-fault", "program fault: OSError: no process any more")
@@ -200,7 +200,7 @@ def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> N
     executors = [Broken(lambda _folder: Ended()), bench.executor]
     bench.make_executor = lambda _count: executors.pop(0)
     job = _submitted(bench)
-    bench.desk.start()
+    bench.service.start()
     assert bench.end_of(job).state == "done"
 
 
@@ -214,8 +214,8 @@ def _makes_a_model(folder: Path) -> Ended:
 def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(bench: Bench) -> None:
     bench.carry_out = _makes_a_model
     bench.models.before("take_in", raising(OperationalError("INSERT", {}, Exception("database or disk is full"))))
-    job = bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
-    bench.desk.start()
+    job = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
+    bench.service.start()
     ended = bench.end_of(job)
     assert (ended.state, ended.headline) == ("done", "fitted")
     assert ended.model is not None
@@ -226,9 +226,9 @@ def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(bench: 
 def test_a_model_that_can_never_be_kept_holds_up_no_other_job(bench: Bench, error: Exception) -> None:
     bench.models.before("take_in", *[raising(error)] * 1000)
     bench.carry_out = lambda folder: _makes_a_model(folder) if folder.name == first.id else Ended()
-    first = bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
+    first = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
     second = _submitted(bench)
-    bench.desk.start()
+    bench.service.start()
     assert bench.end_of(second).state == "done"
     if isinstance(error, ValueError):  # nothing that another look could mend
         failed = bench.end_of(first)
@@ -238,7 +238,7 @@ def test_a_model_that_can_never_be_kept_holds_up_no_other_job(bench: Bench, erro
 def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench) -> None:
     job = _submitted(bench)
     bench.jobs.before("waiting", raising(OperationalError("SELECT", {}, Exception("database is locked"))))
-    bench.desk.start()
+    bench.service.start()
     assert bench.end_of(job).state == "done"
 
 
@@ -261,14 +261,14 @@ def test_there_is_no_job_without_its_request(bench: Bench, monkeypatch: pytest.M
 
 
 def test_the_same_key_is_the_same_job_whatever_became_of_its_traces(bench: Bench) -> None:
-    first, new = bench.desk.submit(COMPARE, "anna", "key")
+    first, new = bench.service.submit(COMPARE, "anna", "key")
     assert new
     bench.catalogue.path_of(TRACE).unlink()
-    assert bench.desk.submit(COMPARE, "anna", "key") == (first, False)
+    assert bench.service.submit(COMPARE, "anna", "key") == (first, False)
     with pytest.raises(ProblemError, match="used for another request"):
-        bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", "key")
+        bench.service.submit(FitRequest(traces=(TRACE,)), "anna", "key")
     with pytest.raises(ProblemError, match="there is no file for trace"):
-        bench.desk.submit(COMPARE, "anna", "another key")
+        bench.service.submit(COMPARE, "anna", "another key")
 
 
 def test_a_job_refers_to_no_trace_that_is_deleted_as_it_is_submitted(bench: Bench) -> None:
@@ -301,7 +301,7 @@ class HeldExecutor(HandExecutor):
 
 
 def _asked(bench: Bench, request: JobRequest) -> Job:
-    return bench.desk.submit(request, "anna", None)[0]
+    return bench.service.submit(request, "anna", None)[0]
 
 
 def _until(bench: Bench, is_so: Callable[[], bool]) -> None:
@@ -315,11 +315,11 @@ def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what
     diagnosis = _asked(bench, DiagnoseRequest(traces=(TRACE,)))
     fit, other_fit = _asked(bench, FitRequest(traces=(TRACE,))), _asked(bench, FitRequest(traces=(TRACE,)))
     short, next_short = _asked(bench, COMPARE), _asked(bench, COMPARE)
-    bench.desk.start()
+    bench.service.start()
     _until(bench, lambda: {diagnosis.id, short.id} <= {job.id for job in bench.told if job.state == "running"})
     assert set(held.futures) == {diagnosis.id, short.id}
 
-    told = {job.id: job for job in bench.desk.with_progress_all(bench.jobs.waiting("ma2000"))}
+    told = {job.id: job for job in bench.service.with_progress_all(bench.jobs.waiting("ma2000"))}
     behind = [told[job.id].waits_behind for job in (fit, other_fit, next_short)]
     assert [(one.job, one.request.kind, one.others) for one in behind if one] == [
         (diagnosis.id, "diagnose", 0),
@@ -348,7 +348,7 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
 
     bench.make_executor = make_executor
     diagnosis, short, next_short = _asked(bench, DiagnoseRequest(traces=(TRACE,))), _submitted(bench), _submitted(bench)
-    bench.desk.start()
+    bench.service.start()
     _until(bench, lambda: {diagnosis.id, short.id} <= {job.id for job in bench.told if job.state == "running"})
     made[1].futures[short.id].set_exception(BrokenExecutor())
     _until(bench, lambda: any(job.id == next_short.id and job.state == "running" for job in bench.told))
@@ -370,7 +370,7 @@ def test_a_job_reads_traces_within_the_limits_that_are_configured(bench: Bench) 
     bench.catalogue.limits = TraceLimits(records=10)
     bench.carry_out = carry_out
     job = _submitted(bench)
-    bench.desk.start()
+    bench.service.start()
     ended = bench.end_of(job)
     assert ended.state == "failed"
     assert "traces.limits.records" in ended.reason

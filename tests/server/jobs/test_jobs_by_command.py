@@ -13,7 +13,7 @@ from daq.contracts.service.jobs import DiagnoseRequest, FitRequest, Job, WaitsBe
 from daq_cli.models.service_jobs import standing_of
 from model.machine_model.model_file import load_model
 from tests.daq_cli.invoke import CommandLine, Said
-from tests.server.desk import anothers_desk
+from tests.server.other_user import other_users_command_line
 from tests.server.service import Service
 
 pytestmark = pytest.mark.timeout(600)
@@ -38,7 +38,7 @@ def worker(sound_service: Service) -> None:
 @pytest.fixture
 def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """Another user's command."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         yield daq
 
 

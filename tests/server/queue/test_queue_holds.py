@@ -30,7 +30,7 @@ def test_a_control_that_lapses(bench: Bench) -> None:
     bench.control.take("anna", moves_real_arm=True)
     bench.submit()
     bench.clock.turn(LEASE_TIME)
-    # The desk's watch notices it by the wall clock, or when somebody wants the control: the queue, here.
+    # The control's watch notices it by the wall clock, or when somebody wants the control: the queue, here.
     while bench.control.take_for_queue("an experiment") is False:
         pass
     bench.control.give_back_for_queue()

@@ -28,49 +28,49 @@ def clock() -> HandClock:
 
 
 @pytest.fixture
-def desk(clock: HandClock, lapsed: queue.Queue[str]) -> Iterator[ControlService]:
+def control(clock: HandClock, lapsed: queue.Queue[str]) -> Iterator[ControlService]:
     """Nobody has the control."""
     made = ControlService(clock, lapsed.put)
     yield made
     made.close()
 
 
-def test_a_heartbeat_keeps_the_control_and_silence_ends_it(desk: ControlService, clock: HandClock) -> None:
-    lease = desk.take("anna", moves_real_arm=False).lease
+def test_a_heartbeat_keeps_the_control_and_silence_ends_it(control: ControlService, clock: HandClock) -> None:
+    lease = control.take("anna", moves_real_arm=False).lease
     for _ in range(5):
         clock.turn(LEASE_TIME - 1)
-        desk.renew(lease)
+        control.renew(lease)
     clock.turn(LEASE_TIME)
     with pytest.raises(ProblemError, match=r"lost control|no longer"):
-        desk.require(lease)
-    assert desk.status().holder == "nobody"
-    assert desk.take("bert", moves_real_arm=False).lease != lease
+        control.require(lease)
+    assert control.status().holder == "nobody"
+    assert control.take("bert", moves_real_arm=False).lease != lease
 
 
-def test_a_wall_clock_that_is_set_forward_ends_no_lease(desk: ControlService, clock: HandClock) -> None:
-    lease = desk.take("anna", moves_real_arm=False).lease
+def test_a_wall_clock_that_is_set_forward_ends_no_lease(control: ControlService, clock: HandClock) -> None:
+    lease = control.take("anna", moves_real_arm=False).lease
     clock.wall = clock.wall.replace(year=2030)
-    assert desk.require(lease).name == "anna"
+    assert control.require(lease).name == "anna"
 
 
-def test_the_queue_and_a_client_never_have_it_together(desk: ControlService) -> None:
-    lease = desk.take("anna", moves_real_arm=False).lease
-    assert not desk.take_for_queue("an experiment")
-    desk.give_back(lease)
-    assert desk.take_for_queue("an experiment")
+def test_the_queue_and_a_client_never_have_it_together(control: ControlService) -> None:
+    lease = control.take("anna", moves_real_arm=False).lease
+    assert not control.take_for_queue("an experiment")
+    control.give_back(lease)
+    assert control.take_for_queue("an experiment")
     with pytest.raises(ProblemError, match="of the queue is running"):
-        desk.take("anna", moves_real_arm=False)
-    desk.give_back_for_queue()
-    assert desk.take("anna", moves_real_arm=False)
+        control.take("anna", moves_real_arm=False)
+    control.give_back_for_queue()
+    assert control.take("anna", moves_real_arm=False)
 
 
-def test_silence_is_told_once(clock: HandClock, desk: ControlService, lapsed: queue.Queue[str]) -> None:
-    desk.take("anna", moves_real_arm=False)
+def test_silence_is_told_once(clock: HandClock, control: ControlService, lapsed: queue.Queue[str]) -> None:
+    control.take("anna", moves_real_arm=False)
     clock.turn(LEASE_TIME)
-    bert = desk.take("bert", moves_real_arm=False)
-    desk.renew(bert.lease)
-    assert desk.status().name == "bert"
-    desk.close()
+    bert = control.take("bert", moves_real_arm=False)
+    control.renew(bert.lease)
+    assert control.status().name == "bert"
+    control.close()
     assert lapsed.get_nowait() == "anna"
     assert lapsed.empty()
 
@@ -82,26 +82,26 @@ def test_a_listener_that_fails_ends_neither_the_watch_nor_the_next_lease(clock: 
         heard.put(holder)
         raise OSError("database or disk is full")
 
-    desk = ControlService(clock, fails)
+    control = ControlService(clock, fails)
     for name in ("anna", "bert"):
-        desk.take(name, moves_real_arm=False)
+        control.take(name, moves_real_arm=False)
         clock.turn(LEASE_TIME)
-        if desk.take_for_queue("an experiment"):  # the watch looks at the clock, where it has not done so before
-            desk.give_back_for_queue()
+        if control.take_for_queue("an experiment"):  # the watch looks at the clock, where it has not done so before
+            control.give_back_for_queue()
         assert heard.get(timeout=WITHIN) == name
-    desk.take("carl", moves_real_arm=False)
+    control.take("carl", moves_real_arm=False)
     clock.turn(LEASE_TIME)
-    assert desk.take("dora", moves_real_arm=False).lease
+    assert control.take("dora", moves_real_arm=False).lease
     assert heard.get(timeout=WITHIN) == "carl"
-    desk.close()
+    control.close()
 
 
 def test_the_queue_has_the_control_only_after_it_was_told_that_a_client_went_silent(
-    desk: ControlService, clock: HandClock, lapsed: queue.Queue[str]
+    control: ControlService, clock: HandClock, lapsed: queue.Queue[str]
 ) -> None:
-    desk.take("anna", moves_real_arm=False)
+    control.take("anna", moves_real_arm=False)
     clock.turn(LEASE_TIME)
-    while not desk.take_for_queue("an experiment"):
+    while not control.take_for_queue("an experiment"):
         assert lapsed.get(timeout=WITHIN) == "anna"
-    assert desk.status().holder == "queue"
+    assert control.status().holder == "queue"
     assert lapsed.empty()

@@ -39,12 +39,12 @@ def robot() -> Robot:
 
 
 @pytest.fixture
-def desk(robot: Robot) -> Iterator[StopService]:
+def stop_service(robot: Robot) -> Iterator[StopService]:
     """Whose stops are confirmed."""
     confirmed = StopResult(delivered=True, confirmed=True, tick=7, seconds=0.0, text="stopped")
-    desk = StopService(robot, lambda _reach: confirmed)
-    yield desk
-    desk.close()
+    stop_service = StopService(robot, lambda _reach: confirmed)
+    yield stop_service
+    stop_service.close()
 
 
 def _report(arm: ArmState) -> ArmReport:
@@ -52,11 +52,11 @@ def _report(arm: ArmState) -> ArmReport:
 
 
 @pytest.mark.parametrize("jogging", [True, False])
-def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, desk: StopService, jogging: bool) -> None:
+def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, stop_service: StopService, jogging: bool) -> None:
     teaching = TeachingService(robot, lambda _line: None)
     if jogging:
         teaching.jog(JOG, robot.clock.monotonic())
-    assert desk.stop_now().confirmed
+    assert stop_service.stop_now().confirmed
     with pytest.raises(ProblemError) as refused:
         teaching.jog(JOG, robot.clock.monotonic())
     assert (refused.value.status, refused.value.kind) == (409, "arm-stopped")
@@ -75,17 +75,17 @@ def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered
         raise OSError(24, "Too many open files")
 
     monkeypatch.setattr("server.stopping.arm.request_stop", no_socket)
-    desk = StopService(robot)
-    told = desk.stop_now()
-    desk.close()
+    stop_service = StopService(robot)
+    told = stop_service.stop_now()
+    stop_service.close()
     assert (told.delivered, told.confirmed) == (False, False)
     assert told.text == f"stop NOT DELIVERED: {told.detail}"
     assert told.detail == f"{told.note}. Use the emergency stop."
     assert told.text.endswith("Too many open files. Use the emergency stop.")
 
 
-def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, desk: StopService) -> None:
+def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, stop_service: StopService) -> None:
     fault = _report("fault").model_copy(update={"cause": "joint 2 moved"})
     robot._on_report(fault)
-    assert desk.stop_now().confirmed
+    assert stop_service.stop_now().confirmed
     assert robot.arm == fault

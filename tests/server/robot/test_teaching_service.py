@@ -53,31 +53,31 @@ def robot() -> Asked:
 
 
 @pytest.fixture
-def desk(robot: Asked) -> TeachingService:
+def teaching(robot: Asked) -> TeachingService:
     """Its teaching."""
     return TeachingService(robot, lambda _line: None)
 
 
-def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, desk: TeachingService) -> None:
+def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, teaching: TeachingService) -> None:
     said = robot.clock.monotonic()
     robot.clock.turn(DEAD_MAN / 2)  # type: ignore[attr-defined]
-    desk.jog(JOG, said)
+    teaching.jog(JOG, said)
     assert robot.orders == [JogBegin(number=0, asked=robot.clock.monotonic()), JogDrive(velocities=JOG, said=said)]
 
 
-def test_a_command_that_was_held_up_begins_nothing(robot: Asked, desk: TeachingService) -> None:
-    desk.jog(JOG, robot.clock.monotonic() - DEAD_MAN - 0.1)
-    assert (robot.orders, desk.status().activity) == ([], "none")
+def test_a_command_that_was_held_up_begins_nothing(robot: Asked, teaching: TeachingService) -> None:
+    teaching.jog(JOG, robot.clock.monotonic() - DEAD_MAN - 0.1)
+    assert (robot.orders, teaching.status().activity) == ([], "none")
 
 
-def test_a_step_is_asked_for_as_one(robot: Asked, desk: TeachingService) -> None:
+def test_a_step_is_asked_for_as_one(robot: Asked, teaching: TeachingService) -> None:
     program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
-    desk.perform(Word(robot.clock.monotonic()), program, "step")
+    teaching.perform(Word(robot.clock.monotonic()), program, "step")
     assert robot.orders == [RunProgram(number=0, asked=robot.clock.monotonic(), program=program, activity="step")]
 
 
 def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
-    robot: Asked, desk: TeachingService
+    robot: Asked, teaching: TeachingService
 ) -> None:
     lapsed: list[str] = []
 
@@ -91,11 +91,11 @@ def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
 
     def perform() -> None:
         try:
-            desk.perform(Word(robot.clock.monotonic(), require), program)
+            teaching.perform(Word(robot.clock.monotonic(), require), program)
         except ProblemError as problem:
             refused.append(problem)
 
-    desk.jog(JOG, robot.clock.monotonic())
+    teaching.jog(JOG, robot.clock.monotonic())
     waiting = threading.Thread(target=perform)
     waiting.start()
     assert robot.finished.wait(60)
@@ -106,48 +106,48 @@ def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
     assert not any(isinstance(order, RunProgram) for order in robot.orders)
 
 
-def test_a_program_goes_on_with_the_moment_at_which_it_was_asked_for(robot: Asked, desk: TeachingService) -> None:
+def test_a_program_goes_on_with_the_moment_at_which_it_was_asked_for(robot: Asked, teaching: TeachingService) -> None:
     said = robot.clock.monotonic()
     robot.clock.turn(4.0)  # type: ignore[attr-defined]
-    desk.perform(Word(said), Program(name="p", machine="ma2000", instructions=(Relative(angles={1: 0.1}),)))
+    teaching.perform(Word(said), Program(name="p", machine="ma2000", instructions=(Relative(angles={1: 0.1}),)))
     assert robot.orders[0].asked == said
 
 
-def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, desk: TeachingService) -> None:
-    desk.lead(Word(0.0), (1,))
+def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, teaching: TeachingService) -> None:
+    teaching.lead(Word(0.0), (1,))
     robot.answers[0].set_result(Answer(number=0, data={"path": PATH}))
-    assert desk.status().path is not None
-    desk.lead(Word(0.0), (1,))
-    assert desk.status().path is None
+    assert teaching.status().path is not None
+    teaching.lead(Word(0.0), (1,))
+    assert teaching.status().path is None
     robot.answers[1].set_result(Answer(number=1, problem="lead: 1 samples are no path", exit_code=4))
-    assert desk.status().path is None
+    assert teaching.status().path is None
 
 
 def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_rest(
     robot: Asked,
 ) -> None:
     assert LEAD_ENDS_WITHIN > PATIENCE
-    desk = TeachingService(robot, lambda _line: None, ends_within=0.0)
-    desk.lead(Word(0.0), (1,))
-    ending = threading.Thread(target=desk.finish)
+    teaching = TeachingService(robot, lambda _line: None, ends_within=0.0)
+    teaching.lead(Word(0.0), (1,))
+    ending = threading.Thread(target=teaching.finish)
     ending.start()
     assert robot.finished.wait(60)
     robot.answers[0].set_result(Answer(number=0, data={"path": PATH}))
     ending.join()
-    assert desk.status().path is not None
+    assert teaching.status().path is not None
 
 
 def test_a_lead_that_does_not_end_says_that_a_stop_holds_nothing(robot: Asked) -> None:
-    desk = TeachingService(robot, lambda _line: None, lead_ends_within=0.0)
-    desk.lead(Word(0.0), (1,))
+    teaching = TeachingService(robot, lambda _line: None, lead_ends_within=0.0)
+    teaching.lead(Word(0.0), (1,))
     with pytest.raises(ProblemError, match="lead did not end within") as refused:
-        desk.finish()
+        teaching.finish()
     assert "HOLD THE ARM" in refused.value.advice
 
 
 def test_a_jog_that_does_not_end_is_to_be_stopped(robot: Asked) -> None:
-    desk = TeachingService(robot, lambda _line: None, ends_within=0.0)
-    desk.jog(JOG, robot.clock.monotonic())
+    teaching = TeachingService(robot, lambda _line: None, ends_within=0.0)
+    teaching.jog(JOG, robot.clock.monotonic())
     with pytest.raises(ProblemError, match="jog did not end within") as refused:
-        desk.finish()
+        teaching.finish()
     assert refused.value.advice == "stop the robot"

@@ -38,7 +38,7 @@ from server.stopping.tokens import UNKNOWN_FOR, StopTokens, TokensCannotBeReadEr
 from server.store.engine import Store
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.desk import anothers_desk
+from tests.server.other_user import other_users_command_line
 from tests.server.service import Service, running_service
 
 LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.1, "duration": 0.5}, "joints": [1, 2], "hold": 600}
@@ -68,7 +68,7 @@ main()
 @pytest.fixture
 def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """The command of the user whose service it is, who finds the stop sockets of its processes."""
-    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         yield daq
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 from sqlalchemy.engine import make_url
+from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.errors import DaqError
 from server.clock import SystemClock
@@ -143,21 +144,26 @@ def test_no_line_about_damage_tells_the_password(tmp_path: Path, address: str) -
 
 
 @pytest.mark.parametrize(
-    ("line", "restore"),
+    ("code", "restore"),
     [
-        ("database disk image is malformed", True),
-        ("file is not a database", True),
-        ("table traces: no such table: traces", True),
-        ("database is locked", False),
-        ("disk I/O error", False),
-        ("terminating connection due to administrator command", False),
-        ("deadlock detected", False),
-        ("table tokens: UNIQUE constraint failed: tokens.name", False),
-        ("database or disk is full", False),
+        (sqlite3.SQLITE_CORRUPT, True),
+        (sqlite3.SQLITE_CORRUPT_INDEX, True),
+        (sqlite3.SQLITE_NOTADB, True),
+        (sqlite3.SQLITE_ERROR, True),
+        (sqlite3.SQLITE_BUSY, False),
+        (sqlite3.SQLITE_IOERR_READ, False),
+        (sqlite3.SQLITE_CONSTRAINT_UNIQUE, False),
+        (sqlite3.SQLITE_FULL, False),
     ],
 )
-def test_a_backup_is_advised_against_damage_alone(line: str, restore: bool) -> None:
-    assert ("daq restore" in advice_of(line)) is restore
+def test_a_backup_is_advised_against_damage_alone(code: int, restore: bool) -> None:
+    own = sqlite3.OperationalError("in SQLite's words")
+    own.sqlite_errorcode = code
+    assert ("daq restore" in advice_of(DatabaseError("SELECT 1", None, own))) is restore
+
+
+def test_no_backup_is_advised_where_another_database_fails() -> None:
+    assert advice_of(DatabaseError("SELECT 1", None, RuntimeError("deadlock detected"))).startswith("try again")
 
 
 def test_what_fails_while_something_is_written_is_damage_only_where_a_row_is_to_blame(tmp_path: Path) -> None:

@@ -75,10 +75,15 @@ export function dayAndSecond(moment: string): string {
   return DAY_AND_SECOND.format(new Date(moment));
 }
 
+/** The text with a capital first letter. */
+export function capital(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
 /** A one-line message of the service with a capital letter and a full stop; nothing remains nothing. */
 export function sentence(text: string): string {
   const whole = text.trim();
   if (whole === '') return '';
-  const first = whole.charAt(0).toUpperCase() + whole.slice(1);
+  const first = capital(whole);
   return /[.!?]$/.test(first) ? first : `${first}.`;
 }

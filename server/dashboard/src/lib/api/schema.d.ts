@@ -1874,7 +1874,7 @@ export interface components {
         };
         /**
          * DiagnosisStep
-         * @description One step of the workflow.
+         * @description One step of the workflow. `called`: what was added, as people write it.
          */
         DiagnosisStep: {
             /** Effect */
@@ -1921,8 +1921,12 @@ export interface components {
             reason_data?: components["schemas"]["Reason"] | null;
             proof?: components["schemas"]["ControllerProof"] | null;
             refusal?: components["schemas"]["Refusal"] | null;
+            /** Called */
+            called: string;
             /** Chance */
             chance: number;
+            /** Not A Finding */
+            not_a_finding: string;
         };
         /**
          * DifferencePlace
@@ -1972,6 +1976,21 @@ export interface components {
             name: string;
             /** Sha256 */
             sha256: string;
+        };
+        /**
+         * EffectInModel
+         * @description An effect of a model. `called`: the effect and its joints as people write them.
+         */
+        EffectInModel: {
+            /** Name */
+            name: string;
+            /**
+             * Joints
+             * @default []
+             */
+            joints?: number[];
+            /** Called */
+            called: string;
         };
         EffectUse: {
             [key: string]: unknown;
@@ -2564,12 +2583,14 @@ export interface components {
         };
         /**
          * GivenWhere
-         * @description Where the given model disagrees with the traces; `chance` as in a step.
+         * @description Where the given model disagrees with the traces; `chance` and `not_a_finding` as in a step.
          */
         GivenWhere: {
             where: components["schemas"]["Where"];
             /** Chance */
             chance: number;
+            /** Not A Finding */
+            not_a_finding: string;
         };
         /**
          * Gripper
@@ -2879,6 +2900,8 @@ export interface components {
         KnownEffect: {
             /** Name */
             name: string;
+            /** Called */
+            called: string;
             /** Family */
             family: string;
             /** Title */
@@ -3175,7 +3198,7 @@ export interface components {
         ModelDetails: {
             entry: components["schemas"]["ModelEntry"];
             /** Effects */
-            effects: components["schemas"]["EffectChoice"][];
+            effects: components["schemas"]["EffectInModel"][];
             /** Parameters */
             parameters: components["schemas"]["ModelParameter"][];
             /** Ancestors */
@@ -5105,7 +5128,7 @@ export interface components {
         };
         /**
          * TriedEffect
-         * @description An effect that the diagnosis tried.
+         * @description An effect that the diagnosis tried. `called`: the effect and its joints as people write them.
          */
         TriedEffect: {
             /** Effect */
@@ -5128,6 +5151,8 @@ export interface components {
             parameters?: {
                 [key: string]: components["schemas"]["FoundValue"];
             };
+            /** Called */
+            called: string;
         };
         /**
          * ValidateRequest

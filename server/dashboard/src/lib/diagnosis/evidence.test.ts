@@ -2,10 +2,11 @@ import { describe, expect, it } from 'vitest';
 import type { DiagnosisData, DiagnosisStep, TriedEffect } from '../api/types';
 import { evidenceBars, turnOf, turnWithoutStep } from './evidence';
 import { viewsOf } from './views';
-import { candidateName, effectName, listed, verdictTitle } from './words';
+import { listed } from './words';
 
 const tried = (effect: string, joint: number, evidence: number, refitted = true): TriedEffect => ({
   effect,
+  called: `${effect} ${joint}`,
   joints: joint === 0 ? [] : [joint],
   evidence,
   misfit: refitted ? 1.1 : null,
@@ -21,6 +22,8 @@ const candidates = [
 const step = (group: TriedEffect[]): DiagnosisStep =>
   ({
     effect: 'coulomb_friction',
+    called: 'Coulomb friction, joint 2',
+    not_a_finding: '',
     joints: [2],
     evidence: 100,
     margin: 20,
@@ -33,10 +36,10 @@ describe('candidates', () => {
   it('are ranked, with the named one marked and every one explained', () => {
     const bars = evidenceBars(turnOf(step([])), 10);
     expect(bars.map((one) => [one.name, one.width, one.chosen])).toEqual([
-      ['Coulomb friction, joint 2', 1, true],
-      ['Stribeck friction, joint 2', 0.8, false],
-      ['backlash, joint 2', 0, false],
-      ['base tilt', 0, false],
+      ['coulomb_friction 2', 1, true],
+      ['stribeck_friction 2', 0.8, false],
+      ['backlash 2', 0, false],
+      ['base_tilt 0', 0, false],
     ]);
     expect(bars.map((one) => one.reason)).toEqual([
       'leads the next candidate by 20',
@@ -57,10 +60,10 @@ describe('candidates that are not comparable', () => {
     const probed = tried('stiction', 1, 5000, false);
     const bars = evidenceBars(turnOf({ ...step([]), candidates: [probed, ...candidates] }), 4);
     expect(bars.map((one) => [one.name, one.width])).toEqual([
-      ['Coulomb friction, joint 2', 1],
-      ['Stribeck friction, joint 2', 0.8],
-      ['backlash, joint 2', 0],
-      ['stiction, joint 1', 1],
+      ['coulomb_friction 2', 1],
+      ['stribeck_friction 2', 0.8],
+      ['backlash 2', 0],
+      ['stiction 1', 1],
     ]);
   });
 });
@@ -84,40 +87,9 @@ describe('an answer without a step', () => {
 });
 
 describe('words', () => {
-  it('write effects as the field does', () => {
-    expect(effectName('back_emf_error')).toBe('back-EMF error');
-    expect(effectName('load_dependent_friction')).toBe('load-dependent friction');
-    expect(candidateName({ effect: 'input_delay', joints: [1, 3] })).toBe('input delay, joints 1 and 3');
-  });
-
   it('make lists', () => {
     expect(listed(['a', 'b', 'c'])).toBe('a, b and c');
     expect(listed(['a'])).toBe('a');
-  });
-
-  it('put the verdict into a headline', () => {
-    expect(verdictTitle({ verdict: 'named', steps: [step([])] })).toBe(
-      'Coulomb friction, joint 2 is missing from the model',
-    );
-    expect(verdictTitle({ verdict: 'ambiguous', steps: [step(candidates.slice(0, 2))] })).toBe(
-      'Either Stribeck friction, joint 2 or Coulomb friction, joint 2',
-    );
-    expect(verdictTitle({ verdict: 'unknown-effect', steps: [step([])] })).toBe(
-      'Coulomb friction, joint 2, and an unknown effect',
-    );
-    const suspicion = {
-      effect: 'coulomb_friction',
-      joints: [1],
-      evidence: 24,
-      needed: 30,
-      seconds: 20,
-    };
-    expect(verdictTitle({ verdict: 'suspected', steps: [], suspicion })).toBe(
-      'Suspected: Coulomb friction, joint 1',
-    );
-    expect(verdictTitle({ verdict: 'nothing-significant', steps: [] })).toBe(
-      'Nothing significant is missing',
-    );
   });
 });
 
@@ -129,7 +101,7 @@ describe('maps of disagreement', () => {
       { ...step([]), where: where([{}]), chance: 3 },
       { ...step([]), effect: 'wrong_gain', where: where([]), chance: 3 },
     ];
-    const views = viewsOf({ given: { where: where([{}]), chance: 4 }, steps });
+    const views = viewsOf({ given: { where: where([{}]), chance: 4, not_a_finding: '' }, steps });
     expect(views.map((one) => [one.name, one.chance])).toEqual([
       ['the model as given', 4],
       ['tolerances fitted, before Coulomb friction, joint 2', 3],

@@ -1,7 +1,6 @@
 /** Candidates as bars of evidence. */
 
 import type { DiagnosisData, DiagnosisStep, TriedEffect } from '../api/types';
-import { candidateName } from './words';
 
 export interface EvidenceBar {
   name: string;
@@ -48,7 +47,7 @@ export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
   const named = new Set(turn.group.map(key));
   if (turn.effect !== null) named.add(key({ effect: turn.effect, joints: turn.joints }));
   return ranked.slice(0, most).map((one) => ({
-    name: candidateName(one),
+    name: one.called,
     joint: one.joints[0] ?? null,
     evidence: one.evidence,
     width: Math.min(1, Math.max(0, one.evidence) / widest),

@@ -12,6 +12,7 @@ const error = (before: number, after: number): SignalError => ({
 const step = (effect: string, adopted: boolean, before: number, after: number): DiagnosisStep =>
   ({
     effect,
+    called: effect,
     joints: [2],
     adopted,
     rmse_fit: [error(before, after)],
@@ -31,8 +32,8 @@ describe('the gap, step by step', () => {
     expect(gap.stages.map((one) => one.name)).toEqual([
       'as given',
       'tolerances fitted',
-      '+ backlash, joint 2',
-      '+ Coulomb friction, joint 2',
+      '+ backlash',
+      '+ coulomb_friction',
     ]);
     expect(gap.stages.map((one) => one.fit[0])).toEqual([4, 3, 1, 0.9]);
     expect(gap.stages.map((one) => one.kept)).toEqual([true, true, true, false]);

@@ -1,7 +1,6 @@
 /** How the gap between measurement and simulation shrinks, step by step, against the noise floor. */
 
 import type { DiagnosisData, SignalError } from '../api/types';
-import { candidateName } from './words';
 
 export interface Stage {
   name: string;
@@ -54,7 +53,7 @@ export function gapOf(found: DiagnosisData): Gap {
   }
   for (const step of steps) {
     stages.push({
-      name: `+ ${candidateName({ effect: step.effect ?? '', joints: step.joints })}`,
+      name: `+ ${step.called}`,
       kept: step.adopted,
       fit: after(step.rmse_fit),
       held: held(step.rmse_holdout, after),

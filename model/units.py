@@ -1,4 +1,4 @@
-"""Units for readers: degrees and millimetres, squares of units, and the unit of each kind of joint."""
+"""Units as texts: the units that readers see, and what a unit is of. A user's own effect may state any unit."""
 
 from __future__ import annotations
 
@@ -21,6 +21,17 @@ def shown_unit(unit: str) -> tuple[float, str]:
 def with_unit(number: str, unit: str) -> str:
     """A number and its unit as they are written: 3.2°, 3.2 mm."""
     return f"{number}{'' if unit.startswith('°') else ' '}{unit}"
+
+
+def torque_power(unit: str) -> int:
+    """Power with which a unit contains torque (or mass): what scales when all torques are scaled together."""
+    above, _, below = unit.replace("(", "").replace(")", "").partition("/")
+    return int("kg" in above or "N" in above) - int("kg" in below or "N" in below)
+
+
+def sliding(unit: str) -> str:
+    """The unit on a joint that slides: forces in place of torques, lengths in place of angles."""
+    return unit.replace("N·m", "N").replace("rad", "m")
 
 
 def joint_unit(machine: Machine, joint: int) -> str:

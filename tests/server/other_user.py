@@ -1,4 +1,4 @@
-"""The desk of another user of a service: a folder of their own, and nothing in it."""
+"""The command line of another user of a service, in a folder of their own with nothing in it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def environment_in(folder: Path) -> dict[str, str]:
 
 
 @contextmanager
-def anothers_desk(
+def other_users_command_line(
     folder: Path, capture: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[CommandLine]:
     """`daq` as it is typed in `folder`."""

@@ -1,0 +1,39 @@
+"""The headline of an answer: one clause for the terminal, the report, lists and the page."""
+
+from __future__ import annotations
+
+from model.discrepancy.diagnosis import Diagnosis, Step
+from model.discrepancy.explanation.effect_words import words_of
+from model.discrepancy.explanation.renderer import size_words, suspicion_words
+from model.effects.names import effect_on
+
+SHOWN = 3
+"""Members of a group that a headline names."""
+
+
+def headline(found: Diagnosis) -> str:
+    """The effects that were found, with joints and sizes; or that none was found, or none that is known. A clause."""
+    if found.verdict == "suspected" and found.suspicion is not None:
+        return f"perhaps {suspicion_words(found.suspicion)}"
+    if found.verdict == "nothing-significant":
+        if any(s.effect is not None for s in found.steps):
+            return "nothing that the held-out traces confirm"
+        return "the model explains these traces within their noise and its tolerances"
+    findings = [_group(s) if s.group else _finding(s) for s in found.steps if s.adopted]
+    if found.verdict == "unknown-effect":
+        findings.append("none of the known effects explains what is left")
+    return "; ".join(findings) or "several effects that these traces cannot tell apart"
+
+
+def _group(step: Step) -> str:
+    """The first members of a group, and how many more there are."""
+    names = [effect_on(c.effect, c.joints) for c in step.group]
+    more = [] if len(names) <= SHOWN else [f"{len(names) - SHOWN} more"]
+    return f"one of: {' or '.join(names[:SHOWN] + more)}"
+
+
+def _finding(step: Step) -> str:
+    effect = step.effect or ""
+    part = words_of(effect).size
+    sizes = [size_words(v) for v in step.parameters.values() if v.part == part]
+    return ", ".join((effect_on(effect, step.joints), *sizes))

@@ -1,0 +1,49 @@
+"""The headline of an answer names what was found."""
+
+from __future__ import annotations
+
+import pytest
+
+from model.discrepancy.diagnosis import Diagnosis, Suspicion
+from model.discrepancy.explanation.headline import headline
+from tests.model.discrepancy.answers import an_answer
+
+
+@pytest.fixture(scope="module")
+def answer() -> Diagnosis:
+    return an_answer(12.0)[0]
+
+
+def test_it_names_effect_joint_and_size(answer: Diagnosis) -> None:
+    assert headline(answer) == "Coulomb friction on joint 2, 8 N·m (7.8 to 8.2)"
+
+
+def test_of_a_group_it_names_the_first_and_counts_the_others(answer: Diagnosis) -> None:
+    (step,) = answer.steps
+    grouped = step.model_copy(update={"effect": None, "group": step.candidates[:5]})
+    undecided = answer.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})
+    several = "one of: Coulomb friction on joint 2 or stiction on joint 2 or Stribeck friction on joint 2 or 2 more"
+    assert headline(undecided) == several
+    both = undecided.model_copy(update={"steps": (grouped, step)})
+    assert headline(both) == f"{several}; Coulomb friction on joint 2, 8 N·m (7.8 to 8.2)"
+
+
+def test_it_says_when_no_known_effect_is_left(answer: Diagnosis) -> None:
+    unknown = answer.model_copy(update={"verdict": "unknown-effect"})
+    assert headline(unknown).endswith("(7.8 to 8.2); none of the known effects explains what is left")
+    assert headline(unknown.model_copy(update={"steps": ()})) == "none of the known effects explains what is left"
+
+
+def test_it_tells_a_sound_model_from_one_whose_effect_was_refused(answer: Diagnosis) -> None:
+    nothing = answer.model_copy(update={"verdict": "nothing-significant"})
+    assert headline(nothing) == "nothing that the held-out traces confirm"
+    sound = nothing.model_copy(update={"steps": ()})
+    assert headline(sound) == "the model explains these traces within their noise and its tolerances"
+
+
+def test_a_suspicion_says_what_more_motion_would_settle(answer: Diagnosis) -> None:
+    doubt = Suspicion(effect="backlash", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
+    suspected = answer.model_copy(update={"verdict": "suspected", "steps": (), "suspicion": doubt})
+    assert headline(suspected) == (
+        "perhaps backlash on joint 1, evidence 24 of 30; 20 s more of this motion would settle it"
+    )
