@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from model.discrepancy.diagnosis import Diagnosis, FoundValue, SignalError, Step
+from model.discrepancy.diagnosis import Diagnosis, FoundValue, Step
 from model.discrepancy.explanation.effect_words import words_of
 from model.effects.names import capitalised, placed
 from model.reports.numbers import estimate
 from model.reports.units import shown_unit, with_unit
 
-NOTABLE = 1.5
-"""Ratio of an error to its noise, from which the share that is gone means something."""
 NO_LAW = "none of the known effects explains what is left"
 
 
 @dataclass(frozen=True)
 class Compared:
-    """What a diagnosis compared. residual: its name. errors: what errors and map are of. overlays: why there are none;
+    """What a diagnosis compared. residual: its name. errors: what the map is of. overlays: why there are none;
     empty where there are some."""
 
     residual: str
@@ -28,7 +26,7 @@ class Compared:
 POSITIONS = Compared(
     "measured − simulated",
     "The simulation follows half of the record: its controller is given the mean of the simulated and the recorded "
-    "reading. These are not the errors of the closed loop alone.",
+    "reading. The errors of the closed loop alone stand in the table of the gap.",
 )
 
 
@@ -93,31 +91,8 @@ def gap(step: Step) -> str:
     return f"Taken into the model: on traces it was not fitted to, {share} of the variance beyond noise is gone."
 
 
-def gone(e: SignalError) -> str:
-    """Share of the excess variance that is gone, never more than all of it; a dash where there was hardly any."""
-    if e.before < NOTABLE * e.floor:
-        return "–"
-    share = (e.before**2 - e.after**2) / (e.before**2 - e.floor**2)
-    return _percent(share, 1 if share > 0.99 else 0) or "all of it"
-
-
 def _percent(share: float, places: int) -> str | None:
     """A share in percent; None for all of it. A share below all is never rounded up to 100 %."""
     if share >= 1.0:
         return None
     return f"{min(100 * share, 100 - 10**-places):.{places}f} %".replace("-", "−")
-
-
-def distortion(before: float, after: float) -> str:
-    """Σλ² of the distortion method before and after a step that was taken, and what it means."""
-    change = f"Σλ² of the distortion method goes from {before:.3g} to {after:.3g}. "
-    if before >= 1.0:
-        more = "It grows because less is left to explain. " if after > before else ""
-        return (
-            f"{change}{more}Above 1 already before: judged by the size of the error alone, deviations of the "
-            "parameters as large as expected would explain it. What speaks for the effect is its pattern, which they "
-            "cannot produce."
-        )
-    if after >= 1.0:
-        return change + "At 1 or more, deviations of the parameters as large as expected explain all that is left."
-    return change + "Below 1 the expected deviations of the parameters do not explain all that is left."
