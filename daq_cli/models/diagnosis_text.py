@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from daq_cli.models.gap_text import gap_lines
 from model.discrepancy.diagnosis import in_order
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
@@ -37,6 +38,7 @@ def answer_text(found: Diagnosis) -> str:
         lines += _step(step, found.steps[: number - 1])
     if not found.steps:
         lines += ["", *_without_steps(found)]
+    lines += ["", *(_beside("gap", gap_lines(found.gap)) if found.gap is not None else _errors_of(found))]
     if left := _left(found):
         lines += ["", *left]
     if found.next_experiment is not None:
@@ -56,7 +58,9 @@ def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
         lines += [f"{'':{INDENT}}{name} = {_value(v)}" for name, v in step.parameters.items()]
     if not step.adopted and step.effect is not None:
         lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
-    return lines + _shown(step)
+    if step.excess_removed_holdout is not None:
+        lines += _filled("shown", removed_words(step.excess_removed_holdout))
+    return lines
 
 
 def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
@@ -91,7 +95,7 @@ def _without_steps(found: Diagnosis) -> list[str]:
     lines = _filled("where", place) if place else []
     if found.candidates and found.significant is not None:
         lines += _filled("what", best_tried(found.candidates, found.significant))
-    return lines + _errors(found.rmse_fit, found.rmse_holdout, "model as given → with its tolerances fitted (noise)")
+    return lines
 
 
 def _left(found: Diagnosis) -> list[str]:
@@ -101,27 +105,19 @@ def _left(found: Diagnosis) -> list[str]:
     return _filled("left", sentence(what_is_left(found.remaining))) if found.remaining else []
 
 
-def _shown(step: Step) -> list[str]:
-    lines = _errors(step.rmse_fit, step.rmse_holdout, "before → after (noise)")
-    if step.excess_removed_holdout is not None:
-        lines += _filled("", removed_words(step.excess_removed_holdout))
-    if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
-        lines += _filled("", f"Σλ² {_plain(step.sum_lambda2_before)} → {_plain(step.sum_lambda2_after)}")
-    return lines
-
-
-def _plain(number: float) -> str:
-    """Three digits, and no powers of ten where the number is large."""
-    return f"{number:.0f}" if abs(number) >= 100 else f"{number:.3g}"
-
-
-def _errors(fitted: Sequence[SignalError], held: Sequence[SignalError], columns: str) -> list[str]:
+def _errors_of(found: Diagnosis) -> list[str]:
+    """Errors in an older answer, which has no gap."""
     lines: list[str] = []
-    for label, errors in (("fitted to", fitted), ("held out", held)):
+    for label, errors in (("fitted to", found.rmse_fit), ("held out", found.rmse_holdout)):
         if errors:
-            lines += _filled("" if lines else "shown", f"rms error on traces {label}, {columns}")
+            lines += _filled("" if lines else "gap", f"rms error on traces {label}, given → resulting model (noise)")
             lines += [f"{'':{INDENT}}  {_error(e)}" for e in errors]
     return lines
+
+
+def _beside(label: str, lines: Sequence[str]) -> list[str]:
+    """Lines beside a label, as they are."""
+    return [f"{'' if number else label:<{INDENT}}{line}" for number, line in enumerate(lines)]
 
 
 def _error(e: SignalError) -> str:

@@ -77,6 +77,37 @@ class SignalError(FrozenRecord):
     floor: float
 
 
+class GapStage(FrozenRecord):
+    """The error of one model on the way from the given to the resulting one: root mean square by joint of the `Gap`, on
+    traces fitted to and on held-out ones (empty without any); None where the simulation does not stay finite.
+
+    `kind`: the model as given; with its tolerance parameters fitted; or with `effect` on `joints` added to the stage
+    before.
+    """
+
+    kind: Literal["given", "fitted", "effect"]
+    name: str = UNWRITTEN
+    """For a list, in words."""
+    effect: str | None = None
+    joints: tuple[int, ...] = ()
+    fitted: tuple[float | None, ...]
+    held_out: tuple[float | None, ...] = ()
+
+
+class Gap(FrozenRecord):
+    """The gap between simulation and measurement, and how it shrinks from stage to stage.
+
+    `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
+    `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance.
+    """
+
+    measure: Literal["closed-loop", "torques"]
+    joints: tuple[int, ...]
+    units: tuple[str, ...]
+    noise: tuple[float, ...]
+    stages: tuple[GapStage, ...]
+
+
 class PhaseCell(FrozenRecord):
     """One cell of the map of disagreement: mean square of the weighted residual (1: no more than noise) of a joint in
     a stretch of time and phase of motion; `significance` in standard deviations."""
@@ -259,6 +290,8 @@ class Diagnosis(FrozenRecord):
     """Errors on the fitted traces, of the model as given and of the resulting model."""
     rmse_holdout: tuple[SignalError, ...] = ()
     """Errors on the held-out traces, likewise."""
+    gap: Gap | None = None
+    """How the gap between simulation and measurement shrinks; None in older answers."""
     where: Where | None = None
     """What is left in the end: the map and dependences of the model that comes out; None in older answers."""
     candidates: tuple[Candidate, ...] = ()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError, in_order
+from model.discrepancy.diagnosis import Candidate, RemainingShape, in_order
 from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
@@ -109,75 +108,6 @@ def _evidence_caption(more: int, *, has_fits: bool, has_chosen: bool) -> str:
     if more > 0:
         sentences.append(f"{more} more lie lower.")
     return " ".join(sentences)
-
-
-def error_picture(
-    fit: Sequence[SignalError], held: Sequence[SignalError], residual: str = "measured − simulated"
-) -> Picture:
-    """Errors before and after beside the noise floor, in sample and held out. residual: its name."""
-    from matplotlib.lines import Line2D
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-    groups = [("fitted to", fit)] + ([("held out", held)] if held else [])
-    units = {shown_unit(e.unit)[1] for e in (*fit, *held)}
-    sizes = [shown_unit(e.unit)[0] * v for e in (*fit, *held) for v in (e.before, e.after, e.floor) if v > 0.0]
-    low, high = min(sizes) / 1.15, max(sizes) * 1.15
-
-    def draw(figure: Figure) -> None:
-        axes = panels(figure, 1, len(groups), sharex=True, sharey=True)[0]
-        for place, (name, errors) in zip(axes, groups, strict=True):
-            for row, e in enumerate(reversed(errors)):
-                _error(place, row, e)
-            place.set_yticks(range(len(errors)), [_row_name(e, units) for e in reversed(errors)])
-            place.set_ylim(-0.6, len(errors) - 0.4)
-            place.set_xscale("log")
-            place.set_xlim(low, high)
-            place.xaxis.set_major_locator(FixedLocator(log_ticks(low, high)))
-            place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            place.xaxis.set_minor_locator(NullLocator())
-            place.set_title(name)
-            unit = next(iter(units)) if len(units) == 1 else "unit of the joint"
-            place.set_xlabel(f"rms error / {unit} (logarithmic)")
-            place.grid(visible=False, axis="y")
-        marks = (("before", "o", "none"), ("after", "o", INK), ("noise floor", "|", INK))
-        handles = [Line2D([], [], marker=m, mfc=fill, color=INK, ls="", ms=5.5, label=name) for name, m, fill in marks]
-        figure.legend(handles=handles, loc="outside upper right", ncols=3)
-
-    caption = f"Root mean square of {residual} before (ring) and after (dot); the bar is what noise alone leaves."
-    return Picture(drawn(draw, 0.85 + 0.24 * len(fit)), caption)
-
-
-def _error(axes: Axes, row: int, e: SignalError) -> None:
-    factor = shown_unit(e.unit)[0]
-    colour = COLOURS[(e.joint - 1) % len(COLOURS)]
-    before, after, floor = (factor * v for v in (e.before, e.after, e.floor))
-    axes.plot([before, after], [row, row], color=colour, lw=1.6, solid_capstyle="butt", alpha=0.55)
-    axes.plot([before], [row], "o", mfc="none", color=colour, ms=5.5)
-    axes.plot([after], [row], "o", color=colour, ms=5.5)
-    axes.plot([floor], [row], "|", color=INK, ms=13, mew=1.2)
-
-
-def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
-    """At most so many round numbers in a range of positive sizes: per decade where it is wide, else evenly spaced."""
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    if high / low >= 5.0:
-        for steps, every in (((1, 2, 5), 1), ((1, 3), 1), ((1,), 1), ((1,), 2), ((1,), 3)):
-            ticks = [float(f"{s}e{d}") for d in decades if d % every == 0 for s in steps]
-            inside = [t for t in ticks if low <= t <= high]
-            if len(inside) <= most:
-                return inside
-    step = next(
-        float(f"{s}e{d}")
-        for d in range(decades[0] - 3, decades[-1] + 1)
-        for s in (1, 2, 5)
-        if (high - low) / float(f"{s}e{d}") < most
-    )
-    return [round(step * k, 12) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
-
-
-def _row_name(e: SignalError, units: Collection[str]) -> str:
-    """The name of a row: a joint, with its unit where the axis has several units."""
-    return f"joint {e.joint}" if len(units) == 1 else f"joint {e.joint} / {shown_unit(e.unit)[1]}"
 
 
 def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:

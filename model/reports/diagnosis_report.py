@@ -18,8 +18,9 @@ from model.discrepancy.explanation.renderer import best_tried, sentence, what_is
 from model.effects.names import capitalised
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
-from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks
+from model.reports.diagnosis_steps import step_sections, where_blocks
 from model.reports.diagnosis_words import Compared, compared
+from model.reports.gap import gap_section
 from model.reports.motion import motion_section
 from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed
 
@@ -42,7 +43,7 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
             are left out without it.
     """
     of = compared(found)
-    sections: list[Section] = []
+    sections = [] if found.gap is None else [gap_section(found.gap)]
     for number in range(1, len(found.steps) + 1):
         sections += step_sections(number, found.steps, of)
     if not any(s.adopted for s in found.steps):
@@ -96,10 +97,6 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
             needed = found.significant
             words = () if needed is None else (Text(best_tried(found.candidates, needed)),)
             sections.append(Section("What was tried", (*words, picture)))
-    errors = error_blocks(found.rmse_fit, found.rmse_holdout, of, "as given", "fitted")
-    if errors:
-        text = "No effect was added. Before is the model as it was given; after, its tolerance parameters are fitted."
-        sections.append(Section("Errors beside the noise", (Text(text), *errors)))
     return sections
 
 
@@ -107,13 +104,13 @@ def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
     motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True)
     taken = any(s.adopted for s in steps)
     text = "Before is the model as it was given; after, its tolerance parameters are fitted" + (
-        " as well. What the effects brought by themselves stands in the tables above. "
+        " as well. What each effect brought by itself stands in the table of the gap. "
         if taken
         else ", and no effect was added. "
     )
     text += (
         "The simulations here are of the closed loop alone: they are given the set points and the start, and nothing "
-        "else of the record. So their errors differ from those of the tables."
+        "else of the record."
     )
     return Section("Measured, before and after", (Text(text), *motion.blocks))
 

@@ -7,14 +7,10 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Candidate, Dependence, FoundValue, SignalError, Step, Where
 from model.effects.names import capitalised, placed
 from model.reports.diagnosis_map import dependence_picture, map_picture
-from model.reports.diagnosis_pictures import error_picture, evidence_picture
-from model.reports.diagnosis_words import Compared, distortion, gap, gone
+from model.reports.diagnosis_pictures import evidence_picture
+from model.reports.diagnosis_words import Compared, gap
 from model.reports.numbers import column, estimate
-from model.reports.page import Block, Cell, Section, Table, Text, cells
-from model.units import shown_unit, with_unit
-
-WITHOUT_AND_WITH = "without the effect", "with it"
-"""Names of a step's two errors; the tolerance parameters are fitted for both."""
+from model.reports.page import Block, Cell, Section, Table, Text
 
 
 def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Section]:
@@ -28,9 +24,9 @@ def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Sect
     found = [Section(f"{turn}where they disagree", where)]
     found.append(Section(f"{turn}{'what is missing' if step.adopted else 'what was tried'}", _what(step, before)))
     if step.effect is not None and step.adopted:
-        found.append(Section(f"{turn}what adding it did", _shown(step, of)))
+        found.append(Section(f"{turn}what adding it did", _shown(step)))
     elif step.effect is not None:
-        found.append(Section(f"{turn}what adding it would have done", _refused(step, of)))
+        found.append(Section(f"{turn}what adding it would have done", _refused(step)))
     return [Section(capitalised(s.title), s.blocks) for s in found]
 
 
@@ -87,25 +83,20 @@ def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _shown(step: Step, of: Compared) -> tuple[Block, ...]:
+def _shown(step: Step) -> tuple[Block, ...]:
     blocks: list[Block] = [Text(gap(step), "good")]
     if step.parameters:
         caption = "As the record has it." if step.proof is not None else "As the last fit has them."
         blocks.append(_parameters(step.parameters, caption))
-    if step.proof is not None:
-        return tuple(blocks)
-    blocks += error_blocks(step.rmse_fit, step.rmse_holdout, of, *WITHOUT_AND_WITH)
-    if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
-        blocks.append(Text(distortion(step.sum_lambda2_before, step.sum_lambda2_after)))
     return tuple(blocks)
 
 
-def _refused(step: Step, of: Compared) -> tuple[Block, ...]:
+def _refused(step: Step) -> tuple[Block, ...]:
     because = step.rejected_because or "it did not lower the held-out error"
     blocks: list[Block] = [Text(f"Not taken into the model: {because}.", "warning")]
     if step.parameters:
         blocks.append(_parameters(step.parameters, "Not in the model: what the fit with this effect came to."))
-    return (*blocks, *error_blocks(step.rmse_fit, step.rmse_holdout, of, *WITHOUT_AND_WITH))
+    return tuple(blocks)
 
 
 def _parameters(parameters: dict[str, FoundValue], caption: str) -> Table:
@@ -115,34 +106,3 @@ def _parameters(parameters: dict[str, FoundValue], caption: str) -> Table:
         shown = "not bounded by these traces" if interval is None else interval
         rows.append((Cell(name), Cell(value, number=True), Cell(shown, number=True), Cell(v.unit)))
     return Table(("parameter", "value", "95 % interval", "unit"), tuple(rows), caption)
-
-
-def error_blocks(
-    fit: Sequence[SignalError], held: Sequence[SignalError], of: Compared, before: str, after: str
-) -> tuple[Block, ...]:
-    """Picture and table of errors. before, after: names of the two states that are compared."""
-    if not fit and not held:
-        return ()
-    kinds = [("fitted to", e) for e in fit] + [("held out", e) for e in held]
-    sizes = _sizes([e for _, e in kinds])
-    rows = tuple((Cell(kind), *cells(str(e.joint), *own, gone(e))) for (kind, e), own in zip(kinds, sizes, strict=True))
-    caption = (
-        f"Root mean square of {of.residual}, {before} and {after}. "
-        f"{of.errors} Gone: share of the variance beyond noise that was taken off; a dash where there was hardly any. "
-        "An error may lie a little below the noise floor: the floor is what noise leaves on the average, and the noise "
-        "of one record may be less."
-    )
-    table = Table(("traces", "joint", before, after, "noise floor", "gone"), rows, caption)
-    return error_picture(fit, held, of.residual), table
-
-
-def _sizes(errors: Sequence[SignalError]) -> list[tuple[str, ...]]:
-    """Before, after and floor of each, with the same decimals for all of one unit."""
-    found: dict[int, tuple[str, ...]] = {}
-    for unit in dict.fromkeys(e.unit for e in errors):
-        factor, shown = shown_unit(unit)
-        own = [k for k, e in enumerate(errors) if e.unit == unit]
-        texts = column([factor * v for k in own for v in (errors[k].before, errors[k].after, errors[k].floor)])
-        for place, k in enumerate(own):
-            found[k] = tuple(with_unit(text, shown) for text in texts[3 * place : 3 * place + 3])
-    return [found[k] for k in range(len(errors))]

@@ -30,8 +30,9 @@ def _drive_timing(v: Values) -> str:
 
 def _errors_follow_record(v: Values) -> str:
     return (
-        "errors, their floor and the map are of a simulation whose controller is given the simulated reading moved "
-        f"{v['share']:g} of the way to the recorded one; reasons give sizes of the closed loop alone"
+        "the gap and the sizes in reasons are of the closed loop; the map, and the errors by which held-out traces "
+        "decide, are of a simulation whose controller is given the simulated reading moved "
+        f"{v['share']:g} of the way to the recorded one"
     )
 
 

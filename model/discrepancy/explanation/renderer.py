@@ -18,6 +18,7 @@ from model.discrepancy.diagnosis import (
     Diagnosis,
     DifferencePlace,
     FoundValue,
+    Gap,
     NextExperiment,
     Phase,
     RemainingShape,
@@ -53,6 +54,7 @@ def with_sentences(answer: Diagnosis) -> Diagnosis:
     written = answer.model_copy(
         update={
             "steps": tuple(map(step_with_sentences, answer.steps)),
+            "gap": None if answer.gap is None else _gap_with_names(answer.gap),
             "where": None if answer.where is None else where_with_summary(answer.where),
             "next_experiment": None if asked is None else _experiment_with_reason(asked),
             "notes": tuple(sentence(note_words(n)) for n in answer.notes_data) or answer.notes,
@@ -71,6 +73,19 @@ def step_with_sentences(step: Step) -> Step:
     if step.refusal is not None:
         update["rejected_because"] = refusal_words(step.refusal)
     return step.model_copy(update=update)
+
+
+def _gap_with_names(gap: Gap) -> Gap:
+    """The gap with the names of its stages."""
+    named = {"given": "model as given", "fitted": "its numbers fitted"}
+    return gap.model_copy(
+        update={
+            "stages": tuple(
+                s.model_copy(update={"name": named.get(s.kind, f"+ {placed(s.effect or '', s.joints)}")})
+                for s in gap.stages
+            )
+        }
+    )
 
 
 def where_with_summary(where: Where) -> Where:

@@ -20,6 +20,7 @@ from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
+from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
@@ -378,14 +379,16 @@ class _Workflow:
             fit={"fitted": [u.name for u in self.now.unknowns]},
             note="diagnosis",
         )
+        fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
         return Diagnosis(
             verdict=verdict(steps, unexplained=bool(shapes) and not adopted, suspected=self.suspicion is not None),
             suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
             steps=steps,
-            rmse_fit=self._errors(self.case.records),
-            rmse_holdout=self._errors(self.case.held_out),
+            rmse_fit=fit_errors,
+            rmse_holdout=held_errors,
+            gap=torque_gap(fit_errors, held_errors, steps),
             where=locate(self.now, self.case),
             candidates=self.tried,
             remaining=shapes,

@@ -225,18 +225,29 @@ class Observation:
             raise SpecError("the simulation does not stay finite: the loop is unstable")
         return found
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of the joints' positions: rad or m."""
+        kinds = [self.machine.joint(joint).kind for joint in self.machine.modelled_joints]
+        return tuple("rad" if kind == "revolute" else "m" for kind in kinds)
+
+    def rms(self, signals: Signals) -> list[float]:
+        """Root mean square of every joint over all samples that are compared, in the signals' unit."""
+        return [
+            float(np.sqrt(np.mean(np.concatenate([s[run, column] for s, run in self._runs(signals)]) ** 2)))
+            for column in range(len(self.deviations))
+        ]
+
+    def _runs(self, signals: Signals) -> list[tuple[Floats, slice]]:
+        return [(s, run) for s, r in zip(signals, self.records, strict=True) for run in r.runs]
+
     def errors(self, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
         """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
-        found = []
-        for column, joint in enumerate(self.machine.modelled_joints):
-            sizes = []
-            for signals in (before, after):
-                parts = [s[run, column] for s, r in zip(signals, self.records, strict=True) for run in r.runs]
-                sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
-            unit = "rad" if self.machine.joint(joint).kind == "revolute" else "m"
-            least = float(floor[column])
-            found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
-        return tuple(found)
+        rows = zip(self.machine.modelled_joints, self.units, self.rms(before), self.rms(after), floor, strict=True)
+        return tuple(
+            SignalError(joint=joint, unit=unit, before=old, after=new, floor=float(least))
+            for joint, unit, old, new, least in rows
+        )
 
     def weighted(self, signals: Sequence[Floats]) -> Floats:
         """Signals (…, m, n) in standard deviations of a reading, all compared samples in one row: (…, N)."""

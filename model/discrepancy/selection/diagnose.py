@@ -33,6 +33,7 @@ from model.discrepancy.output_error.controller_evidence import (
     with_findings,
     with_used_set_points,
 )
+from model.discrepancy.output_error.gap import closed_loop_gap
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
@@ -117,6 +118,13 @@ class _Search:
     def added(self) -> list[Added]:
         """The effects in the current fit."""
         return [Added(s.effect, s.joints, s.evidence) for s in self.steps if s.adopted]
+
+    @property
+    def taken(self) -> list[tuple[Step, Point]]:
+        """The steps in the current fit, each with the point after it."""
+        after = [*self.before[1:], self.current]
+        adopted = [k for k, step in enumerate(self.steps) if step.adopted]
+        return [(self.steps[k], (self.current if k == adopted[-1] else after[k]).point) for k in adopted]
 
 
 def _given_point(observation: Observation, given: Calibration) -> Point:
@@ -232,6 +240,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
         holdout=tuple(t.record.trace_id for t in case.held_traces),
         rmse_fit=case.fitted_errors(case.given, end),
         rmse_holdout=held,
+        gap=closed_loop_gap(case, found.first.point, found.taken),
         significant=case.thresholds.significant,
         seconds=0.0,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),

@@ -7,7 +7,17 @@ import numpy as np
 from daq.contracts.experiment import ExperimentSpec, SlowRamp
 from daq.contracts.trace import Trace
 from model.comparison.compare import Comparison, compare
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    Candidate,
+    Diagnosis,
+    FoundValue,
+    Gap,
+    GapStage,
+    NextExperiment,
+    SignalError,
+    Step,
+)
 from model.discrepancy.explanation.reasons import reason
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.localisation.disagreement import locate
@@ -82,6 +92,7 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
         next_experiment=asked,
         model_before=before,
         model_after=after,
+        gap=_gap(comparison),
         traces=(fit.record.trace_id,),
         holdout=(held.record.trace_id,),
         seconds=4.2,
@@ -96,6 +107,24 @@ def residual(model: Model, trace: Trace) -> np.ndarray:
     record = records_of([trace], model.machine, "position")[0]
     run = simulate(model, record.inputs, Options(quantise=False))
     return np.asarray(record.measured - run.at_samples(run.reading))
+
+
+def _gap(comparison: Comparison) -> Gap:
+    """No tolerance parameter was fitted: the first two stages are alike."""
+    fitted, held = _errors(comparison, "in_sample"), _errors(comparison, "held_out")
+    before = {"fitted": tuple(e.before for e in fitted), "held_out": tuple(e.before for e in held)}
+    after = {"fitted": tuple(e.after for e in fitted), "held_out": tuple(e.after for e in held)}
+    return Gap(
+        measure="closed-loop",
+        joints=tuple(e.joint for e in fitted),
+        units=tuple(e.unit for e in fitted),
+        noise=tuple(e.floor for e in fitted),
+        stages=(
+            GapStage(kind="given", **before),
+            GapStage(kind="fitted", **before),
+            GapStage(kind="effect", effect=EFFECT, joints=(2,), **after),
+        ),
+    )
 
 
 def _errors(comparison: Comparison, kind: str) -> tuple[SignalError, ...]:

@@ -10,7 +10,7 @@ from model.comparison.compare import TraceSignals
 from model.discrepancy.diagnosis import Candidate, PhaseCell, Where
 from model.reports import diagnosis_map, diagnosis_pictures
 from model.reports.diagnosis_map import by_shade, map_picture, shade_limits
-from model.reports.diagnosis_pictures import evidence_picture, log_ticks, shown_candidates
+from model.reports.diagnosis_pictures import evidence_picture, shown_candidates
 from model.reports.figures import band
 from model.reports.motion import _reach
 from model.reports.motion_closer import stretch_of_most
@@ -69,24 +69,6 @@ def test_the_line_that_an_effect_has_to_reach_is_drawn(figure: Figure) -> None:
     assert [t.get_text() for t in figure.axes[0].texts if "needed" in t.get_text()] == ["needed: 10"]
     assert figure.axes[0].get_xlim()[1] > 10.0
     assert "In full colour" not in picture.caption
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "told"),
-    [
-        (0.027, 0.055, [0.03, 0.04, 0.05]),
-        (0.028, 0.0315, [0.028, 0.029, 0.03, 0.031]),
-        (0.4, 30.0, [1, 3, 10, 30]),
-        (0.007, 7.0, [0.01, 0.1, 1.0]),
-        (1e-9, 1e9, [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9][:5]),
-    ],
-)
-def test_a_logarithmic_axis_has_few_round_ticks(low: float, high: float, told: list[float]) -> None:
-    ticks = log_ticks(low, high)
-    assert 2 <= len(ticks) <= 5
-    assert all(low <= t <= high for t in ticks)
-    if high / low < 1e6:
-        assert ticks == pytest.approx(told)
 
 
 def test_a_strong_map_keeps_its_structure() -> None:

@@ -7,10 +7,10 @@ import re
 import pytest
 
 from model.comparison.compare import Comparison
-from model.discrepancy.diagnosis import Acquired, Diagnosis, SignalError
+from model.discrepancy.diagnosis import Acquired, Diagnosis
 from model.discrepancy.grounds import ControllerProof
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
-from model.reports.diagnosis_words import TORQUES, compared, gap, gone
+from model.reports.diagnosis_words import TORQUES, compared, gap
 from model.reports.page import Picture, Report, Table, Text, html
 from tests.model.discrepancy.answers import EFFECT, an_answer
 
@@ -35,6 +35,7 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
     found, comparison = answer
     report = diagnosis_report(found, comparison)
     assert [s.title for s in report.sections] == [
+        "How the gap shrinks",
         "Where they disagree",
         "What is missing",
         "What adding it did",
@@ -50,22 +51,25 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
     assert "joint2.coulomb_friction.torque" in text
     assert "98.2 % of the held-out variance beyond noise is gone" in text
     assert "6.4 standard deviations" in text
-    # map, dependences, evidence, errors, two overlays and a closer look at each, remaining torque
+    # gap, map, dependences, evidence, two overlays and a closer look at each, remaining torque
     assert page.count("<svg") == 9
     assert "<script" not in page
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_errors_stand_beside_the_noise_and_say_how_much_is_gone(answer: tuple[Diagnosis, Comparison]) -> None:
-    step = answer[0].steps[0]
-    still = SignalError(joint=1, unit="rad", before=1.2e-3, after=1.1e-3, floor=1e-3)
-    gone = SignalError(joint=2, unit="rad", before=10e-3, after=1.5e-3, floor=1e-3)
-    told = answer[0].model_copy(update={"steps": (step.model_copy(update={"rmse_holdout": (still, gone)}),)})
-    blocks = next(s for s in diagnosis_report(told).sections if s.title == "What adding it did").blocks
-    table = next(b for b in blocks if isinstance(b, Table) and b.head[0] == "traces")
-    by_joint = {(row[0].text, row[1].text): row[-1].text for row in table.rows}
-    assert by_joint["held out", "2"] == "99 %"
-    assert by_joint["held out", "1"] == "–"
+def test_the_gap_of_the_closed_loop_comes_first(answer: tuple[Diagnosis, Comparison]) -> None:
+    report = diagnosis_report(answer[0])
+    assert report.sections[0].title == "How the gap shrinks"
+    table = next(b for b in report.sections[0].blocks if isinstance(b, Table))
+    assert table.head == (
+        "traces",
+        "joint",
+        "model as given",
+        "its numbers fitted",
+        "+ Coulomb friction, joint 2",
+        "noise",
+    )
+    assert [(row[0].text, row[1].text) for row in table.rows[2:4]] == [("fitted to", "2"), ("held out", "2")]
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -254,9 +258,6 @@ def test_what_has_no_clear_shape_is_not_told_as_one(answer: tuple[Diagnosis, Com
 
 
 def test_never_more_than_all_of_it_is_gone(answer: tuple[Diagnosis, Comparison]) -> None:
-    below = SignalError(joint=1, unit="rad", before=10e-3, after=0.9e-3, floor=1e-3)
-    nearly = below.model_copy(update={"after": 1.002e-3, "before": 1.0})
-    assert (gone(below), gone(nearly)) == ("all", "99.9 %")
     step = answer[0].steps[0].model_copy(update={"excess_removed_holdout": 1.002})
     assert gap(step).endswith("all of the held-out variance beyond noise is gone.")
 

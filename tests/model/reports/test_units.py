@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from daq.contracts.machine import Machine, load_machine
 from daq_cli.commands.compare import _print_result
 from daq_cli.commands.validate import _print_in_time
+from daq_cli.models.gap_text import gap_lines
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison
-from model.discrepancy.diagnosis import SignalError
+from model.discrepancy.diagnosis import Gap, GapStage
 from model.reports.comparison_report import comparison_report
-from model.reports.diagnosis_pictures import error_picture
+from model.reports.gap import gap_section
 from model.reports.page import Table
 from model.reports.validation_report import validation_report
 from model.units import joint_unit, squared, with_unit
@@ -141,11 +142,28 @@ def test_a_validation_of_a_sliding_joint_is_in_metres(
     assert "rms 0.15 m/s², 15 × the noise floor (0.01)" in capsys.readouterr().out
 
 
-def test_an_axis_of_degrees_and_millimetres_is_not_labelled_with_one_of_them(labels: list[str]) -> None:
-    turns = SignalError(joint=1, unit="rad", before=0.2, after=0.1, floor=0.01)
-    slides = SignalError(joint=2, unit="m", before=0.2, after=0.1, floor=0.01)
-    error_picture([turns, slides], [])
-    assert {"rms error / unit of the joint (logarithmic)", "joint 1 / °", "joint 2 / mm"} <= set(labels)
-    labels.clear()
-    error_picture([slides], [])
-    assert {"rms error / mm (logarithmic)", "joint 2"} <= set(labels)
+def test_the_gap_of_joints_that_turn_and_slide_is_shown_in_their_own_units(labels: list[str]) -> None:
+    stages = (
+        GapStage(kind="given", name="model as given", fitted=(0.2, 0.2), held_out=(0.3, None)),
+        GapStage(kind="fitted", name="its numbers fitted", fitted=(0.1, 0.1), held_out=(0.1, 0.1)),
+    )
+    gap = Gap(measure="closed-loop", joints=(1, 2), units=("rad", "m"), noise=(0.01, 0.01), stages=stages)
+    _, table = gap_section(gap).blocks
+    assert {"joint 1 / °", "joint 2 / mm"} <= set(labels)
+    assert isinstance(table, Table)
+    assert [[cell.text for cell in row] for row in table.rows] == [
+        ["fitted to", "1", "11.46°", "5.73°", "0.57°"],
+        ["held out", "1", "17.19°", "5.73°", "0.57°"],
+        ["fitted to", "2", "200 mm", "100 mm", "10 mm"],
+        ["held out", "2", "–", "100 mm", "10 mm"],
+    ]
+    assert gap_lines(gap) == [
+        "rms error in closed loop   joint 1, °  joint 2, mm",
+        "on traces fitted to",
+        "  model as given                11.46          200",
+        "  its numbers fitted             5.73          100",
+        "on traces held out",
+        "  model as given                17.19            –",
+        "  its numbers fitted             5.73          100",
+        "noise                            0.57           10",
+    ]

@@ -1780,6 +1780,7 @@ export interface components {
              * @default []
              */
             rmse_holdout?: components["schemas"]["SignalError"][];
+            gap?: components["schemas"]["Gap"] | null;
             where?: components["schemas"]["Where"] | null;
             /**
              * Candidates
@@ -2570,6 +2571,62 @@ export interface components {
             viscous?: components["schemas"]["Quantity"] | null;
             coulomb_arm?: components["schemas"]["Quantity"] | null;
             coulomb?: components["schemas"]["Quantity"] | null;
+        };
+        /**
+         * Gap
+         * @description The gap between simulation and measurement, and how it shrinks from stage to stage.
+         *
+         *     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
+         *     `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance.
+         */
+        Gap: {
+            /**
+             * Measure
+             * @enum {string}
+             */
+            measure: "closed-loop" | "torques";
+            /** Joints */
+            joints: number[];
+            /** Units */
+            units: string[];
+            /** Noise */
+            noise: number[];
+            /** Stages */
+            stages: components["schemas"]["GapStage"][];
+        };
+        /**
+         * GapStage
+         * @description The error of one model on the way from the given to the resulting one: root mean square by joint of the `Gap`, on
+         *     traces fitted to and on held-out ones (empty without any); None where the simulation does not stay finite.
+         *
+         *     `kind`: the model as given; with its tolerance parameters fitted; or with `effect` on `joints` added to the stage
+         *     before.
+         */
+        GapStage: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "given" | "fitted" | "effect";
+            /**
+             * Name
+             * @default
+             */
+            name?: string;
+            /** Effect */
+            effect?: string | null;
+            /**
+             * Joints
+             * @default []
+             */
+            joints?: number[];
+            /** Fitted */
+            fitted: (number | null)[];
+            /**
+             * Held Out
+             * @default []
+             */
+            held_out?: (number | null)[];
         };
         /**
          * Geometry

@@ -50,6 +50,7 @@ export type QueueStatus = Told<Schemas['QueueStatus']>;
 export type RobotStatus = Told<Schemas['RobotStatus']>;
 export type Schedule = Told<Schemas['Schedule']>;
 export type ServiceEvent = Told<Schemas['ServiceEvent']>;
+export type GapStage = Told<Schemas['GapStage']>;
 export type SignalError = Told<Schemas['SignalError']>;
 export type StopResult = Told<Schemas['StopResult']>;
 export type SystemStatus = Told<Schemas['SystemStatus']>;

@@ -1,57 +1,57 @@
 import { describe, expect, it } from 'vitest';
-import type { DiagnosisData, DiagnosisStep, SignalError } from '../api/types';
+import type { DiagnosisData } from '../api/types';
 import { gapOf, goneOf, ticksFromZero } from './gap';
 
-const error = (before: number, after: number): SignalError => ({
-  joint: 2,
-  unit: 'rad',
-  before,
-  after,
-  floor: 0.1,
-});
-const step = (effect: string, adopted: boolean, before: number, after: number): DiagnosisStep =>
-  ({
-    effect,
-    called: effect,
-    joints: [2],
-    adopted,
-    rmse_fit: [error(before, after)],
-    rmse_holdout: [error(before * 1.1, after * 1.1)],
-    where: { cells: [{}] },
-  }) as unknown as DiagnosisStep;
-const found = (steps: DiagnosisStep[], last: number): DiagnosisData =>
-  ({
-    steps,
-    rmse_fit: [error(4, last)],
-    rmse_holdout: [error(5, last)],
-  }) as unknown as DiagnosisData;
+const gap = {
+  measure: 'closed-loop',
+  joints: [1, 2],
+  units: ['rad', 'rad'],
+  noise: [0.1, 0.2],
+  stages: [
+    { name: 'as given', kind: 'given', effect: null, joints: [], fitted: [4, 5], held_out: [6, 7] },
+    {
+      name: 'tolerances fitted',
+      kind: 'fitted',
+      effect: null,
+      joints: [],
+      fitted: [3, 4],
+      held_out: [null, 5],
+    },
+    {
+      name: '+ Coulomb friction, joint 2',
+      kind: 'effect',
+      effect: 'coulomb_friction',
+      joints: [2],
+      fitted: [1, 1],
+      held_out: [1, 2],
+    },
+  ],
+};
 
 describe('the gap, step by step', () => {
-  it('goes from the model as given over its tolerances to every step', () => {
-    const gap = gapOf(found([step('backlash', true, 3, 1), step('coulomb_friction', false, 1, 0.9)], 1));
-    expect(gap.stages.map((one) => one.name)).toEqual([
+  it('goes from the model as given over its tolerances to every effect that was added', () => {
+    const found = gapOf({ gap } as unknown as DiagnosisData);
+    expect(found.stages.map((one) => one.name)).toEqual([
       'as given',
       'tolerances fitted',
-      '+ backlash',
-      '+ coulomb_friction',
+      '+ Coulomb friction, joint 2',
     ]);
-    expect(gap.stages.map((one) => one.fit[0])).toEqual([4, 3, 1, 0.9]);
-    expect(gap.stages.map((one) => one.kept)).toEqual([true, true, true, false]);
-    expect(gap.stages[0]?.held).toEqual([5]);
-    expect(gap.floor).toEqual([0.1]);
+    expect(found.stages.map((one) => one.fit[0])).toEqual([4, 3, 1]);
+    expect(found.stages.map((one) => one.held?.[0])).toEqual([6, null, 1]);
+    expect(found.floor).toEqual([0.1, 0.2]);
   });
 
-  it('has two stages when nothing is missing', () => {
-    const gap = gapOf(found([], 0.2));
-    expect(gap.stages.map((one) => [one.name, one.fit[0]])).toEqual([
-      ['as given', 4],
-      ['tolerances fitted', 0.2],
+  it('has no held-out stages where nothing was held out', () => {
+    const alone = { ...gap, stages: gap.stages.map((one) => ({ ...one, held_out: [] })) };
+    expect(gapOf({ gap: alone } as unknown as DiagnosisData).stages.map((one) => one.held)).toEqual([
+      null,
+      null,
+      null,
     ]);
   });
 
-  it('leaves out what the controller itself has proved: nothing was fitted for it', () => {
-    const proof = { ...step('wrong_gain', true, 0, 0), where: { cells: [] } } as unknown as DiagnosisStep;
-    expect(gapOf(found([proof], 0.2)).stages).toHaveLength(2);
+  it('is empty in an answer that is older than it', () => {
+    expect(gapOf({ gap: null } as unknown as DiagnosisData).stages).toEqual([]);
   });
 
   it('tells how much of the excess is gone only where there was some', () => {

@@ -1,14 +1,12 @@
 /** How the gap between measurement and simulation shrinks, step by step, against the noise floor. */
 
-import type { DiagnosisData, SignalError } from '../api/types';
+import type { DiagnosisData } from '../api/types';
 
 export interface Stage {
   name: string;
-  /** Whether the model was kept so; a step that was not taken leads back to the stage before. */
-  kept: boolean;
-  /** Root mean square by joint, in the joint's unit; in the order of the joints. */
-  fit: readonly number[];
-  held: readonly number[] | null;
+  /** Root mean square by joint, in the joint's unit, in the order of the joints; null where it is not finite. */
+  fit: readonly (number | null)[];
+  held: readonly (number | null)[] | null;
 }
 
 export interface Gap {
@@ -18,53 +16,19 @@ export interface Gap {
   stages: readonly Stage[];
 }
 
-/** The stages of a diagnosis: the model as given, its tolerances fitted, every step. */
+/** The stages of a diagnosis: the model as given, its tolerances fitted, every effect that was added. */
 export function gapOf(found: DiagnosisData): Gap {
-  const overall = found.rmse_fit;
-  const steps = found.steps.filter((step) => step.effect !== null && step.where.cells.length > 0);
-  const before = (errors: readonly SignalError[]): number[] => errors.map((one) => one.before);
-  const after = (errors: readonly SignalError[]): number[] => errors.map((one) => one.after);
-  const held = (errors: readonly SignalError[], pick: typeof before): number[] | null =>
-    errors.length === 0 ? null : pick(errors);
-  const stages: Stage[] = [];
-  if (overall.length > 0) {
-    stages.push({
-      name: 'as given',
-      kept: true,
-      fit: before(overall),
-      held: held(found.rmse_holdout, before),
-    });
-  }
-  const first = steps[0];
-  if (first !== undefined) {
-    stages.push({
-      name: 'tolerances fitted',
-      kept: true,
-      fit: before(first.rmse_fit),
-      held: held(first.rmse_holdout, before),
-    });
-  } else if (overall.length > 0) {
-    stages.push({
-      name: 'tolerances fitted',
-      kept: true,
-      fit: after(overall),
-      held: held(found.rmse_holdout, after),
-    });
-  }
-  for (const step of steps) {
-    stages.push({
-      name: `+ ${step.called}`,
-      kept: step.adopted,
-      fit: after(step.rmse_fit),
-      held: held(step.rmse_holdout, after),
-    });
-  }
-  const source = overall.length > 0 ? overall : (first?.rmse_fit ?? []);
+  const gap = found.gap;
+  if (!gap) return { joints: [], units: [], floor: [], stages: [] };
   return {
-    joints: source.map((one) => one.joint),
-    units: source.map((one) => one.unit),
-    floor: source.map((one) => one.floor),
-    stages,
+    joints: gap.joints,
+    units: gap.units,
+    floor: gap.noise,
+    stages: gap.stages.map((stage) => ({
+      name: stage.name,
+      fit: stage.fitted,
+      held: stage.held_out.length === 0 ? null : stage.held_out,
+    })),
   };
 }
 

@@ -1,0 +1,47 @@
+"""How the gap between simulation and measurement shrinks, as a table for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from model.reports.gap import MEASURES
+from model.reports.numbers import column
+from model.units import shown_unit
+
+if TYPE_CHECKING:
+    from model.discrepancy.diagnosis import Gap
+
+COLUMN = 13
+
+
+def gap_lines(gap: Gap) -> list[str]:
+    """A row a model, first on the traces fitted to, then on the held-out ones, and the noise; a column a joint."""
+    shown = [shown_unit(unit) for unit in gap.units]
+    heads = [f"joint {joint}, {unit}" for joint, (_, unit) in zip(gap.joints, shown, strict=True)]
+    held = any(stage.held_out for stage in gap.stages)
+    blocks = [("fitted to", [stage.fitted for stage in gap.stages])]
+    if held:
+        blocks.append(("held out", [stage.held_out for stage in gap.stages]))
+    names = [stage.name for stage in gap.stages]
+    label = max(len(MEASURES[gap.measure]), *(len(name) + 2 for name in names), len("noise")) + 1
+    texts = _texts([*(row for _, rows in blocks for row in rows), gap.noise], [factor for factor, _ in shown])
+    lines = [_row(MEASURES[gap.measure], heads, label)]
+    for title, rows in blocks:
+        lines.append(f"on traces {title}")
+        lines += [_row(f"  {name}", texts.pop(0), label) for name, _ in zip(names, rows, strict=True)]
+    return [*lines, _row("noise", texts.pop(0), label)]
+
+
+def _texts(rows: Sequence[Sequence[float | None]], factors: Sequence[float]) -> list[list[str]]:
+    """Rows of numbers as text, a joint's all with the same decimals; a dash for what is not finite."""
+    columns = []
+    for place, factor in enumerate(factors):
+        values = [row[place] for row in rows]
+        texts = iter(column([factor * v for v in values if v is not None]))
+        columns.append(["–" if v is None else next(texts) for v in values])
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _row(name: str, cells: Sequence[str], label: int) -> str:
+    return f"{name:<{label}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)
