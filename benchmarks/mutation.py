@@ -77,6 +77,26 @@ class Tests:
 
 
 @dataclass(frozen=True)
+class Baseline:
+    """Seconds that each unchanged test takes, by the name that selects it, and the most that one may take."""
+
+    seconds: dict[str, float]
+    longest_s: float
+
+    def tests(self, files: tuple[str, ...]) -> Tests:
+        """The tests of some files, the quickest file first, without the tests that take too long."""
+        times = dict.fromkeys(files, 0.0)
+        deselected = []
+        for test, seconds in self.seconds.items():
+            file = test.partition("::")[0]
+            if file in times and seconds > self.longest_s:
+                deselected.append(test)
+            elif file in times:
+                times[file] += seconds
+        return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How one mutant ended: `killed`, `timed out` (killed as well), `survived` or `no tests`; and which test failed."""
 
@@ -223,32 +243,34 @@ def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int
         return code, failed[0].strip() if failed else ""
 
 
-def measured(tree: Path, files: tuple[str, ...], longest_s: float) -> Tests:
-    """Runs the unchanged tests: the files in the order of their times, without the tests that take too long.
-
-    Where a test takes too long all are run again, since the first run may have spent the time on compiling.
-    Raises MutationError when one fails.
+def measured(tree: Path, files: tuple[str, ...], longest_s: float) -> Baseline:
+    """Runs the unchanged tests. Those that took too long are run again, since the first run may have spent the time on
+    compiling, and are left out when they take too long once more. Raises MutationError when one fails.
     """
-    first = _measured_once(tree, files, longest_s)
-    return _measured_once(tree, files, longest_s) if first.deselected else first
+    times = _times(tree, files)
+    long = [test for test, seconds in times.items() if seconds > longest_s]
+    if long:
+        times |= _times(tree, long)
+    return Baseline(times, longest_s)
 
 
-def _measured_once(tree: Path, files: tuple[str, ...], longest_s: float) -> Tests:
+def _times(tree: Path, tests: Iterable[str]) -> dict[str, float]:
+    """Seconds of each test."""
     report = tree / "mutation-baseline.xml"
-    code, failed = run_tests(tree, [f"--junitxml={report}", "-o", "junit_family=xunit1", *files], BASELINE_LIMIT_S)
+    code, failed = run_tests(tree, [f"--junitxml={report}", "-o", "junit_family=xunit1", *tests], BASELINE_LIMIT_S)
     if code == 5:  # pytest: there was no test
-        return Tests((), (), 0.0)
+        return {}
     if code != 0:
-        raise MutationError(f"the tests fail without any fault (exit code {code}; {failed}): {' '.join(files)}")
-    times = dict.fromkeys(files, 0.0)
-    deselected = []
-    for case in ElementTree.parse(report).iter("testcase"):
-        file, seconds = case.get("file", ""), float(case.get("time", 0.0))
-        if seconds > longest_s:
-            deselected.append(f"{file}::{case.get('name')}")
-        else:
-            times[file] = times.get(file, 0.0) + seconds
-    return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+        raise MutationError(f"the tests fail without any fault (exit code {code}; {failed}): {' '.join(tests)}")
+    cases = ElementTree.parse(report).iter("testcase")
+    return {_name(case): float(case.get("time", 0.0)) for case in cases}
+
+
+def _name(case: ElementTree.Element) -> str:
+    """The name by which pytest selects a test: `file::class::name`, mostly without a class."""
+    file = case.get("file", "")
+    classes = case.get("classname", "").removeprefix(file.removesuffix(".py").replace("/", "."))
+    return "::".join([file, *filter(None, classes.split(".")), case.get("name", "")])
 
 
 def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
@@ -292,20 +314,22 @@ def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool
             finally:
                 trees.put(tree)
 
-        def measure(files: tuple[str, ...]) -> Tests:
+        def measure(files: tuple[str, ...]) -> Baseline:
             with a_tree() as tree:
                 return measured(tree, files, longest_s)
 
         def attempt(mutant: Mutant) -> Outcome:
             with a_tree() as tree:
-                ended = outcome(tree, mutant, tests[reaching(mutant.file)])
+                ended = outcome(tree, mutant, baselines[mirrored_folder(mutant.file)].tests(reaching(mutant.file)))
             if ended.lives or kills:
                 print(f"{ended.ending}: {mutant}{f'  ({ended.failed})' if ended.failed else ''}", flush=True)
             return ended
 
-        sets_of_files = list(dict.fromkeys(reaching(mutant.file) for mutant in mutants))
+        files: dict[Path, dict[str, None]] = {}
+        for mutant in mutants:
+            files.setdefault(mirrored_folder(mutant.file), {}).update(dict.fromkeys(reaching(mutant.file)))
         with ThreadPoolExecutor(processes) as pool:
-            tests = dict(zip(sets_of_files, pool.map(measure, sets_of_files), strict=True))
+            baselines = dict(zip(files, pool.map(measure, map(tuple, files.values())), strict=True))
             return list(pool.map(attempt, mutants))
 
 
