@@ -48,6 +48,7 @@ def test_a_pause_that_lasts_is_a_fault() -> None:
     guards = running()
     verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
     assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
+    assert all(verdict.hold for verdict in verdicts)
     (trip,) = verdicts[-1].trips
     assert trip.startswith("joint 3: positional error of 130 ADC counts, set points pause outside ±127; ")
     assert trip.endswith("it lasted 0.52 s, allowed are 0.5 s")
