@@ -83,6 +83,23 @@ def test_a_stop_by_another_host_is_noticed_on_the_board(arm: Rig) -> None:
     assert "has been stopped" in result.reason or "on the board" in result.reason
 
 
+def test_a_stop_by_another_host_is_noticed_while_set_points_wait(arm: Rig) -> None:
+    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=2")
+    arm.ears.at_event["pause"] = arm.controller.link.stop
+    result = arm.run(LONG_RAMP)
+    assert (result.outcome, result.reason.partition(" at tick ")[0]) == ("stopped", "on the board,")
+    assert "fault" not in arm.kinds
+
+
+def test_repeated_requests_are_told_once_each(tmp_path: Path) -> None:
+    long = ExperimentSpec(trajectory=Pause(duration=4), settle=0, hold=0)
+    with rig(tmp_path, "seed=5&fault=drop:rate=0.05") as arm:
+        result = arm.run(long)
+    told = [int(event.message.split()[0]) for event in read_trace(result.trace).events if event.kind == "retry"]
+    assert len(told) >= 3
+    assert 0 < sum(told) <= result.counters["retries"]
+
+
 def test_a_stop_on_the_way_to_the_start_leaves_a_frozen_arm_and_no_trace(arm: Rig, tmp_path: Path) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(200)}})
     arm.ears.at_event["note"] = arm.stop_as_the_guardian_does  # "slow move starts"
