@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.trace import Trace, TraceEvent
-from daq.traces.plot import ALARM, QUIET, figure_of, plot_trace
+from daq.traces.plot import ALARM, JOINT_COLOURS, QUIET, figure_of, plot_trace
 from daq.traces.reader import read_trace
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import JOINTS, record, row, write
@@ -44,6 +44,7 @@ def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace)
     assert [axis.get_ylabel() for axis in axes if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"]
     assert [axis.get_title("left") for axis in axes[:3]] == ["joint 1, waist", "joint 2, shoulder", "joint 3, elbow"]
     measured = next(line for line in axes[1].lines if line.get_label() == "position")
+    assert measured.get_color() == JOINT_COLOURS[1]
     values = np.asarray(measured.get_ydata(), dtype=float)
     np.testing.assert_allclose(values[np.isfinite(values)], np.degrees(trace.position[:, 1]))
     assert np.isnan(values).sum() == 1
