@@ -51,7 +51,8 @@ def test_sleeping_lets_the_controller_s_time_pass_in_turns_of_a_second_at_most()
     clock, channel = clock_of(Board(1_500_000))
     clock.sleep_until(4.0)
     assert clock.now() == pytest.approx(4.0)
-    assert asked(channel) == [0, 1_000_000, 1_000_000, 500_000]
+    clock.sleep_until(4.000001)
+    assert asked(channel) == [0, 1_000_000, 1_000_000, 500_000, 1]
 
 
 def test_a_moment_that_is_past_is_not_waited_for() -> None:

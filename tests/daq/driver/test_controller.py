@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from daq.driver import Controller, GainsNotTakenError, NoSampleError, ProtocolVersionError
-from daq.link import LinkTimeoutError
+from daq.link import Link, LinkTimeoutError
 from daq.transport import TransportError
 from firmware_protocol.commands import (
     Capability,
@@ -51,6 +51,17 @@ def test_another_protocol_is_refused_with_both_versions() -> None:
     newer = HelloReply(3, Capability.SAMPLE, 20_000, 8, 1)
     with pytest.raises(ProtocolVersionError, match="speaks protocol 3, this software 2: update this software"):
         controller_that(lambda _: None, newer)
+
+
+def test_a_controller_that_cannot_be_spoken_to_is_not_kept_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+    def newer(sequence: int, _: Request) -> list[tuple[float, bytes]]:
+        return [(0.0, frame_of(sequence, HelloReply(3, Capability.SAMPLE, 20_000, 8, 1)))]
+
+    link, channel = scripted_link(newer)
+    monkeypatch.setattr(Link, "open", lambda _url: link)
+    with pytest.raises(ProtocolVersionError):
+        Controller.connect("script://")
+    assert channel.broken == "closed"
 
 
 def test_a_recorded_short_greeting_of_the_same_version_is_no_identity() -> None:

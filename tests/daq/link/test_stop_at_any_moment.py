@@ -76,13 +76,26 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
 
 def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     class Echo(SampleWaitsForStop):
+        overlaps = 0
+        _read = threading.Lock()
+
+        def read(self, timeout_s: float) -> bytes:
+            if not self._read.acquire(blocking=False):
+                self.overlaps += 1
+                return super().read(timeout_s)
+            try:
+                return super().read(timeout_s)
+            finally:
+                self._read.release()
+
         def write(self, data: bytes) -> None:
             for frame in self._decoder.feed(data):
                 request = parse_request(frame)
                 assert isinstance(request, Sample)
                 self._replies.put(frame_of(frame.sequence, Snapshot(request.after + 1, 0, SNAPSHOT.joints)))
 
-    link = Link(Echo())
+    bench = Echo()
+    link = Link(bench)
     wrong: list[int] = []
 
     def ask(first: int) -> None:
@@ -95,5 +108,6 @@ def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     for thread in threads:
         thread.join(20)
     assert not wrong
+    assert bench.overlaps == 0, "one thread at a time reads for all"
     assert link.counters.requests == 1200
     assert link.counters.retries == 0
