@@ -6,11 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq.driver.double_read import DoubleReader, Span, spans
+from daq.driver.double_read import MOST_READINGS, DoubleReader, Span, spans
 from daq.link import Link
+from firmware_protocol.commands import Block, ReadBlock, Request
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
 from tests.daq.driver.memory_board import PERIOD_S, MemoryBoard
-from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, frame_of
 
 
 class ChannelClock:
@@ -94,6 +95,22 @@ def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
     assert [(reading.position, reading.error, reading.power) for _, reading in joints] == counting(2)
     assert link.counters.torn == 1
     assert reader.disturbed
+
+
+def test_readings_that_all_differ_deliver_nothing_however_many_there_are() -> None:
+    changes = iter(range(1, 100))
+
+    def never_at_rest(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, ReadBlock)
+        return [(0.0001, frame_of(sequence, Block(bytes([next(changes)] * request.count))))]
+
+    channel = ScriptedChannel(never_at_rest)
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    reader = DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S)
+    assert reader.read((1, 2, 3)) is None
+    assert reader.disturbed
+    assert len(channel.asked) == MOST_READINGS
+    assert link.counters.torn == MOST_READINGS - 1
 
 
 def test_a_mixture_that_two_changes_leave_alike_is_not_taken() -> None:

@@ -74,28 +74,55 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
     assert bench.order == [Sample, Stop, Stop]
 
 
-def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
-    class Echo(SampleWaitsForStop):
-        overlaps = 0
-        _read = threading.Lock()
+def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
+    class SlowToConfirm(SampleWaitsForStop):
+        readers = most_readers = 0
+        confirmation: threading.Timer | None = None
+        _counting = threading.Lock()
+
+        def write(self, data: bytes) -> None:
+            for frame in self._decoder.feed(data):
+                if isinstance(parse_request(frame), Sample):
+                    self._sample = frame.sequence
+                    self.sample_waits.set()
+                elif self.confirmation is None:
+                    reply = frame_of(frame.sequence, STOPPED)
+                    self.confirmation = threading.Timer(0.05, self._replies.put, (reply,))
+                    self.confirmation.start()
 
         def read(self, timeout_s: float) -> bytes:
-            if not self._read.acquire(blocking=False):
-                self.overlaps += 1
-                return super().read(timeout_s)
+            with self._counting:
+                self.readers += 1
+                self.most_readers = max(self.most_readers, self.readers)
             try:
                 return super().read(timeout_s)
             finally:
-                self._read.release()
+                with self._counting:
+                    self.readers -= 1
 
+    bench = SlowToConfirm()
+    link = Link(bench)
+    link.set_period(30.0)
+    sampler = threading.Thread(target=lambda: link.request(Sample(9, 1), Snapshot))
+    sampler.start()
+    assert bench.sample_waits.wait(5)
+    assert link.stop() == STOPPED
+    bench.answer_sample()
+    sampler.join(5)
+    assert bench.confirmation is not None
+    bench.confirmation.join(5)
+    assert bench.most_readers == 1
+
+
+def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
+    class Echo(SampleWaitsForStop):
         def write(self, data: bytes) -> None:
             for frame in self._decoder.feed(data):
                 request = parse_request(frame)
                 assert isinstance(request, Sample)
                 self._replies.put(frame_of(frame.sequence, Snapshot(request.after + 1, 0, SNAPSHOT.joints)))
 
-    bench = Echo()
-    link = Link(bench)
+    link = Link(Echo())
     wrong: list[int] = []
 
     def ask(first: int) -> None:
@@ -108,6 +135,5 @@ def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     for thread in threads:
         thread.join(20)
     assert not wrong
-    assert bench.overlaps == 0, "one thread at a time reads for all"
     assert link.counters.requests == 1200
     assert link.counters.retries == 0
