@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -97,20 +99,34 @@ def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
     assert reader.disturbed
 
 
-def test_readings_that_all_differ_deliver_nothing_however_many_there_are() -> None:
-    changes = iter(range(1, 100))
+def reader_of_bytes(values: Iterable[int]) -> tuple[DoubleReader, Link, ScriptedChannel]:
+    """A reader of a memory all of whose bytes have these values, one reading after the other."""
+    readings = iter(values)
 
-    def never_at_rest(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
         assert isinstance(request, ReadBlock)
-        return [(0.0001, frame_of(sequence, Block(bytes([next(changes)] * request.count))))]
+        return [(0.0001, frame_of(sequence, Block(bytes([next(readings)] * request.count))))]
 
-    channel = ScriptedChannel(never_at_rest)
+    channel = ScriptedChannel(answer)
     link = Link(ScriptedEndpoint([channel]), now=channel.now)
-    reader = DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S)
+    return DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S), link, channel
+
+
+def test_readings_that_all_differ_deliver_nothing_however_many_there_are() -> None:
+    reader, link, channel = reader_of_bytes(range(1, 100))
     assert reader.read((1, 2, 3)) is None
     assert reader.disturbed
     assert len(channel.asked) == MOST_READINGS
     assert link.counters.torn == MOST_READINGS - 1
+
+
+def test_only_the_two_readings_that_agree_tell_whether_the_board_has_its_supply() -> None:
+    reader, _, _ = reader_of_bytes([5, 6, 0, 0])
+    assert reader.read((1, 2, 3)) is None
+    reader, _, _ = reader_of_bytes([5, 0, 7, 7])
+    joints = reader.read((1, 2, 3))
+    assert joints is not None
+    assert {reading.power for _, reading in joints} == {7}
 
 
 def test_a_mixture_that_two_changes_leave_alike_is_not_taken() -> None:
