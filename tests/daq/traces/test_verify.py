@@ -46,6 +46,7 @@ def test_a_good_trace_has_no_findings_but_notes(tmp_path: Path) -> None:
     ("made", "expected", "words"),
     [
         ({"ticks": [0, 1, 4, 5, 9]}, ("warning", "gaps"), "5 samples are missing in 2 gaps, the first after 0.020 s"),
+        ({"ticks": [0, 2, 6]}, ("warning", "gaps"), "4 samples are missing in 2 gaps, the first after 0.000 s"),
         (
             {"ticks": [0, 1, 4], "counters": {"missing_samples": 1}},
             ("error", "counters"),
