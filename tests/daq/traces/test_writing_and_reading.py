@@ -176,7 +176,9 @@ def test_a_name_tells_moment_and_kind_and_is_never_used_twice(tmp_path: Path) ->
     with pytest.raises(TraceError, match="exists already"):
         write_trace(read_trace(path), path)
     assert path.read_bytes() == before
-    assert len({new_trace_id() for _ in range(100)}) == 100
+    numbers = {new_trace_id() for _ in range(100)}
+    assert len(numbers) == 100
+    assert all(len(number) == 12 and set(number) <= set("0123456789abcdef") for number in numbers)
 
 
 def test_two_writers_of_one_name_do_not_meet(tmp_path: Path) -> None:
