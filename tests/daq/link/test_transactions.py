@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from daq.link import Link, LinkLostError, LinkState, LinkTimeoutError, RequestRefusedError
 from daq.link.counters import Tally
 from daq.link.pending import SEQUENCE_NUMBERS, PendingReplies
-from daq.link.timing import CLEAN_TRANSACTIONS, HELLO_RETRIES, RETRIES
+from daq.link.timing import HELLO_RETRIES, RETRIES
 from firmware_protocol.commands import (
     Block,
     ReadBlock,
@@ -56,10 +56,12 @@ def test_a_request_gets_its_reply_and_a_lost_reply_is_asked_for_under_the_same_n
     assert seen == [0, 0]
     assert (link.counters.requests, link.counters.retries, link.counters.timeouts) == (1, 1, 1)
     assert link.state is LinkState.DEGRADED
-    for _ in range(CLEAN_TRANSACTIONS):
+    for _ in range(99):
         link.request(ReadStatus(), Status)
+    assert link.state is LinkState.DEGRADED
+    link.request(ReadStatus(), Status)
     assert link.state is LinkState.CONNECTED
-    assert seen[2:] == list(range(1, CLEAN_TRANSACTIONS + 1))
+    assert seen[2:] == list(range(1, 101))
 
 
 def test_the_budget_of_one_transaction_ends_in_one_clear_line() -> None:
