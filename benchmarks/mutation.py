@@ -10,11 +10,14 @@ browser, a real arm or measured traces. A mutant also counts as killed when the 
 their time and 20 s (240 s for the model, which has to compile).
 
 The output is each survivor with file, line and change, and the share killed of each path. A survivor asks for a test.
-One that no test could notice is entered in equivalent_mutants.toml with the reason, and is then left out.
-The exit code is 1 where less than 90 % of a path's mutants are killed.
+One that no test could notice is entered in equivalent_mutants.toml with the reason, and is then left out: after the
+sample is drawn, so that a seed keeps its sample. The exit code is 1 where less than 90 % of a path's mutants are
+killed.
 
 --sample N    as many mutants of each path, drawn with --seed (all of them without it)
 --list        print the mutants and run nothing
+--kills       print each killed mutant too, with the test that failed; on a busy machine a test that waits for a
+              process or a clock may have failed without noticing the fault
 --line N      only those that begin at this line; for one file
 """
 
@@ -74,11 +77,32 @@ class Tests:
 
 
 @dataclass(frozen=True)
+class Baseline:
+    """Seconds that each unchanged test takes, by the name that selects it, and the most that one may take."""
+
+    seconds: dict[str, float]
+    longest_s: float
+
+    def tests(self, files: tuple[str, ...]) -> Tests:
+        """The tests of some files, the quickest file first, without the tests that take too long."""
+        times = dict.fromkeys(files, 0.0)
+        deselected = []
+        for test, seconds in self.seconds.items():
+            file = test.partition("::")[0]
+            if file in times and seconds > self.longest_s:
+                deselected.append(test)
+            elif file in times:
+                times[file] += seconds
+        return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """How one mutant ended: `killed`, `timed out` (killed as well), `survived`, or `no tests`."""
+    """How one mutant ended: `killed`, `timed out` (killed as well), `survived` or `no tests`; and which test failed."""
 
     mutant: Mutant
     ending: str
+    failed: str = ""
 
     @property
     def lives(self) -> bool:
@@ -100,14 +124,12 @@ def equivalents(file: Path = EQUIVALENT) -> dict[tuple[str, str, str, str], str]
 
 
 def mutants_below(path: str, root: Path = ROOT) -> list[Mutant]:
-    """All mutants of a file or a folder (relative to the root), without the equivalent ones."""
+    """All mutants of a file or a folder (relative to the root)."""
     place = root / path
     files = [place] if place.is_file() else sorted(place.rglob("*.py"))
     if not files:
         raise MutationError(f"{path}: there is no Python file")
-    known = equivalents()
-    found = (mutant for file in files for mutant in mutants_of(file.read_bytes(), file.relative_to(root).as_posix()))
-    return [mutant for mutant in found if mutant.identity not in known]
+    return [mutant for file in files for mutant in mutants_of(file.read_bytes(), file.relative_to(root).as_posix())]
 
 
 # ---- which tests
@@ -195,48 +217,60 @@ def copy_of_tree(target: Path) -> None:
         shutil.copytree(ROOT / page, target / page, dirs_exist_ok=True)
 
 
-def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> int | None:
-    """pytest's exit code for the tests of a copy; None when they took too long, and everything they began was ended."""
+def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int | None, str]:
+    """pytest's exit code for the tests of a copy, and the first that failed.
+
+    The code is None when they took too long; everything they began was then ended.
+    """
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", LEFT_OUT, *arguments]
     environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled")}
-    with subprocess.Popen(
-        command, cwd=tree, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    ) as process:
+    with (
+        tempfile.TemporaryFile("w+", errors="replace") as output,
+        subprocess.Popen(
+            command, cwd=tree, env=environment, stdout=output, stderr=subprocess.DEVNULL, start_new_session=True
+        ) as process,
+    ):
+        code = None
         try:
-            return process.wait(limit_s)
+            code = process.wait(limit_s)
         except subprocess.TimeoutExpired:
-            return None
+            pass
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+        output.seek(0)
+        failed = [line.split(" - ")[0] for line in output if line.startswith(("FAILED ", "ERROR "))]
+        return code, failed[0].strip() if failed else ""
 
 
-def measured(tree: Path, files: tuple[str, ...], longest_s: float) -> Tests:
-    """Runs the unchanged tests: the files in the order of their times, without the tests that take too long.
-
-    Where a test takes too long all are run again, since the first run may have spent the time on compiling.
-    Raises MutationError when one fails.
+def measured(tree: Path, files: tuple[str, ...], longest_s: float) -> Baseline:
+    """Runs the unchanged tests. Those that took too long are run again, since the first run may have spent the time on
+    compiling, and are left out when they take too long once more. Raises MutationError when one fails.
     """
-    first = _measured_once(tree, files, longest_s)
-    return _measured_once(tree, files, longest_s) if first.deselected else first
+    times = _times(tree, files)
+    long = [test for test, seconds in times.items() if seconds > longest_s]
+    if long:
+        times |= _times(tree, long)
+    return Baseline(times, longest_s)
 
 
-def _measured_once(tree: Path, files: tuple[str, ...], longest_s: float) -> Tests:
+def _times(tree: Path, tests: Iterable[str]) -> dict[str, float]:
+    """Seconds of each test."""
     report = tree / "mutation-baseline.xml"
-    code = run_tests(tree, [f"--junitxml={report}", "-o", "junit_family=xunit1", *files], BASELINE_LIMIT_S)
+    code, failed = run_tests(tree, [f"--junitxml={report}", "-o", "junit_family=xunit1", *tests], BASELINE_LIMIT_S)
     if code == 5:  # pytest: there was no test
-        return Tests((), (), 0.0)
+        return {}
     if code != 0:
-        raise MutationError(f"the tests fail without any fault (exit code {code}): {' '.join(files)}")
-    times = dict.fromkeys(files, 0.0)
-    deselected = []
-    for case in ElementTree.parse(report).iter("testcase"):
-        file, seconds = case.get("file", ""), float(case.get("time", 0.0))
-        if seconds > longest_s:
-            deselected.append(f"{file}::{case.get('name')}")
-        else:
-            times[file] = times.get(file, 0.0) + seconds
-    return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+        raise MutationError(f"the tests fail without any fault (exit code {code}; {failed}): {' '.join(tests)}")
+    cases = ElementTree.parse(report).iter("testcase")
+    return {_name(case): float(case.get("time", 0.0)) for case in cases}
+
+
+def _name(case: ElementTree.Element) -> str:
+    """The name by which pytest selects a test: `file::class::name`, mostly without a class."""
+    file = case.get("file", "")
+    classes = case.get("classname", "").removeprefix(file.removesuffix(".py").replace("/", "."))
+    return "::".join([file, *filter(None, classes.split(".")), case.get("name", "")])
 
 
 def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
@@ -249,10 +283,10 @@ def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
     try:
         arguments = [*tests.files, *(f"--deselect={name}" for name in tests.deselected)]
         grace = COMPILING_S if mutant.file.startswith("model/") else GRACE_S
-        code = run_tests(tree, arguments, 3.0 * tests.seconds + grace)
+        code, failed = run_tests(tree, arguments, 3.0 * tests.seconds + grace)
     finally:
         _write(file, unchanged, changed_at)
-    return Outcome(mutant, {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed"))
+    return Outcome(mutant, {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed"), failed)
 
 
 def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
@@ -260,8 +294,11 @@ def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
     os.utime(file, ns=(changed_at_ns, changed_at_ns))
 
 
-def run_all(mutants: list[Mutant], processes: int, longest_s: float) -> list[Outcome]:
-    """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once."""
+def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool) -> list[Outcome]:
+    """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once.
+
+    With `kills` it prints each killed one as well, with the test that failed.
+    """
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         trees: SimpleQueue[Path] = SimpleQueue()
         for number in range(processes):
@@ -277,20 +314,22 @@ def run_all(mutants: list[Mutant], processes: int, longest_s: float) -> list[Out
             finally:
                 trees.put(tree)
 
-        def measure(files: tuple[str, ...]) -> Tests:
+        def measure(files: tuple[str, ...]) -> Baseline:
             with a_tree() as tree:
                 return measured(tree, files, longest_s)
 
         def attempt(mutant: Mutant) -> Outcome:
             with a_tree() as tree:
-                ended = outcome(tree, mutant, tests[reaching(mutant.file)])
-            if ended.lives:
-                print(f"{ended.ending}: {mutant}", flush=True)
+                ended = outcome(tree, mutant, baselines[mirrored_folder(mutant.file)].tests(reaching(mutant.file)))
+            if ended.lives or kills:
+                print(f"{ended.ending}: {mutant}{f'  ({ended.failed})' if ended.failed else ''}", flush=True)
             return ended
 
-        sets_of_files = list(dict.fromkeys(reaching(mutant.file) for mutant in mutants))
+        files: dict[Path, dict[str, None]] = {}
+        for mutant in mutants:
+            files.setdefault(mirrored_folder(mutant.file), {}).update(dict.fromkeys(reaching(mutant.file)))
         with ThreadPoolExecutor(processes) as pool:
-            tests = dict(zip(sets_of_files, pool.map(measure, sets_of_files), strict=True))
+            baselines = dict(zip(files, pool.map(measure, map(tuple, files.values())), strict=True))
             return list(pool.map(attempt, mutants))
 
 
@@ -306,6 +345,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--longest", type=float, default=5.0, metavar="SECONDS")
     parser.add_argument("--line", type=int, metavar="N")
     parser.add_argument("--list", action="store_true")
+    parser.add_argument("--kills", action="store_true")
     return parser.parse_args()
 
 
@@ -313,19 +353,23 @@ def main() -> int:
     """The exit code: 0 when enough mutants of every path were killed."""
     options = _arguments()
     random = Random(options.seed)
+    known = equivalents()
     chosen: dict[str, list[Mutant]] = {}
+    left_out: dict[str, int] = {}
     try:
         for path in options.paths:
             mutants = [m for m in mutants_below(path.rstrip("/")) if options.line in (None, m.line)]
             fewer = options.sample is not None and options.sample < len(mutants)
-            chosen[path] = random.sample(mutants, options.sample) if fewer else mutants
+            drawn = random.sample(mutants, options.sample) if fewer else mutants
+            chosen[path] = [mutant for mutant in drawn if mutant.identity not in known]
+            left_out[path] = len(drawn) - len(chosen[path])
         if options.list:
             for mutants in chosen.values():
                 print(*mutants, sep="\n")
             return 0
         begun = time.monotonic()
         every = [mutant for mutants in chosen.values() for mutant in mutants]
-        ended = {each.mutant: each for each in run_all(every, options.processes, options.longest)}
+        ended = {each.mutant: each for each in run_all(every, options.processes, options.longest, options.kills)}
     except MutationError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -336,7 +380,10 @@ def main() -> int:
         timed_out = sum(ended[mutant].ending == "timed out" for mutant in mutants)
         share = killed / len(mutants) if mutants else 1.0
         enough &= share >= TARGET
-        print(f"{path:<24} {killed} of {len(mutants)} killed ({share:.0%}), {timed_out} of them by the time limit")
+        print(
+            f"{path:<24} {killed} of {len(mutants)} killed ({share:.0%}), {timed_out} of them by the time limit; "
+            f"{left_out[path]} more are equivalent"
+        )
     return 0 if enough else 1
 
 

@@ -1,6 +1,7 @@
 """Every message packs into its payload and back; nothing else gets in, and only ProtocolError comes out."""
 
 import dataclasses
+import struct
 
 import pytest
 from hypothesis import given
@@ -78,6 +79,33 @@ def test_a_number_fills_its_bytes_and_not_one_more(kind: type[c.Message], field:
     for value in (-1, highest + 1):
         with pytest.raises(ProtocolError, match=f"{field} of {value}: allowed are 0 to {highest}"):
             kind(**others | {field: value})
+
+
+@dataclasses.dataclass(frozen=True)
+class EveryWidth(c.Message):
+    """A message with a field of each kind that a layout may name."""
+
+    LAYOUT = "<BbHhIQ"
+    unsigned_8: int
+    signed_8: int
+    unsigned_16: int
+    signed_16: int
+    unsigned_32: int
+    unsigned_64: int
+
+
+@pytest.mark.parametrize(("place", "letter"), list(enumerate(EveryWidth.LAYOUT[1:])))
+def test_a_field_takes_exactly_the_values_that_its_bytes_hold(place: int, letter: str) -> None:
+    values = 1 << 8 * struct.calcsize(f"<{letter}")
+    lowest = -values // 2 if letter.islower() else 0
+    fields = [0] * 6
+    for value in (lowest, lowest + values - 1):
+        fields[place] = value
+        assert EveryWidth.parse(EveryWidth(*fields).pack()) == EveryWidth(*fields)
+    for value in (lowest - 1, lowest + values):
+        fields[place] = value
+        with pytest.raises(ProtocolError, match=f"of {value}: allowed are {lowest} to {lowest + values - 1}"):
+            EveryWidth(*fields)
 
 
 def test_a_stop_has_no_stamp_and_the_layout_of_version_1() -> None:
@@ -166,6 +194,10 @@ READING = c.JointReading(0, 0, 0, 0)
         (lambda: c.JointReading(0, 0, 0, 128), "power of 128: allowed are -128 to 127"),
         (lambda: c.Snapshot(1, 0, ((3, READING), (2, READING))), "joints 3, 2: each once, in ascending order"),
         (lambda: c.Snapshot(-1, 0, ((3, READING),)), "Snapshot: tick of -1: allowed are 0 to 4294967295"),
+        (lambda: c.Snapshot(1 << 32, 0, ((3, READING),)), "Snapshot: tick of 4294967296: allowed are 0 to 4294967295"),
+        (lambda: c.Snapshot(1, 256, ((3, READING),)), "Snapshot: status of 256: allowed are 0 to 255"),
+        (lambda: c.Stopped(-1, (1,) * 6), "Stopped: tick of -1: allowed are 0 to 4294967295"),
+        (lambda: c.Stopped(1 << 32, (1,) * 6), "Stopped: tick of 4294967296: allowed are 0 to 4294967295"),
         (lambda: c.Stopped(1, (1, 2, 3)), "Stopped: 3 postures, expected 6"),
         (lambda: c.Stopped(1, (1, 2, 3, 4, 5, 1000)), "posture of joint 6 of 1000: allowed are 0 to 999"),
     ],

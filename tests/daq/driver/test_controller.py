@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from daq.driver import Controller, GainsNotTakenError, NoSampleError, ProtocolVersionError
-from daq.link import LinkTimeoutError
+from daq.link import Link, LinkTimeoutError
 from daq.transport import TransportError
 from firmware_protocol.commands import (
     Capability,
@@ -22,10 +22,13 @@ from firmware_protocol.commands import (
     Request,
     Sample,
     SetGains,
+    SetPointsTaken,
     Snapshot,
     Status,
+    StatusFlag,
     Stop,
     Stopped,
+    WriteSetPoints,
 )
 from firmware_protocol.joints import JointReading
 from tests.daq.link.scripted import frame_of, scripted_link
@@ -48,6 +51,17 @@ def test_another_protocol_is_refused_with_both_versions() -> None:
     newer = HelloReply(3, Capability.SAMPLE, 20_000, 8, 1)
     with pytest.raises(ProtocolVersionError, match="speaks protocol 3, this software 2: update this software"):
         controller_that(lambda _: None, newer)
+
+
+def test_a_controller_that_cannot_be_spoken_to_is_not_kept_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+    def newer(sequence: int, _: Request) -> list[tuple[float, bytes]]:
+        return [(0.0, frame_of(sequence, HelloReply(3, Capability.SAMPLE, 20_000, 8, 1)))]
+
+    link, channel = scripted_link(newer)
+    monkeypatch.setattr(Link, "open", lambda _url: link)
+    with pytest.raises(ProtocolVersionError):
+        Controller.connect("script://")
+    assert channel.broken == "closed"
 
 
 def test_a_recorded_short_greeting_of_the_same_version_is_no_identity() -> None:
@@ -114,6 +128,12 @@ def test_a_stop_that_nobody_answers_is_told_and_not_raised() -> None:
     assert "no reply to Stop" in confirmation.problem
 
 
+def test_a_refused_stop_was_sent_and_is_not_confirmed() -> None:
+    confirmation = controller_that(lambda request: Refused(request.OPCODE, Refusal.UNKNOWN_OPCODE)).stop()
+    assert (confirmation.sent, confirmation.acknowledged) == (True, False)
+    assert "refused Stop" in str(confirmation.problem)
+
+
 def test_a_stop_over_an_ended_channel_was_not_sent() -> None:
     controller = controller_that(lambda _: None)
     controller.close()
@@ -132,3 +152,57 @@ def test_a_gap_in_the_ticks_is_counted_as_missing() -> None:
     snapshot = controller.next_snapshot(after=10)
     assert snapshot.missing_before == 4
     assert controller.counters.missing_samples == 4
+
+
+def snapshots_of(snapshot: Snapshot) -> Controller:
+    """A driver over a board that takes set points in tick 7, and always delivers the same period."""
+    taken, stopped = SetPointsTaken(7, 0), Stopped(7, (505,) * 6)
+    replies: dict[type[Request], Reply] = {WriteSetPoints: taken, Sample: snapshot, Stop: stopped}
+    return controller_that(lambda request: replies.get(type(request)))
+
+
+def test_a_period_without_set_points_by_the_board_s_own_flag_is_told_though_none_were_sent() -> None:
+    flagged = Snapshot(8, StatusFlag.SET_POINT_MISSED, ((1, JointReading(500, 2048, 0, 0)),))
+    controller = snapshots_of(flagged)
+    assert controller.next_snapshot().set_points_missed
+    assert controller.counters.missed_set_points == 1
+
+
+def test_a_period_that_shows_older_set_points_than_sent_is_told_without_a_flag() -> None:
+    controller = snapshots_of(Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
+    assert not controller.next_snapshot().set_points_missed
+    controller.set_points({1: 510})
+    assert controller.next_snapshot().set_points_missed
+    assert controller.counters.missed_set_points == 1
+
+
+def test_set_points_of_before_a_new_greeting_are_not_missed_after_it() -> None:
+    controller = snapshots_of(Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
+    controller.set_points({1: 510})
+    controller.hello()
+    assert not controller.next_snapshot().set_points_missed
+
+
+def test_after_a_stop_the_period_after_it_must_show_the_frozen_set_points() -> None:
+    assert not snapshots_of(Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))).next_snapshot().set_points_missed
+    controller = snapshots_of(Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
+    controller.set_points({1: 500})
+    assert controller.stop().frozen == dict.fromkeys(range(1, 7), 505)
+    assert controller.next_snapshot().set_points_missed
+
+
+def test_only_a_greeting_after_a_reset_of_the_board_says_that_it_has_restarted() -> None:
+    boots = iter([3, 3, 4])
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, Hello)
+        return [(0.0, frame_of(sequence, HelloReply(2, Capability.SAMPLE, 20_000, 8, next(boots), request.nonce, 7)))]
+
+    link, _ = scripted_link(answer)
+    controller = Controller(link)
+    assert [controller.identity.restarted, controller.hello().restarted, controller.hello().restarted] == [
+        False,
+        False,
+        True,
+    ]
+    assert controller.counters.restarts == 1

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq.driver.double_read import DoubleReader, Span, spans
+from daq.driver.double_read import MOST_READINGS, DoubleReader, Span, spans
 from daq.link import Link
+from firmware_protocol.commands import Block, ReadBlock, Request
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
 from tests.daq.driver.memory_board import PERIOD_S, MemoryBoard
-from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, frame_of
 
 
 class ChannelClock:
@@ -94,6 +97,36 @@ def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
     assert [(reading.position, reading.error, reading.power) for _, reading in joints] == counting(2)
     assert link.counters.torn == 1
     assert reader.disturbed
+
+
+def reader_of_bytes(values: Iterable[int]) -> tuple[DoubleReader, Link, ScriptedChannel]:
+    """A reader of a memory all of whose bytes have these values, one reading after the other."""
+    readings = iter(values)
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, ReadBlock)
+        return [(0.0001, frame_of(sequence, Block(bytes([next(readings)] * request.count))))]
+
+    channel = ScriptedChannel(answer)
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    return DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S), link, channel
+
+
+def test_readings_that_all_differ_deliver_nothing_however_many_there_are() -> None:
+    reader, link, channel = reader_of_bytes(range(1, 100))
+    assert reader.read((1, 2, 3)) is None
+    assert reader.disturbed
+    assert len(channel.asked) == MOST_READINGS
+    assert link.counters.torn == MOST_READINGS - 1
+
+
+def test_only_the_two_readings_that_agree_tell_whether_the_board_has_its_supply() -> None:
+    reader, _, _ = reader_of_bytes([5, 6, 0, 0])
+    assert reader.read((1, 2, 3)) is None
+    reader, _, _ = reader_of_bytes([5, 0, 7, 7])
+    joints = reader.read((1, 2, 3))
+    assert joints is not None
+    assert {reading.power for _, reading in joints} == {7}
 
 
 def test_a_mixture_that_two_changes_leave_alike_is_not_taken() -> None:

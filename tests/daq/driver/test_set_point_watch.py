@@ -50,6 +50,9 @@ def test_a_refused_batch_is_not_missed() -> None:
     watch.confirmed(watch.sending({1: 510}), due=5)
     watch.withdrawn(watch.sending({1: 600}))
     assert not watch.missed(6, shows(510))
+    assert watch.missed(6, shows(600)), "nobody sent it that counts"
+    watch.confirmed(watch.sending({2: 520}), due=7)
+    assert not watch.missed(7, shows(510, 520))
 
 
 def test_after_a_stop_the_frozen_set_points_are_the_right_ones() -> None:

@@ -74,6 +74,76 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
     assert bench.order == [Sample, Stop, Stop]
 
 
+def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
+    class SlowToConfirm(SampleWaitsForStop):
+        readers = most_readers = 0
+        confirmation: threading.Timer | None = None
+        _counting = threading.Lock()
+
+        def write(self, data: bytes) -> None:
+            for frame in self._decoder.feed(data):
+                if isinstance(parse_request(frame), Sample):
+                    self._sample = frame.sequence
+                    self.sample_waits.set()
+                elif self.confirmation is None:
+                    reply = frame_of(frame.sequence, STOPPED)
+                    self.confirmation = threading.Timer(0.05, self._replies.put, (reply,))
+                    self.confirmation.start()
+
+        def read(self, timeout_s: float) -> bytes:
+            with self._counting:
+                self.readers += 1
+                self.most_readers = max(self.most_readers, self.readers)
+            try:
+                return super().read(timeout_s)
+            finally:
+                with self._counting:
+                    self.readers -= 1
+
+    bench = SlowToConfirm()
+    link = Link(bench)
+    link.set_period(30.0)
+    sampler = threading.Thread(target=lambda: link.request(Sample(9, 1), Snapshot))
+    sampler.start()
+    assert bench.sample_waits.wait(5)
+    assert link.stop() == STOPPED
+    bench.answer_sample()
+    sampler.join(5)
+    assert bench.confirmation is not None
+    bench.confirmation.join(5)
+    assert bench.most_readers == 1
+
+
+def test_a_reply_that_another_thread_has_read_is_handed_on_at_once() -> None:
+    class TwoSamples(SampleWaitsForStop):
+        def __init__(self) -> None:
+            super().__init__()
+            self.sequences: SimpleQueue[int] = SimpleQueue()
+
+        def write(self, data: bytes) -> None:
+            for frame in self._decoder.feed(data):
+                self.sequences.put(frame.sequence)
+
+        def answer(self, sequence: int) -> None:
+            self._replies.put(frame_of(sequence, SNAPSHOT))
+
+    bench = TwoSamples()
+    link = Link(bench)
+    link.set_period(30.0)  # the patience of both
+    threads = [threading.Thread(target=link.request, args=(Sample(9, 1), Snapshot), daemon=True) for _ in range(2)]
+    numbers = []
+    for thread in threads:
+        thread.start()
+        numbers.append(bench.sequences.get(timeout=5))
+    reply = threading.Timer(0.05, bench.answer, (numbers[1],))
+    reply.start()
+    threads[1].join(3)
+    assert not threads[1].is_alive(), "woken by the reply and not by its own patience"
+    bench.answer(numbers[0])
+    threads[0].join(3)
+    reply.join(3)
+
+
 def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     class Echo(SampleWaitsForStop):
         def write(self, data: bytes) -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from daq.link import Link, LinkLostError, LinkState, LinkTimeoutError, RequestRefusedError
 from daq.link.counters import Tally
 from daq.link.pending import SEQUENCE_NUMBERS, PendingReplies
-from daq.link.timing import CLEAN_TRANSACTIONS, HELLO_RETRIES, RETRIES
+from daq.link.timing import HELLO_RETRIES, RETRIES
 from firmware_protocol.commands import (
     Block,
     ReadBlock,
@@ -56,10 +56,12 @@ def test_a_request_gets_its_reply_and_a_lost_reply_is_asked_for_under_the_same_n
     assert seen == [0, 0]
     assert (link.counters.requests, link.counters.retries, link.counters.timeouts) == (1, 1, 1)
     assert link.state is LinkState.DEGRADED
-    for _ in range(CLEAN_TRANSACTIONS):
+    for _ in range(99):
         link.request(ReadStatus(), Status)
+    assert link.state is LinkState.DEGRADED
+    link.request(ReadStatus(), Status)
     assert link.state is LinkState.CONNECTED
-    assert seen[2:] == list(range(1, CLEAN_TRANSACTIONS + 1))
+    assert seen[2:] == list(range(1, 101))
 
 
 def test_the_budget_of_one_transaction_ends_in_one_clear_line() -> None:
@@ -165,6 +167,39 @@ def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> Non
     assert link.request(ReadStatus(), Status) == STATUS
     assert second.asked[0][0] == 1, "numbers go on: an old reply is never taken for a new one"
     assert link.counters.reconnections == 1
+
+
+def test_connecting_again_ends_the_old_channel_even_one_that_still_works() -> None:
+    first = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
+    link.request(ReadStatus(), Status)
+    link.reconnect()
+    assert first.broken == "closed"
+    link.request(ReadStatus(), Status)
+    assert (len(first.asked), len(second.asked)) == (1, 1)
+
+
+class _EndsAtTheWrite(ScriptedChannel):
+    """A channel of which nobody knew before the write that it had ended."""
+
+    def write(self, data: bytes) -> None:
+        self.broken = self.broken or "cable pulled"
+        super().write(data)
+
+
+def test_a_reply_to_a_request_that_could_not_be_written_is_nobody_s() -> None:
+    def answers_an_older_request_too(sequence: int, _: Request) -> list[tuple[float, bytes]]:
+        return [(0.0, frame_of(sequence - 1, STATUS) + frame_of(sequence, STATUS))]
+
+    first = _EndsAtTheWrite(lambda _sequence, _request: [])
+    second = ScriptedChannel(answers_an_older_request_too)
+    link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
+    with pytest.raises(LinkLostError, match="cable pulled"):
+        link.request(ReadStatus(), Status)
+    link.reconnect()
+    assert link.request(ReadStatus(), Status) == STATUS
+    assert (link.counters.stale, link.counters.duplicates) == (1, 0)
 
 
 def test_half_a_reply_is_forgotten_with_the_channel_it_came_over() -> None:

@@ -58,6 +58,15 @@ def test_after_a_stop_no_step_of_a_run_is_taken(step: Event) -> None:
     assert not control.may_send
 
 
+def test_set_points_may_be_sent_while_a_run_goes_on_and_not_before_or_after_it() -> None:
+    control, _ = make()
+    seen = [control.may_send]
+    for event in (Event.ARM, Event.START, Event.FINISHED):
+        control.handle(event)
+        seen.append(control.may_send)
+    assert seen == [False, False, True, False]
+
+
 def test_only_a_reset_ends_a_halt() -> None:
     control, _ = make()
     control.stop("now")

@@ -83,6 +83,23 @@ def test_a_stop_by_another_host_is_noticed_on_the_board(arm: Rig) -> None:
     assert "has been stopped" in result.reason or "on the board" in result.reason
 
 
+def test_a_stop_by_another_host_is_noticed_while_set_points_wait(arm: Rig) -> None:
+    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=2")
+    arm.ears.at_event["pause"] = arm.controller.link.stop
+    result = arm.run(LONG_RAMP)
+    assert (result.outcome, result.reason.partition(" at tick ")[0]) == ("stopped", "on the board,")
+    assert "fault" not in arm.kinds
+
+
+def test_repeated_requests_are_told_once_each(tmp_path: Path) -> None:
+    long = ExperimentSpec(trajectory=Pause(duration=4), settle=0, hold=0)
+    with rig(tmp_path, "seed=5&fault=drop:rate=0.05") as arm:
+        result = arm.run(long)
+    told = [int(event.message.split()[0]) for event in read_trace(result.trace).events if event.kind == "retry"]
+    assert len(told) >= 3
+    assert 0 < sum(told) <= result.counters["retries"]
+
+
 def test_a_stop_on_the_way_to_the_start_leaves_a_frozen_arm_and_no_trace(arm: Rig, tmp_path: Path) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(200)}})
     arm.ears.at_event["note"] = arm.stop_as_the_guardian_does  # "slow move starts"
@@ -184,9 +201,13 @@ def test_an_arm_that_does_not_come_up_to_its_start_is_a_fault(arm: Rig, tmp_path
     """A way so short that the following error never comes to its limit of 127 counts, of which 40 may be left."""
     near = SHORT.model_copy(update={"start": {1: math.radians(185)}})
     arm.ask("fault_on", fault="stalled_joint:joint=1")
+    begun = arm.ask("state")["time_us"]
     with pytest.raises(RunFaultError, match=r"joint 1 is \d\d ADC counts away .*not come nearer.*nothing was rec"):
         arm.run(near)
-    assert arm.ask("state")["frozen"]
+    state = arm.ask("state")
+    assert state["frozen"]
+    way = math.radians(5) / 0.25
+    assert way + 1.0 < (state["time_us"] - begun) * 1e-6 < way + 1.6, "a second beyond the way itself"
     assert not list(tmp_path.iterdir())
 
 

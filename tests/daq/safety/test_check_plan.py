@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import JointLimits, Limits
 from daq.safety import check_move_to_start, check_plan, largest_step, unchecked
+from daq.safety.violation import TOLERANCE
 from daq.trajectories import make_plan, plan, plan_move, start_angles
+from daq.trajectories.kinematics import link_ends
 from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, plan_of
 
 
@@ -136,6 +138,28 @@ def test_an_arm_led_outside_its_limits_may_come_back_but_not_go_further() -> Non
     assert check_move_to_start(back, MA2000, tight) == []
     away = plan_move(MA2000, REST.tolist(), further)
     assert [v.rule for v in check_move_to_start(away, MA2000, tight)] == ["range"]
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_an_arm_outside_its_limits_cannot_creep_further_out_by_roundings(side: int) -> None:
+    own = limits(joints=(JointLimits(low=REST[0] - 0.1, high=REST[0] + 0.1, speed=2.0),))
+    here = REST[0] + side * 0.2
+    slack = 1.5 * math.pi / 1000 / 2
+    assert check_move_to_start(plan_of(1, here, here), MA2000, own) == []
+    assert check_move_to_start(plan_of(1, here, here - side * slack), MA2000, own) == []
+    further = check_move_to_start(plan_of(1, here, here + side * 0.5 * slack), MA2000, own)
+    assert [violation.rule for violation in further] == ["range"]
+
+
+def test_a_link_that_is_exactly_the_tolerance_beyond_floor_or_reach_is_allowed() -> None:
+    still = plan_of(2, REST[1], REST[1])
+    ends = link_ends(MA2000, still.angles)
+    lowest, furthest = float(ends[:, :, 2].min()), float(np.linalg.norm(ends, axis=2).max())
+    floor, reach = lowest + TOLERANCE, furthest - TOLERANCE
+    assert (floor - TOLERANCE, reach + TOLERANCE) == (lowest, furthest), "no rounding comes between"
+    assert check_plan(still, MA2000, Limits(floor_height=floor, reach=reach)) == []
+    tighter = Limits(floor_height=floor + 1e-12, reach=reach - 1e-12)
+    assert [violation.rule for violation in check_plan(still, MA2000, tighter)] == ["floor", "reach"]
 
 
 def test_an_arm_below_the_floor_may_come_back_but_not_go_deeper() -> None:

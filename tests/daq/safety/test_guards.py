@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
-from daq.safety import RestGuards, RunningGuards
+from daq.safety import RestGuards, RunningGuards, Verdict
+from daq.safety.findings import Finding
 from daq.trajectories import plan, start_angles
 from firmware_protocol.commands import StatusFlag
 from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, row
@@ -48,6 +49,7 @@ def test_a_pause_that_lasts_is_a_fault() -> None:
     guards = running()
     verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
     assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
+    assert all(verdict.hold for verdict in verdicts)
     (trip,) = verdicts[-1].trips
     assert trip.startswith("joint 3: positional error of 130 ADC counts, set points pause outside ±127; ")
     assert trip.endswith("it lasted 0.52 s, allowed are 0.5 s")
@@ -175,6 +177,22 @@ def test_a_joint_led_by_hand_may_move() -> None:
     guards = RestGuards(MA2000, LIMITS, (1, 2, 3), led=(1,))
     guards.check(row(0))
     assert not guards.check(row(1, position=(500, 0, 0))).trips
+
+
+def test_what_several_guards_find_in_one_period_is_all_told() -> None:
+    verdict = running(moving=(1, 2)).check(row(0, error=(130, 0, 50), status=5), {}, expected={1: 600})
+    assert verdict.hold
+    assert verdict.stop == "on the board, at tick 0"
+    assert [finding.kind for finding in verdict.findings] == ["pause", "missed_set_point"]
+    assert [trip.partition(",")[0] for trip in verdict.trips] == ["joint 3: unexpected motion"]
+
+
+def test_one_verdict_takes_nothing_from_another() -> None:
+    one = Verdict(hold=True, stop="first", trips=("a",), findings=(Finding("note", "x"),))
+    other = Verdict(stop="second", trips=("b",), findings=(Finding("note", "y"),))
+    assert one | other == Verdict(True, "first", ("a", "b"), (Finding("note", "x"), Finding("note", "y")))
+    assert other | one == Verdict(True, "second", ("b", "a"), (Finding("note", "y"), Finding("note", "x")))
+    assert (one | Verdict(), Verdict() | one) == (one, one)
 
 
 def test_missed_set_points_are_counted_and_a_run_of_them_is_a_fault() -> None:

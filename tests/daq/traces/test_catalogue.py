@@ -1,15 +1,20 @@
 """Lists of traces, and finding one of them by what a person types."""
 
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 import pytest
+from mcap.writer import IndexType, Writer
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Sine
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
 from daq.traces.catalogue import find_trace, list_traces
+from daq.traces.ends import indexed_metadata
 from daq.traces.naming import trace_path
 from daq.traces.salvage import salvage_folder
+from daq.traces.scan import UNREADABLE
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import CREATED, JOINTS, record, row, write
 
@@ -54,6 +59,26 @@ def test_a_list_changes_with_what_happens_to_a_trace(tmp_path: Path) -> None:
     assert [summary.state for summary in list_traces(tmp_path)] == ["unfinished"]
     salvage_folder(tmp_path)
     assert [(summary.state, summary.outcome) for summary in list_traces(tmp_path)] == [("finished", "interrupted")]
+
+
+def test_a_trace_without_its_index_is_listed_only_while_it_is_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "a.mcap", 30)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) - 20])
+    (cut,) = list_traces(tmp_path)
+    assert (cut.state, cut.trace_id) == ("unreadable", None)
+    assert cut.problem.startswith(f"{path}: is damaged after byte ")
+    path.unlink()
+    kept = ("repeat_channels", "repeat_schemas", "use_statistics", "use_summary_offsets")
+    without = partial(Writer, index_types=IndexType.NONE, **dict.fromkeys(kept, False))
+    monkeypatch.setattr("daq.traces.recording.Writer", without)
+    write(path, 30)
+    with path.open("rb") as stream, pytest.raises(UNREADABLE):
+        indexed_metadata(stream, DEFAULT_TRACE_LIMITS)
+    (whole,) = list_traces(tmp_path)
+    assert (whole.state, whole.outcome, whole.samples) == ("finished", "complete", 30)
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.trace import Trace, TraceEvent
-from daq.traces.plot import figure_of, plot_trace
+from daq.traces.plot import ALARM, JOINT_COLOURS, QUIET, figure_of, plot_trace
 from daq.traces.reader import read_trace
 from daq.traces.writer import TraceWriter
-from tests.daq.traces.samples import JOINTS, record, row
+from tests.daq.traces.samples import JOINTS, record, row, write
 
 
 @pytest.fixture
@@ -42,6 +44,7 @@ def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace)
     assert [axis.get_ylabel() for axis in axes if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"]
     assert [axis.get_title("left") for axis in axes[:3]] == ["joint 1, waist", "joint 2, shoulder", "joint 3, elbow"]
     measured = next(line for line in axes[1].lines if line.get_label() == "position")
+    assert measured.get_color() == JOINT_COLOURS[1]
     values = np.asarray(measured.get_ydata(), dtype=float)
     np.testing.assert_allclose(values[np.isfinite(values)], np.degrees(trace.position[:, 1]))
     assert np.isnan(values).sum() == 1
@@ -57,6 +60,69 @@ def test_only_the_joints_that_the_experiment_moves_are_drawn_unless_others_are_a
     assert drawn((2,)) == ["joint 2, shoulder"]
     with pytest.raises(TraceError, match="joint 5 is not in it"):
         drawn((5,))
+
+
+def lines_at(axes: Axes, time: float) -> list[str]:
+    """Colours of the vertical lines at a moment."""
+    return [str(line.get_color()) for line in axes.lines if list(np.asarray(line.get_xdata())) == [time, time]]
+
+
+def test_events_are_marked_in_the_panels_of_their_joint_and_alarms_in_another_colour(trace: Trace) -> None:
+    marked = dataclasses.replace(
+        trace,
+        events=(
+            TraceEvent(time=0.2, kind="note", message="not marked"),
+            TraceEvent(time=0.4, kind="ramp_start", message="ramp starts", joint=2),
+            TraceEvent(time=0.45, kind="pause", message="too near to be labelled"),
+            TraceEvent(time=0.9, kind="stop", message="by the operator"),
+        ),
+    )
+    first, second = figure_of(moving(marked, 1, 2)).axes[:2]
+    assert [lines_at(first, time) for time in (0.2, 0.4, 0.45, 0.9)] == [[], [], [QUIET], [ALARM]]
+    assert [lines_at(second, time) for time in (0.2, 0.4, 0.45, 0.9)] == [[], [QUIET], [QUIET], [ALARM]]
+    assert [text.get_text() for text in first.texts] == ["stop", "pause"]
+    assert [text.get_text() for text in second.texts] == ["stop", "ramp starts"]
+
+
+def test_missing_samples_are_shaded_and_explained(trace: Trace, tmp_path: Path) -> None:
+    axes = figure_of(trace).axes[0]
+    (gap,) = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
+    assert (gap.get_x(), gap.get_x() + gap.get_width()) == pytest.approx((29 * 0.02, 33 * 0.02))
+
+    def explained(axes: Axes) -> list[str]:
+        legend = axes.get_legend()
+        return [] if legend is None else [text.get_text() for text in legend.get_texts()]
+
+    assert explained(axes) == ["set point", "position", "samples missing"]
+    whole = read_trace(write(tmp_path / "whole.mcap", 20))
+    assert explained(figure_of(whole, (1,)).axes[0]) == ["set point", "position"]
+
+
+def test_panels_of_one_signal_span_as_much_so_that_joints_can_be_compared(trace: Trace) -> None:
+    axes = figure_of(trace).axes
+    position, error = [axis.get_ylim() for axis in axes[:3]], [axis.get_ylim() for axis in axes[3:6]]
+    assert [high - low for low, high in position] == pytest.approx([position[0][1] - position[0][0]] * 3)
+    assert trace.set_point is not None
+    for column, (low, high) in enumerate(position):
+        both = np.degrees(np.concatenate([trace.position[:, column], trace.set_point[:, column]]))
+        assert low < both.min() < both.max() < high
+        assert (low + high) / 2 == pytest.approx((both.min() + both.max()) / 2)
+    assert len(set(error)) == 1, "about zero, the same for all"
+    assert error[0][0] < 0.0
+    assert error[0][1] > np.degrees(0.03)
+
+
+def test_more_joints_than_fit_abreast_go_into_another_band(tmp_path: Path) -> None:
+    with TraceWriter(tmp_path / "a.mcap", record(), (1, 2, 3, 4)) as writer:
+        for tick in range(20):
+            writer.sample(row(tick, 4))
+        four = read_trace(writer.close("complete"))
+    shown = [axis for axis in figure_of(four, (1, 2, 3, 4)).axes if axis.get_visible()]
+    assert [axis.get_title("left")[:7] for axis in shown if axis.get_title("left")] == [
+        f"joint {j}" for j in range(1, 5)
+    ]
+    assert len(shown) == 4 * 3
+    assert [axis.get_ylabel() for axis in shown if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"] * 2
 
 
 def test_the_same_trace_gives_the_same_picture(small: Trace, tmp_path: Path) -> None:

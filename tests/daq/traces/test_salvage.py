@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
@@ -213,3 +214,20 @@ def test_a_part_file_that_another_program_wrote_into_is_kept(tmp_path: Path, mor
     assert salvaged.kept == tmp_path / "a.mcap.part.damaged"
     assert salvaged.kept.read_bytes() == data + more
     assert read_trace(salvaged.path).record.outcome == "interrupted"
+
+
+def test_a_part_file_that_another_process_has_just_finished_is_left_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "a.mcap")
+    part = path.rename(tmp_path / "a.mcap.part")
+    lock = disk.try_lock
+
+    def finished_meanwhile(stream: IO[bytes]) -> bool:
+        part.rename(path)
+        return lock(stream)
+
+    monkeypatch.setattr(disk, "try_lock", finished_meanwhile)
+    with pytest.raises(TraceError, match="was salvaged or finished by another process"):
+        salvage(part)
+    assert list(tmp_path.iterdir()) == [path]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.traces.csv_table import import_csv
+from daq.traces.csv_table import INTEGRATED, import_csv
 from daq.traces.summary import joint_figures
 
 
@@ -20,3 +20,14 @@ def test_a_record_of_forces_without_a_machine_is_of_a_sliding_joint(
     (figures,) = joint_figures(import_csv(path))
     assert figures.unit == shown
     assert figures.end == pytest.approx(end, rel=1e-4)
+
+
+def test_a_record_of_speeds_alone_is_integrated_by_the_trapezoidal_rule_and_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "axis.csv"
+    path.write_text("time,velocity_1,velocity_4\n1,0,1\n2,2,1\n4,4,-3\n")
+    found = import_csv(path)
+    assert found.joints == (1, 4)
+    assert found.position.tolist() == [[0, 0], [1, 1], [7, -1]]
+    assert found.velocity is not None
+    assert found.velocity.tolist() == [[0, 1], [2, 1], [4, -3]]
+    assert INTEGRATED in found.record.notes

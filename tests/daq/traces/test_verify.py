@@ -46,6 +46,7 @@ def test_a_good_trace_has_no_findings_but_notes(tmp_path: Path) -> None:
     ("made", "expected", "words"),
     [
         ({"ticks": [0, 1, 4, 5, 9]}, ("warning", "gaps"), "5 samples are missing in 2 gaps, the first after 0.020 s"),
+        ({"ticks": [0, 2, 6]}, ("warning", "gaps"), "4 samples are missing in 2 gaps, the first after 0.000 s"),
         (
             {"ticks": [0, 1, 4], "counters": {"missing_samples": 1}},
             ("error", "counters"),
@@ -74,6 +75,12 @@ def test_an_error_of_one_rounding_is_no_finding_and_of_two_counts_is(tmp_path: P
     assert findings(recorded(tmp_path / "a.mcap", [0, 1], error=near)) == {}
     far = (good[0] + 2 * count, *good[1:])
     assert "worst 2.0 counts at 0.020 s" in findings(recorded(tmp_path / "b.mcap", [0, 1], error=far))["error", "error"]
+
+
+def test_time_that_is_a_hundredth_of_a_period_off_its_tick_is_no_finding_and_a_little_more_is(tmp_path: Path) -> None:
+    assert findings(recorded(tmp_path / "a.mcap", [0, 1, 2], time=0.04 + 0.009 * 0.02)) == {}
+    found = findings(recorded(tmp_path / "b.mcap", [0, 1, 2], time=0.04 + 0.011 * 0.02))
+    assert found["error", "time"].startswith("time is 0.011 periods off the tick at sample 2")
 
 
 def test_an_event_beyond_the_record_is_noted(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """What is recorded is what is read, here and with the official reader."""
 
+import io
 import json
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,11 @@ from mcap.reader import make_reader
 
 from daq.contracts.errors import TraceError
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Trace, TraceEvent
+from daq.contracts.trace import EventKind, Trace, TraceEvent
 from daq.traces import layout
 from daq.traces.naming import new_trace_id, part_path, trace_path
 from daq.traces.reader import read_trace
+from daq.traces.recording import Recording
 from daq.traces.store import write_trace
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import CREATED, JOINTS, PERIOD, record, row, write
@@ -174,7 +176,9 @@ def test_a_name_tells_moment_and_kind_and_is_never_used_twice(tmp_path: Path) ->
     with pytest.raises(TraceError, match="exists already"):
         write_trace(read_trace(path), path)
     assert path.read_bytes() == before
-    assert len({new_trace_id() for _ in range(100)}) == 100
+    numbers = {new_trace_id() for _ in range(100)}
+    assert len(numbers) == 100
+    assert all(len(number) == 12 and set(number) <= set("0123456789abcdef") for number in numbers)
 
 
 def test_two_writers_of_one_name_do_not_meet(tmp_path: Path) -> None:
@@ -227,3 +231,42 @@ def test_a_record_needs_a_time_zone_and_leaves_no_file_without_one(tmp_path: Pat
     with pytest.raises(TraceError, match="no time zone"):
         TraceWriter(tmp_path / "a.mcap", record(created=datetime(2026, 1, 1)), JOINTS)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "level"), [("start", 2), ("note", 2), ("pause", 3), ("stop", 3), ("fault", 4), ("link_lost", 4)]
+)
+def test_other_tools_see_how_bad_an_event_is(kind: EventKind, level: int) -> None:
+    """Levels of foxglove.Log: 2 information, 3 warning, 4 error."""
+    message = layout.event_message(
+        TraceEvent(time=1.5, kind=kind, message="why", tick=75, joint=2), 1_000_000_001_500_000_000
+    )
+    assert json.loads(message) == {
+        "timestamp": {"sec": 1_000_000_001, "nsec": 500_000_000},
+        "level": level,
+        "name": kind,
+        "file": "",
+        "line": 0,
+        "time": 1.5,
+        "message": "why",
+        "tick": 75,
+        "joint": 2,
+    }
+
+
+def test_a_moment_that_no_stamp_can_hold_is_refused() -> None:
+    first = Recording(io.BytesIO(), record(created=datetime(1970, 1, 1, tzinfo=UTC)), JOINTS, ("position",), {})
+    first.row(row(0, time=0.0))
+    with pytest.raises(TraceError, match="is before 1970 or after 2554"):
+        first.event(TraceEvent(time=-1e-9, kind="note", message=""))
+    last = Recording(io.BytesIO(), record(created=datetime(2261, 1, 1, tzinfo=UTC)), JOINTS, ("position",), {})
+    with pytest.raises(TraceError, match="is before 1970 or after 2554"):
+        last.event(TraceEvent(time=1e10, kind="note", message=""))
+
+
+def test_after_the_end_every_sample_counts_as_synced(tmp_path: Path) -> None:
+    with TraceWriter(tmp_path / "a.mcap", record(), JOINTS, patience=10) as writer:
+        for tick in range(7):
+            writer.sample(row(tick))
+        writer.close("complete")
+    assert writer.synced_samples == 7

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from model.fitting.covariance import inverse, sandwich
+from model.fitting.covariance import inverse, sandwich, score_covariance
 
 
 def estimates(bandwidth: int, repeats: int = 300) -> tuple[float, float]:
@@ -62,3 +63,25 @@ def test_what_the_data_say_nothing_of_is_wide_and_never_of_negative_variance() -
 def test_the_inverse_is_the_inverse_where_there_is_one() -> None:
     matrix = np.diag([1e12, 1.0, 1e-9]) + 1e-11
     np.testing.assert_allclose(inverse(matrix) @ matrix, np.eye(3), atol=1e-9)
+
+
+def test_scores_of_neighbours_count_less_the_further_they_are_apart_and_never_across_runs() -> None:
+    one, other = np.array([[1.0], [2.0], [4.0], [8.0]]), np.array([[3.0], [5.0]])
+    squares = 1 + 4 + 16 + 64 + 9 + 25
+    next_to, two_apart = 2 + 8 + 32 + 15, 4 + 16
+    found = score_covariance([one, other], bandwidth=2)
+    assert found[0, 0] == pytest.approx(squares + 2 * (2 / 3 * next_to + 1 / 3 * two_apart))
+    assert score_covariance([one, other], bandwidth=0)[0, 0] == squares
+
+
+def test_the_covariance_of_scores_is_symmetric() -> None:
+    scores = np.random.default_rng(4).normal(size=(30, 3))
+    found = score_covariance([scores], bandwidth=4)
+    np.testing.assert_array_equal(found, found.T)
+    by_hand = sum(
+        (1 - abs(lag) / 5) * np.outer(scores[k], scores[k + lag])
+        for lag in range(-4, 5)
+        for k in range(30)
+        if 0 <= k + lag < 30
+    )
+    np.testing.assert_allclose(found, by_hand)

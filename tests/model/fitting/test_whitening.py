@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from model.fitting.whitening import autocovariance, fitted_whitener, white
+from model.fitting.whitening import Whitener, autocovariance, fitted_whitener, white
 
 
 def autoregressive(seed: int, count: int, weights: tuple[float, ...], deviation: float) -> NDArray[np.float64]:
@@ -60,3 +60,25 @@ def test_coloured_undoes_whitened_and_makes_noise_of_the_fitted_size() -> None:
     made = whitener.coloured(np.random.default_rng(5).normal(size=20_000))
     np.testing.assert_allclose(whitener.coloured(whitener.whitened(made)[4:])[200:], made[204:], rtol=1e-6, atol=1e-6)
     assert made.std() == pytest.approx(autoregressive(4, 20_000, (0.9, -0.5), 2.0).std(), rel=0.05)
+
+
+def test_each_sample_is_less_what_those_before_it_predict_in_units_of_the_prediction_s_error() -> None:
+    whitener = Whitener((np.zeros(0), np.array([0.5]), np.array([0.6, -0.2])), np.array([4.0, 2.0, 1.0]))
+    found = whitener.whitened(np.array([8.0, 3.0, 1.0, 2.0]))
+    np.testing.assert_allclose(found, [8 / 4, (3 - 4) / 2, 1 - 0.6 * 3 + 0.2 * 8, 2 - 0.6 * 1 + 0.2 * 3])
+    np.testing.assert_allclose(whitener.whitened(np.array([8.0, 3.0])), [2.0, -0.5])
+    assert whitener.order == 2
+
+
+def test_coloured_noise_follows_its_own_past() -> None:
+    whitener = Whitener((np.zeros(0), np.array([0.5]), np.array([0.6, -0.2])), np.array([4.0, 2.0, 3.0]))
+    found = whitener.coloured(np.array([1.0, 0.0, 0.0, 0.0]))
+    np.testing.assert_allclose(found, [3.0, 1.8, 0.6 * 1.8 - 0.2 * 3, 0.6 * 0.48 - 0.2 * 1.8])
+
+
+def test_few_samples_are_not_asked_for_a_long_memory() -> None:
+    def orders(count: int) -> int:
+        return fitted_whitener([autoregressive(7, count, (0.9, -0.5), 1.0)], 8, floor=1e-6).order
+
+    assert (orders(19), orders(39)) == (0, 1)
+    assert orders(4000) >= 2

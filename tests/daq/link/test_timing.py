@@ -1,0 +1,36 @@
+"""How long a reply may take, and how often a request is repeated: the numbers themselves."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.link.timing import LinkTiming, copies_of, reply_opcode
+from firmware_protocol.commands import Hello, ReadStatus, Request, Sample, Status, Stop, Stopped
+
+LINE = LinkTiming(bytes_per_second=11520.0, period_s=0.03)
+FULL_FRAMES = 2 * 57
+
+
+@pytest.mark.parametrize(
+    ("request_", "beyond_the_line"), [(ReadStatus(), 0.025), (Stop(), 0.010), (Sample(7, 1), 0.025 + 0.03)]
+)
+def test_a_reply_may_take_its_time_on_the_line_and_a_margin_and_a_sample_a_period_more(
+    request_: Request, beyond_the_line: float
+) -> None:
+    assert LINE.reply_timeout_s(request_, 100) == pytest.approx((100 + FULL_FRAMES) / 11520 + beyond_the_line)
+    assert LinkTiming(float("inf"), 0.03).reply_timeout_s(request_, 100) == pytest.approx(beyond_the_line)
+
+
+def test_a_greeting_and_a_stop_are_repeated_more_often_than_anything_else() -> None:
+    assert [LINE.retries_of(request) for request in (ReadStatus(), Hello(2, 1), Stop())] == [8, 40, 50]
+    patient = LinkTiming(11520.0, retries=60)
+    assert [patient.retries_of(request) for request in (ReadStatus(), Hello(2, 1), Stop())] == [60, 60, 50]
+    assert LinkTiming(11520.0).period_s == 0.020
+
+
+def test_only_a_stop_is_written_twice_at_once() -> None:
+    assert (copies_of(Stop()), copies_of(ReadStatus())) == (2, 1)
+
+
+def test_a_request_is_answered_by_its_own_kind_of_reply() -> None:
+    assert (reply_opcode(Stop()), reply_opcode(ReadStatus())) == (Stopped.OPCODE, Status.OPCODE)

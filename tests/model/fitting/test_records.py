@@ -1,0 +1,102 @@
+"""Traces as a fit reads them: where it begins to compare, where it is cut, and how noisy a reading is."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Trace, TraceRecord
+from model.fitting.records import noise_floor, records_of, sensor_deviation
+from tests.model.fitting.imagined import PERIOD, STARTS, arm, machine
+
+COUNT = 1.5 * np.pi / 4096
+
+
+def record_of(ticks: list[int], rise: float = 0.3, still: int = 30, drive: float = 1.0) -> Trace:
+    """A trace in which set points and positions stand still for some ticks, and then rise together."""
+    tick = np.array(ticks)
+    motion = np.clip((tick - still) / 100.0, 0.0, None) * rise
+    points = np.tile(STARTS[0], (len(tick), 1)) + motion[:, None]
+    wave = drive * np.stack([np.sin(tick), np.cos(tick), tick % 5], axis=1)
+    record = TraceRecord(
+        trace_id="made",
+        created=datetime(2026, 1, 1, tzinfo=UTC),
+        software="test",
+        source="imported",
+        period=PERIOD,
+        gains=dict.fromkeys((1, 2, 3), (2, 0, 0)),
+    )
+    return Trace(
+        record, (1, 2, 3), PERIOD * tick, points.copy(), set_point=points, error=0 * points, drive=wave, tick=tick
+    )
+
+
+def test_the_first_settling_is_simulated_and_not_compared_unless_the_trace_is_short() -> None:
+    (long,) = records_of([record_of(list(range(200)))], machine(), "position")
+    assert long.runs == (slice(20, 200),)
+    assert long.samples == 180
+    (just,) = records_of([record_of(list(range(80)))], machine(), "position")
+    assert just.runs == (slice(20, 80),)
+    (short,) = records_of([record_of(list(range(79)))], machine(), "position")
+    assert short.runs == (slice(0, 79),)
+
+
+def test_a_record_is_cut_where_samples_are_missing() -> None:
+    ticks = [*range(100), *range(103, 200)]
+    (found,) = records_of([record_of(ticks)], machine(), "position")
+    assert found.runs == (slice(20, 100), slice(100, 197))
+    assert found.samples == 177
+
+
+def test_the_drive_before_the_record_is_the_mean_over_its_initial_rest() -> None:
+    whole = record_of(list(range(200)))
+    assert whole.drive is not None
+    (found,) = records_of([whole], machine(), "position")
+    np.testing.assert_allclose(found.inputs.first_drive, whole.drive[:20].mean(axis=0))
+    early = record_of(list(range(200)), still=7)
+    assert early.drive is not None
+    (found,) = records_of([early], machine(), "position")
+    np.testing.assert_allclose(found.inputs.first_drive, early.drive[:8].mean(axis=0))
+
+
+@pytest.mark.parametrize(("counts", "moves"), [(3.9, False), (4.1, True)])
+def test_motion_of_less_than_four_counts_is_none(counts: float, moves: bool) -> None:
+    given = [record_of(list(range(131)), rise=counts * COUNT)]
+    if moves:
+        assert len(records_of(given, machine(), "position")) == 1
+    else:
+        with pytest.raises(TraceError, match="no joint of made moves by 4 counts"):
+            records_of(given, machine(), "position")
+
+
+def test_ten_samples_are_enough() -> None:
+    assert records_of([record_of(list(range(10)), still=0)], machine(), "position")[0].samples == 10
+    with pytest.raises(TraceError, match="trace made: 9 samples; a fit needs at least 10"):
+        records_of([record_of(list(range(9)), still=0)], machine(), "position")
+
+
+def test_velocity_that_was_not_recorded_cannot_be_fitted() -> None:
+    with pytest.raises(TraceError, match="has no velocity"):
+        records_of([record_of(list(range(100)))], machine(), "velocity")
+
+
+def test_a_reading_is_as_noisy_as_rounding_and_sensor_make_it() -> None:
+    records = records_of([record_of(list(range(200)))], machine(), "position")
+    sensor = machine().joint(1).sensor
+    assert sensor is not None
+    noise = 0.0 if sensor.noise is None else sensor.noise.value
+    assert sensor_deviation(sensor) == pytest.approx(np.sqrt(1 / 12 + noise**2) * COUNT)
+    assert noise_floor(records, machine(), "position")[0] == pytest.approx(sensor_deviation(sensor))
+
+
+def test_the_noise_of_a_signal_without_a_sensor_is_estimated_from_the_signal() -> None:
+    (record,) = records_of([record_of(list(range(1000)))], machine(), "position")
+    noisy = record.measured + 0.01 * np.random.default_rng(2).normal(size=record.measured.shape)
+    found = noise_floor([type(record)(record.inputs, noisy, record.runs, "made")], arm().machine, "velocity")
+    np.testing.assert_allclose(found, [0.01] * 3, rtol=0.1)
+    straight = np.ones_like(noisy) * [2.0, 0.0, -3.0]
+    found = noise_floor([type(record)(record.inputs, straight, record.runs, "made")], arm().machine, "velocity")
+    np.testing.assert_allclose(found, [2e-6, 1e-12, 3e-6])

@@ -1,0 +1,123 @@
+"""The experiment that runs: its progress, who cancels it, and what is left when it ends."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.contracts.service.experiments import ExperimentRequest
+from server.owner.messages import Answer, HaltRun
+from server.problems import ProblemError
+from server.queue.attendance import ATTENDANCE
+from tests.server.queue.bench import REAL, SPEC, Bench, done
+
+STOPPED = Answer(number=1, problem="the arm has been stopped", exit_code=6)
+LOOK = "look at the arm, then resume the queue"
+
+
+def _running(bench: Bench) -> str:
+    """Begins an experiment that runs until the test answers for the arm."""
+    bench.answer = None
+    made = bench.submit()
+    bench.queue.start()
+    bench.moves.wait()
+    return made.id
+
+
+def test_only_the_one_that_runs_has_its_progress(bench: Bench) -> None:
+    identity = _running(bench)
+    waiting = bench.submit()
+    bench.queue.progressed(0.25, "moving")
+    shown = bench.queue.with_progress(bench.experiments.get("ma2000", identity))
+    assert (shown.progress, shown.progress_text) == (0.25, "moving")
+    assert bench.queue.with_progress(waiting) == waiting
+    status = bench.queue.status()
+    assert (status.running, status.queued, status.waiting_for, status.paused) == (identity, 1, "", False)
+
+
+def test_progress_without_a_run_is_nobody_s(bench: Bench) -> None:
+    bench.queue.progressed(0.25, "moving")
+    made = bench.submit()
+    assert bench.queue.with_progress(made) == made
+    assert bench.queue.running is None
+
+
+def test_cancelling_the_one_that_runs_stops_the_arm_and_is_its_reason(bench: Bench) -> None:
+    identity = _running(bench)
+    bench.queue.cancel(identity, "anna")
+    assert bench.orders == [HaltRun()]
+    bench.asked.set_result(STOPPED)
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", identity)
+    assert (ended.state, ended.reason) == ("cancelled", "cancelled by anna")
+    assert bench.queue.status().reason == f"pause was cancelled (cancelled by anna): {LOOK}"
+
+
+def test_cancelling_one_that_waits_stops_nothing(bench: Bench) -> None:
+    identity = _running(bench)
+    waiting = bench.submit()
+    assert bench.queue.cancel(waiting.id, "anna").state == "cancelled"
+    assert bench.orders == []
+    assert bench.experiments.get("ma2000", identity).state == "running"
+    with pytest.raises(ProblemError):
+        bench.queue.cancel(waiting.id, "anna")
+
+
+def test_one_that_is_cancelled_in_the_moment_it_would_begin_leaves_the_robot_free_for_the_next(bench: Bench) -> None:
+    made = bench.submit()
+    bench.experiments.before(
+        "begin", lambda: bench.experiments.cancel_waiting("ma2000", made.id, bench.clock.utc(), "anna")
+    )
+    bench.experiments.after("due", lambda: None, lambda: seen.append(bench.queue.running))
+    seen: list[object] = []
+    bench.queue.start()
+    while bench.experiments.get("ma2000", made.id).state != "cancelled":
+        pass
+    bench.answer = done()
+    following = bench.submit()
+    bench.until(lambda event: event == "experiment: completed")
+    assert seen == [None]
+    assert bench.experiments.get("ma2000", following.id).state == "done"
+    assert bench.experiments.get("ma2000", made.id).state == "cancelled"
+
+
+def test_a_run_that_the_end_of_the_service_stops_was_lost(bench: Bench) -> None:
+    identity = _running(bench)
+    bench.queue.begin_no_more()
+    bench.asked.set_result(STOPPED)
+    bench.queue.close(10)
+    ended = bench.experiments.get("ma2000", identity)
+    assert (ended.state, ended.reason) == ("interrupted", "the service was shut down while this ran")
+
+
+def test_a_stop_by_somebody_else_keeps_its_own_reason(bench: Bench) -> None:
+    identity = _running(bench)
+    bench.asked.set_result(STOPPED)
+    bench.until(lambda event: event.startswith("queue: paused"))
+    assert bench.experiments.get("ma2000", identity).reason == "the arm has been stopped"
+    assert bench.orders == []
+
+
+def test_a_run_that_ends_well_lets_the_next_begin(bench: Bench) -> None:
+    bench.answer = done()
+    one, other = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda _: bench.events.count("experiment: completed") == 2)
+    assert [bench.experiments.get("ma2000", each.id).state for each in (one, other)] == ["done", "done"]
+    assert not bench.queue.status().paused
+    assert bench.looked_for_traces == 0
+
+
+def test_an_operator_who_leaves_is_missed_though_nothing_waits_and_nobody_comes_back(bench: Bench) -> None:
+    bench.robot.identity = REAL
+    bench.queue.resume("anna", moves_real_arm=True)
+    bench.clock.turn(ATTENDANCE)
+    bench.queue.start()
+    bench.until(lambda event: event == f"queue: paused: no operator confirms presence any more: {LOOK}")
+
+
+def test_the_same_request_under_the_same_key_is_queued_once(bench: Bench) -> None:
+    request = ExperimentRequest(spec=SPEC)
+    one, new = bench.queue.submit(request, "anna", "key")
+    again, anew = bench.queue.submit(request, "anna", "key")
+    assert (new, anew, again.id) == (True, False, one.id)
+    assert bench.events == ["experiment: queued"]
