@@ -19,6 +19,7 @@ from model.discrepancy.candidates.library import TONES, Hypothesis, tone
 from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
 from model.discrepancy.output_error.search import Point
+from model.discrepancy.output_error.thinning import LEAST_PERIOD
 from model.fitting.records import Record, resolution
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
@@ -36,9 +37,6 @@ HIGHEST = 8.0
 SHORTEST_WAVE = 4096 / 75
 """Shortest wave that is tried, in counts of the sensor: an assumption. On 12 bits over 270° it is a hundredth of a
 joint turn, which the fastest ramp of the presets, 20 counts a period, still samples more than twice."""
-LEAST_PERIOD = 0.005
-"""Time between samples, s, at which fast records are compared with tones: means over so long show every tone that is
-tried, and a spectrum of all samples takes a hundred times as long."""
 BLOCK = 4_000_000
 """Samples of tones in memory at a time: 64 MB."""
 
@@ -112,7 +110,8 @@ def _samples(record: Record, every: int = 1) -> int:
 
 
 def _samples_together(observation: Observation) -> int:
-    """Over how many samples means are taken: 1, but for fast records without a gap."""
+    """Over how many samples means are taken: 1, but for fast records without a gap, of which a spectrum of all samples
+    takes ten times as long."""
     if any(len(r.runs) != 1 for r in observation.records):
         return 1
     return max(1, int(LEAST_PERIOD / max(r.inputs.period for r in observation.records) + 1e-6))
