@@ -9,12 +9,12 @@ import pytest
 
 from daq.contracts.machine import Machine
 from daq.contracts.quantity import Quantity
+from model.discrepancy.candidates import tones
 from model.discrepancy.candidates.library import tone
 from model.discrepancy.candidates.tones import MOST_TONES, propose_tones, rates_tried, tones_tried, torque_response
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import Point, point_at
-from model.machine_model.model import Model, base_model
-from tests.model.discrepancy import outside_arm
+from model.machine_model.model import Model
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
 
@@ -44,20 +44,17 @@ def test_a_ripple_is_proposed_at_its_cycles(has_hum: bool) -> None:
     assert np.hypot(*(best.start[f"joint2.torque_ripple.{p}"] for p in ("sine", "cosine"))) == pytest.approx(1, rel=0.5)
 
 
-def test_a_disturbance_of_a_fast_record_is_proposed_from_means_of_its_samples() -> None:
-    fast = replace(outside_arm.drawn(1), period=0.001)
-    machine = outside_arm.machine(period=0.001)
-    observation, given = observe(base_model(machine), [outside_arm.record(fast, 11, duration=6.0)])
-    hums = given.of(given.model.with_effect("periodic_disturbance", (2,), HUM))
-    (record,), shown = observation.records, observation.shown(hums)
-    humming = replace(observation, records=(replace(record, measured=shown[0]),))
-    nothing = np.zeros((len(given.unknowns), humming.samples))
-    best = propose_tones(point_at(humming, given, nothing), (2,))[0]
-    assert best.hypothesis.name == "periodic_disturbance"
-    assert best.start["joint2.periodic_disturbance.frequency"] == pytest.approx(1.7, abs=0.1)
-    sizes = [best.start[f"joint2.periodic_disturbance.{p}"] for p in ("sine", "cosine")]
-    assert np.hypot(*sizes) == pytest.approx(np.hypot(0.5, 0.2), rel=0.5)
-    assert best.response.shape == (humming.samples,)
+def test_tones_of_a_fast_record_are_those_that_all_of_its_samples_propose(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is compared with them in means of several samples."""
+    point = seen(imagined.arm().with_effect("periodic_disturbance", (2,), HUM), imagined.arm())
+    every = propose_tones(point, (2,))[0]
+    monkeypatch.setattr(tones, "LEAST_PERIOD", 2 * imagined.PERIOD)
+    found = propose_tones(point, (2,))[0]
+    assert found.hypothesis.name == every.hypothesis.name == "periodic_disturbance"
+    assert found.gain == pytest.approx(every.gain, rel=0.02)
+    assert np.linalg.norm(found.response - every.response) < 0.3 * np.linalg.norm(every.response)
+    rate = "joint2.periodic_disturbance.frequency"
+    assert found.start[rate] == pytest.approx(every.start[rate], rel=0.05)
 
 
 def test_the_response_to_a_torque_is_the_same_beside_a_tone() -> None:
