@@ -96,6 +96,11 @@ def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Hy
     return _hypothesis(_Place(model, name, (joint,), name), (dict(values),))
 
 
+def law_on(model: Model, name: str, joints: Sequence[int]) -> Hypothesis | None:
+    """A hypothesis without trials, for a fit that begins elsewhere; None where the model has no room for it."""
+    return _hypothesis(_Place(model, name, tuple(joints), name), ())
+
+
 def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, float]) -> Hypothesis | None:
     """One law on all joints of hypotheses about single ones, with one trial. values: by full name. None where the model
     has the effect on some of the joints already."""

@@ -8,19 +8,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point, descend, point_at
-from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
+from model.discrepancy.thresholds import FEEDBACK_SHARE, FEEDBACK_SHARE_FOR_ERRORS
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
 
 BLOCK = 0.2
 """Time over which errors may be correlated, s."""
+NEARER = (FEEDBACK_SHARE, 0.95)
+"""Feedback shares that are tried in turn where the simulation of a held-out trace does not stay finite."""
 START_STEPS = 8
 """Steps of the search for the initial posture of a held-out trace: with play in a gear, that is not a smooth
 problem."""
@@ -93,13 +96,23 @@ def _residuals(observation: Observation, point: Calibration, starts: tuple[Unkno
 
 def _fitted_here(observation: Observation, point: Calibration, own: tuple[Unknown, ...]) -> Point:
     """The point with the record's own unknowns at their best. They are not searched for where there are none, or where
-    the simulation does not stay finite."""
+    the simulation does not stay finite.
+
+    A simulation that runs away follows the record more, as in the fits.
+    """
     here = _values_here(point, own)
     count = len(here.unknowns)
-    begun = point_at(observation, here, np.zeros((count, observation.samples)))
+    for share in (None, *NEARER):
+        followed = observation if share is None else observation.with_feedback_share(share)
+        begun = point_at(followed, here, np.zeros((count, observation.samples)))
+        if begun.is_finite:
+            break
     if not own or not begun.is_finite:
         return begun
-    return descend(begun, START_STEPS, range(count - len(own), count))
+    try:
+        return descend(begun, START_STEPS, range(count - len(own), count))
+    except SpecError:
+        return begun  # on the verge of instability, as where a delay is missing: no derivative exists
 
 
 def _values_here(point: Calibration, own: tuple[Unknown, ...]) -> Calibration:

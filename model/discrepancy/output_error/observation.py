@@ -66,6 +66,12 @@ BEND_SHARE = 0.3
 CONTACT_STEP = 1e-3
 """Longest step of integration of models with play, s: parts in contact swing at up to 1500 rad/s, which steps of 2 ms
 cannot follow."""
+SHORTEST_PRESLIDING = 1e-3
+"""Lower bound of the distance over which friction builds up, as a share of the expected one, half a count: so short
+that friction is there at once. With a larger bound, friction that jumps looks like a law that is missing."""
+SHORT, SUDDEN = 0.2, 0.05
+"""Shares of the expected distance below which friction is as stiff a contact as a gear, for derivatives and for all
+other simulations. Longer steps make such joints creep, and derivatives of that are noise."""
 LOOSE_START = 8.0
 """Prior width of the initial posture, in sensor tolerances. Wide, because the sensor itself may have the missing
 effect."""
@@ -169,7 +175,10 @@ class Observation:
             out = np.zeros((len(which), OUTPUTS, longest, model.joint_count), dtype=np.float64)
             starts = np.concatenate([i[begin : begin + BATCH] for i in initials])
             repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
-            left, step = np.arange(len(which)), min(longest_step, longest_step_of(model))
+            left, step = (
+                np.arange(len(which)),
+                min(longest_step, longest_step_of(model), _step_of_contacts(model, own, longest_step)),
+            )
             for _ in range(1 + HALVINGS):
                 tried = BatchRun(model, self.prepared, which[left], repeated[left], starts[left], step).run()
                 out[left] = tried
@@ -299,7 +308,9 @@ def observe(
         for r in problem.records
     )
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
-    unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
+    unknowns = tuple(
+        _sudden_friction(_loose_start(_even_bend(_as_given(u, given), problem.model))) for u in problem.unknowns
+    )
     observation = Observation(model.machine, problem.records, problem.floor, unit, prepared)
     return observation, Calibration(problem.model, unknowns, np.array([u.start for u in unknowns]))
 
@@ -320,6 +331,15 @@ def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
 def longest_step_of(model: Model) -> float:
     """Longest step of integration, s, with which a model can be simulated."""
     return CONTACT_STEP if any(use.name == "backlash" for use in model.effects) else COARSE_STEP
+
+
+def _step_of_contacts(model: Model, vectors: Floats, longest_step: float) -> float:
+    """Longest step of integration, s, that follows the contacts of friction in all of these states (p, vector)."""
+    places = [at.slot(j, at.PRESLIDING) for j in model.machine.modelled_joints]
+    share = float((vectors[:, places] / model.vector[places]).min())
+    if share < SUDDEN and longest_step <= STEP:
+        return CONTACT_STEP
+    return STEP if share < SHORT else longest_step
 
 
 def step_of_derivatives(model: Model) -> float:
@@ -349,6 +369,13 @@ def _loose_start(unknown: Unknown) -> Unknown:
         return unknown
     limit = 2 * LOOSE_START * unknown.deviation
     return replace(unknown, deviation=LOOSE_START * unknown.deviation, low=-limit, high=limit)
+
+
+def _sudden_friction(unknown: Unknown) -> Unknown:
+    """The unknown; friction may also be there at once."""
+    if unknown.kind is not Kind.PRESLIDING:
+        return unknown
+    return replace(unknown, low=SHORTEST_PRESLIDING * unknown.expected)
 
 
 def _even_bend(unknown: Unknown, model: Model) -> Unknown:

@@ -45,11 +45,14 @@ from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
+from model.machine_model.parameter import Kind
 
 MOST_REFUSALS = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
 FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
+SHORT_DISTANCE = 0.3
+"""Share of the expected distance over which friction builds up, below which a fit is tried with sudden friction too."""
 FIRST_STEPS = 6
 """Steps of a search in these fits, before derivatives are computed anew."""
 
@@ -99,7 +102,7 @@ class _Search:
         current: the fit now.
         steps: one for every ranking with something to say.
         before: the fit that each step began from.
-        rivals: candidates close to the last added effect.
+        rivals: candidates close to the last added effect; where there is a group, of the last group.
         probes: all so far.
         tried: the last ranking, where nothing was added.
         ended: whether the search is over.
@@ -146,7 +149,21 @@ def _fit_tolerances(given: Point) -> Point:
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
         raise SpecError("the simulation does not stay finite: the loop is unstable")
-    return converge(begun, LAST_STEPS)
+    return _with_sudden_friction(converge(begun, LAST_STEPS))
+
+
+def _with_sudden_friction(fitted: Point) -> Point:
+    """The fit, or a better one that begins where friction is there at once, on joints where it builds up over a short
+    distance: there the cost has valleys, in which a search may end."""
+    distances = [k for k, u in enumerate(fitted.unknowns) if u.kind is Kind.PRESLIDING]
+    short = [k for k in distances if fitted.values[k] < SHORT_DISTANCE * fitted.unknowns[k].expected]
+    values = fitted.values.copy()
+    values[short] = [fitted.unknowns[k].low for k in short]
+    if np.array_equal(values, fitted.values):
+        return fitted
+    begun = fitted.moved_to(values)
+    tried = converge(begun, LAST_STEPS) if begun.is_finite else fitted
+    return tried if tried.cost < fitted.cost else fitted
 
 
 def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
@@ -187,8 +204,9 @@ def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel)
             break
         search = replace(search, steps=(*search.steps, step), before=(*search.before, current))
         if step.adopted:
-            rivals = rivals_of(ranking, decision)
-            return replace(search, current=following, rivals=rivals, tried=None, ended=bool(step.group))
+            grouped = any(s.adopted and s.group for s in search.steps[:-1])
+            rivals = search.rivals if grouped and not step.group else rivals_of(ranking, decision)
+            return replace(search, current=following, rivals=rivals, tried=None)
         ranking = replace(ranking, fitted=tuple(f for f in ranking.fitted if f is not decision.best))
     return replace(search, ended=True)
 

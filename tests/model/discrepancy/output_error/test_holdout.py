@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.holdout import hold_out
-from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point, point_at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
@@ -85,3 +88,21 @@ def test_a_held_out_record_of_bent_potentiometers_begins_where_its_readings_do()
         (residual,), (record,) = held.residuals(point), held.observation.records
         left = np.sqrt(np.mean(residual[record.runs[0]] ** 2, axis=0)) / held.floor(point)
         assert np.all(left < 1.15)
+
+
+@dataclass(frozen=True)
+class RunningAway(Observation):
+    """An observation whose simulations stay finite only where they follow most of the record."""
+
+    def residuals(self, tried: Calibration) -> Signals:
+        found = super().residuals(tried)
+        return found if self.prepared[0].following > 0.7 else tuple(np.full_like(f, np.nan) for f in found)
+
+
+def test_a_held_out_simulation_that_runs_away_follows_the_record_more() -> None:
+    held = hold_out(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0, seed=6)])
+    assert held is not None
+    own = held.observation
+    away = RunningAway(own.machine, own.records, own.deviations, own.unit, own.prepared)
+    assert not np.isfinite(away.residuals(begun(1, 0.0))[0]).any()
+    assert all(np.isfinite(left).all() for left in replace(held, observation=away).residuals(begun(1, 0.0)))

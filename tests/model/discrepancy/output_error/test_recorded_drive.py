@@ -15,11 +15,13 @@ from model.discrepancy.output_error.controller_evidence import (
 )
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.sampled_controller import with_errors
+from model.discrepancy.output_error.search import point_at
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.workflow import diagnose
 from model.fitting.records import records_of
 from model.machine_model.model import base_model
+from model.machine_model.parameter import Kind
 from tests.model.discrepancy import outside_arm
 
 MACHINE = outside_arm.machine()
@@ -37,8 +39,30 @@ def test_a_sound_arm_is_explained_to_the_noise_of_its_readings(sound: outside_ar
     assert _fit_tolerances(given).misfit == pytest.approx(1.0, abs=0.08)
 
 
+def test_sudden_friction_with_the_true_numbers_leaves_the_noise_of_readings() -> None:
+    """The arm's friction is there at once: its model's must not need a distance to build up."""
+    arm = outside_arm.drawn(106)
+    observation, given = observe(base_model(MACHINE), [outside_arm.record(arm, 1061)])
+    true = {"controller.delay": arm.delay}
+    for joint in range(3):
+        true[f"link{joint + 1}.mass"] = arm.mass[joint]
+        own = f"joint{joint + 1}."
+        true[own + "motor.resistance"] = arm.resistance[joint]
+        true[own + "viscous_friction.coefficient"] = arm.viscous[joint]
+        true[own + "coulomb_friction.torque"] = arm.coulomb[joint]
+
+    def misfit(**forms: float) -> float:
+        values = [true.get(u.name, forms.get(u.kind.name, u.expected)) for u in given.unknowns]
+        point = point_at(observation, given.at(np.array(values)), np.zeros((len(values), observation.samples)))
+        return point.misfit
+
+    shortest = min(u.low for u in given.unknowns if u.kind is Kind.PRESLIDING)
+    assert misfit(PRESLIDING=shortest, PRESLIDING_SHAPE=0.0) == pytest.approx(1.0, abs=0.06)
+    assert misfit() > 3.0, "with the expected distance, half a count"
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [106, 107])
 def test_a_sound_arm_is_not_called_unsound(seed: int) -> None:
     arm = outside_arm.drawn(seed)
     traces = [outside_arm.record(arm, 10 * seed + k) for k in (1, 2)]

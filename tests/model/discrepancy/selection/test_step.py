@@ -18,15 +18,17 @@ from model.discrepancy.thresholds import Thresholds
 from tests.model.discrepancy.candidate_fits import candidate_fit
 
 
-def after_ranking(monkeypatch: pytest.MonkeyPatch, fits: list[CandidateFit], holding: str | None) -> Any:
-    """The search after a ranking of these fits, of which held-out traces refuse all but `holding`."""
+def after_ranking(
+    monkeypatch: pytest.MonkeyPatch, fits: list[CandidateFit], holding: str | None, group: tuple[str, ...] = ()
+) -> Any:
+    """The search after a ranking of these fits, of which held-out traces refuse all but `holding`, in a group."""
     start, end = cast(Fit, object()), cast(Fit, object())
 
     def make_step(_case: Any, current: Fit, _ranking: Ranking, decision: Any) -> tuple[Any, Fit]:
         if decision.kind == "nothing":
             return None, current
         name = decision.best.hypothesis.name
-        step = SimpleNamespace(effect=name, joints=(1,), evidence=1.0, adopted=name == holding, group=())
+        step = SimpleNamespace(effect=name, joints=(1,), evidence=1.0, adopted=name == holding, group=group)
         return step, end if step.adopted else current
 
     monkeypatch.setattr(diagnose, "_rank", lambda *_: (Ranking(tuple(fits), ()), start))
@@ -55,6 +57,15 @@ def test_a_candidate_that_is_not_significant_is_not_taken_after_a_refused_one(mo
     assert found.ended
     assert found.tried is not None
     assert [f.hypothesis.name for f in found.tried.fitted] == ["backlash", "stiction"], "also what was refused"
+
+
+def test_a_second_effect_is_looked_for_after_a_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The group's best stands in for the one that is there."""
+    both = [candidate_fit("backlash", (1,), 90.0), candidate_fit("stiction", (1,), 88.0)]
+    found = after_ranking(monkeypatch, both, "backlash", group=("backlash", "stiction"))
+    assert [(s.effect, s.adopted) for s in found.steps] == [("backlash", True)]
+    assert not found.ended
+    assert [r.hypothesis.name for r in found.rivals] == ["backlash", "stiction"]
 
 
 def test_the_search_ends_after_three_refused_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
