@@ -44,12 +44,12 @@ test-all: checks ## the same, with the slow tests
 	@$(BIN)/python -m pytest -q $(WORKERS)
 
 # What all workers of the tests need is compiled meanwhile, once: each would do it again, or wait for the one that does.
-checks: $(FOR_DEVELOPMENT) page
+checks: $(FOR_DEVELOPMENT) page ## lint and the tests of the page, while what the tests need is compiled
 	@$(BIN)/python -m tests.compile_ahead & ahead=$$!; \
 	$(MAKE) --no-print-directory lint page-tests; code=$$?; \
 	wait $$ahead || code=1; exit $$code
 
-page-tests:
+page-tests: $(FOR_DEVELOPMENT) ## the tests of the modules of the page
 	@echo "== tests of the page's modules"
 	@$(BIN)/python hatch_build.py test
 
