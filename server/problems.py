@@ -110,14 +110,13 @@ def of_damage(error: DamagedError) -> ProblemError:
 
 def of_disk(error: OSError) -> ProblemError | None:
     """Returns a 507 if the disk is full, a 503 if it cannot be written, and None if the error is another one."""
-    if error.errno in NO_ROOM:
-        status, kind, advice = 507, "no-room", "free some space on it"
-    elif error.errno in NOT_WRITABLE:
-        status, kind, advice = 503, "disk", "the operating system's log says why; make it writable, then try again"
-    else:
+    if error.errno not in (*NO_ROOM, *NOT_WRITABLE):
         return None
     log.error("disk: %s", error)
-    return ProblemError(status, kind, f"the disk: {error.strerror}", advice)
+    line = f"the disk: {error.strerror}"
+    if error.errno in NO_ROOM:
+        return ProblemError(507, "no-room", line, "free some space on it")
+    return ProblemError(503, "disk", line, "the operating system's log says why; make it writable, then try again")
 
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:

@@ -31,6 +31,7 @@ REGISTERED = (
     "model/validation",
     "model/analysis",
     "model/trial",
+    "model/units.py",
     "mock_controller",
     "firmware_protocol",
     "daq/contracts",

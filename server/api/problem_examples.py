@@ -194,4 +194,11 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "check cable and supply, then connect again",
     ),
     _met(".*", 507, "no-room", "the disk of the database is full", "free some space on it"),
+    _met(
+        ".*",
+        503,
+        "disk",
+        "the disk: Read-only file system",
+        "the operating system's log says why; make it writable, then try again",
+    ),
 )

@@ -23,7 +23,7 @@ def answer() -> tuple[Diagnosis, Comparison]:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures cost seconds; what the words say does not need them."""
-    for module in ("diagnosis_map", "diagnosis_pictures", "motion", "motion_closer"):
+    for module in ("diagnosis_map", "diagnosis_pictures", "gap", "motion", "motion_closer"):
         monkeypatch.setattr(f"model.reports.{module}.drawn", lambda *_: "<svg></svg>")
 
 
@@ -127,9 +127,9 @@ def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparis
     report = diagnosis_report(sound, comparison)
     titles = [s.title for s in report.sections]
     assert titles[:4] == [
+        "How the gap shrinks",
         "Where they disagree",
         "What was tried",
-        "Errors beside the noise",
         "Measured, before and after",
     ]
     assert all(any(isinstance(b, Picture) for b in s.blocks) for s in report.sections[:4])
@@ -230,7 +230,9 @@ def test_a_page_about_torques_does_not_speak_of_a_simulation(answer: tuple[Diagn
     step = found.steps[0]
     errors = tuple(e.model_copy(update={"unit": "N·m"}) for e in step.rmse_fit)
     balanced = step.model_copy(update={"rmse_fit": errors, "rmse_holdout": ()})
-    torques = found.model_copy(update={"steps": (balanced,), "method": "inverse-dynamics"})
+    assert found.gap is not None
+    gap = found.gap.model_copy(update={"measure": "torques"})
+    torques = found.model_copy(update={"steps": (balanced,), "method": "inverse-dynamics", "gap": gap})
     assert compared(torques) is TORQUES
     report: Report = diagnosis_report(torques)
     text = words(html(report))
