@@ -59,7 +59,7 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, s
     expect(page.get_by_text("95 % interval").first).to_contain_text(f"{value['low']:.4g}"[:4])
     gap = page.get_by_role("region", name="The gap, step by step")
     gap.get_by_text("As a table").click()
-    after = degrees(next(e["after"] for e in step["rmse_holdout"] if e["joint"] == 2))
+    after = degrees(found["gap"]["stages"][-1]["held_out"][1])
     expect(gap.get_by_role("row").filter(has_text="held out").nth(1)).to_contain_text(f"{after:.3g}"[:5])
     overlay = page.get_by_role("region", name="Measured, before and after")
     expect(overlay.get_by_role("img", name=re.compile("^Position of joint 2"))).to_be_visible()
@@ -88,7 +88,7 @@ def test_the_proposed_experiment_is_queued(studied: Studied, studied_dashboard: 
     (queued,) = studied.service.robot.get("/queue/experiments").json()
     assert queued["spec"]["name"] == asked["spec"]["name"]
     assert queued["spec"]["trajectory"] == asked["spec"]["trajectory"]
-    expect(page.get_by_role("link", name=asked["spec"]["name"], exact=True)).to_be_visible()
+    expect(page.get_by_role("link", name=f"Experiment {asked['spec']['name']}", exact=True)).to_be_visible()
     studied.service.robot.post(f"/experiments/{queued['id']}/cancel")
 
 
