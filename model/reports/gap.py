@@ -16,9 +16,12 @@ if TYPE_CHECKING:
 
 MEASURES = {"closed-loop": "rms error in closed loop", "torques": "rms error of the torque balance"}
 EXPLAINED = {
-    "closed-loop": "The simulation is given the set points and the initial posture, and nothing else of the record.",
-    "torques": "What drives supply is compared with what the recorded motion needs; nothing is simulated.",
+    "closed-loop": "The simulation is given the set points and the initial posture, and nothing else of the record. A "
+    "dash: it does not stay finite.",
+    "torques": "What drives supply is compared with what the recorded motion needs; nothing is simulated. A dash: what "
+    "is needed is not finite.",
 }
+"""How the errors come about, by `Gap.measure`."""
 MOST_COLUMNS = 3
 """Panels side by side."""
 
@@ -42,7 +45,7 @@ def _table(gap: Gap) -> Table:
             rows.append((Cell(kind), *cells(str(joint), *shown)))
     head = ("traces", "joint", *(s.name for s in gap.stages), "noise")
     what = "Root mean square of measured − simulated. " if gap.measure == "closed-loop" else "Root mean square. "
-    return Table(head, tuple(rows), f"{what}{EXPLAINED[gap.measure]} A dash: the simulation does not stay finite.")
+    return Table(head, tuple(rows), f"{what}{EXPLAINED[gap.measure]}")
 
 
 def _picture(gap: Gap) -> Picture:
@@ -60,7 +63,7 @@ def _picture(gap: Gap) -> Picture:
         figure.supylabel(MEASURES[gap.measure], fontsize=8)
 
     caption = "Dots: traces fitted to; rings: held out; grey: noise. Stages: " + "; ".join(
-        f"{_short(k)} {s.name}" for k, s in enumerate(gap.stages)
+        f"{_short(k)}: {s.name}" for k, s in enumerate(gap.stages)
     )
     return Picture(drawn(draw, 0.5 + 1.5 * down), f"{caption}.")
 

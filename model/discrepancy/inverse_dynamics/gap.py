@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from model.discrepancy.diagnosis import Gap, GapStage, SignalError, Step
@@ -37,9 +38,13 @@ def torque_gap(fit: Errors, held: Errors, steps: Sequence[Step]) -> Gap:
     )
 
 
-def _before(errors: Errors) -> tuple[float, ...]:
-    return tuple(e.before for e in errors)
+def _before(errors: Errors) -> tuple[float | None, ...]:
+    return tuple(_finite(e.before) for e in errors)
 
 
-def _after(errors: Errors) -> tuple[float, ...]:
-    return tuple(e.after for e in errors)
+def _after(errors: Errors) -> tuple[float | None, ...]:
+    return tuple(_finite(e.after) for e in errors)
+
+
+def _finite(error: float) -> float | None:
+    return error if math.isfinite(error) else None

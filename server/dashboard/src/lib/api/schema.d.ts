@@ -2597,7 +2597,7 @@ export interface components {
         /**
          * GapStage
          * @description The error of one model on the way from the given to the resulting one: root mean square by joint of the `Gap`, on
-         *     traces fitted to and on held-out ones (empty without any); None where the simulation does not stay finite.
+         *     traces fitted to and on held-out ones (empty without any); None where it is not finite.
          *
          *     `kind`: the model as given; with its tolerance parameters fitted; or with `effect` on `joints` added to the stage
          *     before.
