@@ -21,8 +21,9 @@ AGAINST_THE_CLOCK = (
 fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. They
 are tried again, and the summary names each that was: one that comes up again and again is a race, not a busy machine.
 What runs on a real arm is never repeated by itself."""
-ONE_WORKER = ("server/dashboard", "server/jobs", "server")
-"""Folders whose tests share a service, and a browser, that are costly to start: one worker runs the whole folder."""
+ONE_WORKER = ("server/dashboard", "server/jobs", "server", "model/thesis")
+"""Folders whose tests share a service, a browser or a reproduction of the thesis, each costly to make: one worker runs
+the whole folder."""
 
 
 def is_against_the_clock(test: pytest.Item) -> bool:

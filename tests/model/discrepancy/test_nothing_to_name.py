@@ -36,9 +36,11 @@ def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(
     assert answer.summary.startswith("Joint 2")
 
 
-@pytest.mark.parametrize("experiment", [SLOW_REVERSALS, pytest.param(WHOLE, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("experiment", [SLOW_REVERSALS, WHOLE])
 @pytest.mark.timeout(400)
 def test_a_sound_arm_is_called_sound(tmp_path: Path, experiment: str) -> None:
+    """The whole library; of two effects, tests/server/jobs/test_job_results.py asks the same every day."""
     answer = diagnosed(tmp_path, experiment=experiment)
     assert answer.verdict == "nothing-significant", answer.summary
     assert not [s for s in answer.steps if s.adopted]

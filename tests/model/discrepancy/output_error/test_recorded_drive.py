@@ -32,6 +32,7 @@ def sound() -> outside_arm.OutsideArm:
     return outside_arm.drawn(1)
 
 
+@pytest.mark.slow
 def test_a_sound_arm_is_explained_to_the_noise_of_its_readings(sound: outside_arm.OutsideArm) -> None:
     """Its drive is rounded to 0.14 V and limited, which the record of the drive tells and no law needs to."""
     given = _given_point(*observe(base_model(MACHINE), [outside_arm.record(sound, 11)]))
