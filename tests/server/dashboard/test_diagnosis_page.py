@@ -80,9 +80,9 @@ def _see_the_map(page: Page, given: dict[str, object]) -> None:
 
 
 def test_the_proposed_experiment_is_queued(studied: Studied, studied_dashboard: Dashboard) -> None:
-    asked = studied.result(studied.diagnosis)["next_experiment"]
+    asked = studied.result(studied.asking)["next_experiment"]
     assert asked is not None
-    page = studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+    page = studied_dashboard.open(f"diagnosis/{studied.asking}")
     page.get_by_role("button", name="Queue this experiment").click()
     expect(page.get_by_text("waits: the queue is paused")).to_be_visible()
     (queued,) = studied.service.robot.get("/queue/experiments").json()
