@@ -9,6 +9,7 @@ from server.robot.control import LEASE_TIME
 from tests.server.queue.bench import CALM, REAL, Bench
 
 LOOK = "look at the arm, then resume the queue"
+ASKS = "an operator must allow the queue to move this arm: pause it, then resume it (moves_real_arm)"
 LOST = CALM.model_copy(update={"link": "lost"})
 
 
@@ -124,9 +125,7 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
     bench.queue.resume("anna", moves_real_arm=False)  # nothing was there to be asked about
     bench.submit()
     bench.queue.start()
-    while not (waiting_for := bench.queue.status().waiting_for):
-        pass
-    assert "moves_real_arm" in waiting_for  # the word that the next person has to give
+    bench.until_it_waits(ASKS)  # the word that the next person has to give
 
 
 def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -> None:
@@ -158,9 +157,7 @@ def test_a_word_that_was_given_for_one_connection_is_none_for_the_next(bench: Be
     bench.queue.resume("bert", moves_real_arm=False)
     bench.submit()
     bench.queue.start()
-    while not (waiting_for := bench.queue.status().waiting_for):
-        pass
-    assert "moves_real_arm" in waiting_for
+    bench.until_it_waits(ASKS)
 
 
 def test_an_attempt_to_connect_that_fails_holds_nothing(bench: Bench) -> None:
