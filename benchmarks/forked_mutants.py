@@ -6,8 +6,8 @@ a fork of its own, in which the faulty function's code replaces the right one an
 run, the quickest first, up to the first that fails.
 
 What is decided when a module is imported (constants, defaults, decorators), and functions that no test calls in its own
-process (compiled ones, those of other processes), cannot be tried like this. They are `left`, and `mutation` tries them
-in a process of their own, as it does with everything that lives on here.
+process (compiled ones, those of other processes), cannot be tried like this. `mutation` tries them in a
+process of their own, as it does with everything that lives on here.
 """
 
 from __future__ import annotations
@@ -51,11 +51,13 @@ class Orders:
 
 @dataclass
 class Findings:
-    """Seconds of each test, and each mutant that was killed here with the test that failed ("" at the time limit)."""
+    """Seconds of each test; each mutant that was killed, with the test that failed ("" at the time limit); and those that
+    survived. The others could not be tried here."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     broken: str = ""
     killed: dict[Mutant, str] = field(default_factory=dict)
+    survived: list[Mutant] = field(default_factory=list)
 
 
 @dataclass
@@ -105,7 +107,9 @@ def _try(session: pytest.Session, mutant: Mutant, without: _Without, orders: Ord
         return _first_failure(items) if replace(str(file), name, code) else ""
 
     failed = _in_a_fork(faulty, 3.0 * sum(seconds.values()) + GRACE_S)
-    if failed != "":
+    if failed == "":
+        findings.survived.append(mutant)
+    else:
         findings.killed[mutant] = failed or ""
 
 
