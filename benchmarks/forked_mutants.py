@@ -51,8 +51,8 @@ class Orders:
 
 @dataclass
 class Findings:
-    """Seconds of each test; each mutant that was killed, with the test that failed ("" at the time limit); and those that
-    survived. The others could not be tried here."""
+    """Seconds of each test; each mutant that was killed, with the test that failed ("" at the time limit); and those
+    that survived. The others could not be tried here."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     broken: str = ""
