@@ -236,3 +236,22 @@ def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
         bench.clock.turn(10)
     assert len([event for event in bench.events if "skipped" in event]) == 1
     assert bench.counted(schedule) == 5
+
+
+def test_runs_that_are_left_out_are_told_again_after_one_that_was_made(bench: Bench) -> None:
+    schedule = bench.schedule(every=10)
+    bench.queue.pause("by anna", "anna")
+    runs = DueRuns(bench.queue._context)
+    for _ in range(2):
+        runs.submit()
+        bench.clock.turn(10)
+    bench.queue.cancel(bench.runs(schedule)[0].id, "anna")
+    for _ in range(3):
+        runs.submit()
+        bench.clock.turn(10)
+    assert [event.startswith("experiment: queued") for event in bench.events if "schedule" in event] == [
+        True,
+        False,
+        True,
+        False,
+    ]
