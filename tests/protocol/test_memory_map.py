@@ -134,7 +134,7 @@ def test_the_memory_may_reach_to_the_end_of_the_address_space() -> None:
 
 
 def test_a_map_without_a_name_for_its_file_is_called_a_memory_map() -> None:
-    with pytest.raises(MemoryMapError, match="^memory map: not TOML: "):
+    with pytest.raises(MemoryMapError, match=r"^memory map: not TOML: "):
         parse_memory_map("version =")
 
 
