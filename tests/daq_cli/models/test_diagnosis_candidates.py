@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from daq_cli.models.diagnosis_text import candidates_lines
-from model.discrepancy.diagnosis import Candidate
-from tests.model.discrepancy.steps import step
+from model.discrepancy.diagnosis import Candidate, Step
+from tests.model.discrepancy import steps
 
 
 def fitted(effect: str, evidence: float) -> Candidate:
@@ -13,6 +13,10 @@ def fitted(effect: str, evidence: float) -> Candidate:
 
 def probed(effect: str, evidence: float) -> Candidate:
     return Candidate(effect=effect, joints=(1,), evidence=evidence)
+
+
+def step(effect: str, *candidates: Candidate) -> Step:
+    return steps.step(effect, candidates=candidates)
 
 
 def test_probes_stand_below_what_was_fitted_however_much_they_promise() -> None:
