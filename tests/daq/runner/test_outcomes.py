@@ -400,12 +400,15 @@ def test_limits_that_are_not_set_are_not_zero(arm: Rig) -> None:
 
 def test_a_slow_line_moves_to_the_start_all_the_same(tmp_path: Path) -> None:
     spec = ExperimentSpec(trajectory=Pause(duration=0.2), joints=(1,), settle=0, hold=0, start={1: math.radians(190)})
+    missed: list[int] = []
     with rig(tmp_path, "seed=5&baud=19200") as arm:
+        arm.ears.at_event["start"] = lambda: missed.append(arm.controller.counters.missing_samples)
         result = arm.run(spec)
     trace = read_trace(result.trace)
     assert result.outcome == "complete"
     assert trace.joints == (1,)
     assert math.degrees(trace.position[0, 0]) == pytest.approx(190, abs=1)
+    assert missed == [0], "a move takes the newest sample, and misses none of those it passes over"
 
 
 def signals(arm: Rig, spec: ExperimentSpec) -> list[np.ndarray]:
