@@ -4,8 +4,10 @@
 
 Each path is a folder or a file. Each mutant (see `mutants`) is tried in a temporary copy of the tree. The tests are
 those of the folder of `tests` that mirrors the module's (`tests/daq/link` for `daq/link`; where there is none, the
-folder above), and of these the files that reach the module through imports. The quickest file runs first, and the
-first failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
+folder above), and of these the files that reach the module through imports. Most mutants are tried in a fork of a
+process that has imported everything, by the tests that call the changed function (see `forked_mutants`); what cannot be
+tried there, or lives on, is tried by all tests in a process of its own. The quickest file runs first, and the first
+failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
 browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than three times
 their time and 20 s (240 s for the model, which has to compile).
 
