@@ -146,6 +146,8 @@ def test_a_link_below_the_floor_is_a_violation() -> None:
     way = np.linspace(REST[1], math.radians(-44), 501)
     (found,) = check_plan(plan_of(2, *way), MA2000, LIMITS)
     assert str(found) == "end of link 3: height of -315 mm at 10.00 s: allowed are -300 mm and above"
+    assert (found.rule, found.joint, found.limit) == ("floor", 3, -0.3)
+    assert (found.value, found.time) == (pytest.approx(-0.315, abs=5e-4), pytest.approx(10.0))
 
 
 def test_a_link_beyond_the_reach_is_a_violation() -> None:
@@ -153,6 +155,8 @@ def test_a_link_beyond_the_reach_is_a_violation() -> None:
     assert check_plan(plan_of(3, *way), MA2000, limits(reach=0.4545)) == []
     (found,) = check_plan(plan_of(3, *way), MA2000, limits(reach=0.45))
     assert str(found) == "end of link 3: 454 mm from the base at 10.00 s: allowed are up to 450 mm"
+    assert (found.rule, found.joint, found.limit) == ("reach", 3, 0.45)
+    assert (found.value, found.time) == (pytest.approx(0.454, abs=5e-4), pytest.approx(10.0))
 
 
 def test_the_floor_is_watched_between_set_points_too() -> None:
