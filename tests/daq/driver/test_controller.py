@@ -262,6 +262,17 @@ def test_set_points_that_were_refused_are_not_missed_later() -> None:
     assert not controller.next_snapshot().set_points_missed
 
 
+def test_set_points_that_were_refused_are_not_the_right_ones_later() -> None:
+    """500 was taken in tick 7; a period 8 that shows 510, which the board refused, has missed them."""
+    replies = iter([SetPointsTaken(7, 0), Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)])
+    shown = Snapshot(8, 0, ((1, JointReading(510, 2089, 0, 0)),))
+    controller = controller_that(lambda request: next(replies) if isinstance(request, WriteSetPoints) else shown)
+    controller.set_points({1: 500})
+    with pytest.raises(RequestRefusedError):
+        controller.set_points({1: 510})
+    assert controller.next_snapshot().set_points_missed
+
+
 def test_set_points_travel_with_the_question_for_the_joints_asked_for() -> None:
     asked: list[Request] = []
 
