@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
+
 import pytest
 
 from server.queue.attendance import ATTENDANCE
+from server.queue.service import QueueService
 from server.robot.control import LEASE_TIME
-from tests.server.queue.bench import CALM, REAL, Bench
+from tests.server.queue.bench import CALM, REAL, TOO_LONG, Bench
 
 LOOK = "look at the arm, then resume the queue"
 ASKS = "an operator must allow the queue to move this arm: pause it, then resume it (moves_real_arm)"
@@ -190,3 +194,23 @@ def test_a_service_that_begins_with_work_waiting_lets_nobody_begin_it_but_a_pers
     assert bench.queue.status().reason == f"{line}: {LOOK}"
     bench.queue.resume("anna", moves_real_arm=False)
     bench.until(lambda event: event == "experiment: failed: refused")
+
+
+@pytest.mark.parametrize(
+    "happens",
+    [
+        lambda queue: queue.on_arm_report(LOST),
+        lambda queue: queue.stop_asked("anna"),
+        lambda queue: queue.control_lapsed("anna"),
+        lambda queue: queue.connection_ended("exit code 0"),
+    ],
+    ids=["link", "stop", "control", "connection"],
+)
+def test_what_holds_the_queue_wakes_it(bench: Bench, happens: Callable[[QueueService], None]) -> None:
+    bench.queue.connection_made()
+    looked = threading.Event()
+    bench.experiments.after("due", looked.set)
+    bench.queue.start()
+    assert looked.wait(TOO_LONG)
+    happens(bench.queue)
+    bench.until(lambda event: event.startswith("queue: paused"))
