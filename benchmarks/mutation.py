@@ -4,8 +4,10 @@
 
 Each path is a folder or a file. Each mutant (see `mutants`) is tried in a temporary copy of the tree. The tests are
 those of the folder of `tests` that mirrors the module's (`tests/daq/link` for `daq/link`; where there is none, the
-folder above), and of these the files that reach the module through imports. The quickest file runs first, and the
-first failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
+folder above), and of these the files that reach the module through imports. Most mutants are tried in a fork of a
+process that has imported everything, by the tests that call the changed function (see `forked_mutants`); what cannot be
+tried there, or lives on, is tried by all tests in a process of its own. The quickest file runs first, and the first
+failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
 browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than three times
 their time and 20 s (240 s for the model, which has to compile).
 
@@ -19,6 +21,8 @@ killed.
 --kills       print each killed mutant too, with the test that failed; on a busy machine a test that waits for a
               process or a clock may have failed without noticing the fault
 --line N      only those that begin at this line; for one file
+--quick       only in forks of one process (see `forked_mutants`), which leaves out what is decided at import, compiled
+              code and other processes; a survivor here may still be noticed by a test that starts a process
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from __future__ import annotations
 import argparse
 import ast
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -33,7 +38,7 @@ import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -42,10 +47,11 @@ from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
 from random import Random
-from xml.etree import ElementTree
+from types import MappingProxyType
 
 import grimp
 
+from benchmarks.forked_mutants import ORDERS, Findings, Orders
 from benchmarks.mutants import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[1]
@@ -61,8 +67,8 @@ GRACE_S = 20.0
 """Time that a mutant has beyond three times what the unchanged tests take; the start of pytest varies by seconds."""
 COMPILING_S = 240.0
 """The same for a mutant of the model, whose compiled functions have to be compiled anew."""
-BASELINE_LIMIT_S = 900.0
-"""Time limit of the unchanged tests."""
+FORKS_LIMIT_S = 7200.0
+"""Time limit of the unchanged tests and of all mutants that are tried in forks."""
 _TIMES = count(1_000_000_000, 10)
 """Modification times, all different, since Python recognises current bytecode by its source's time and size."""
 
@@ -217,13 +223,15 @@ def copy_of_tree(target: Path) -> None:
         shutil.copytree(ROOT / page, target / page, dirs_exist_ok=True)
 
 
-def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int | None, str]:
-    """pytest's exit code for the tests of a copy, and the first that failed.
+def run_tests(
+    tree: Path, arguments: Iterable[str], limit_s: float, more: Mapping[str, str] = MappingProxyType({})
+) -> tuple[int | None, str]:
+    """pytest's exit code for the tests of a copy, and the first that failed; `more` goes into its environment.
 
     The code is None when they took too long; everything they began was then ended.
     """
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", LEFT_OUT, *arguments]
-    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled")}
+    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled"), **more}
     with (
         tempfile.TemporaryFile("w+", errors="replace") as output,
         subprocess.Popen(
@@ -243,34 +251,21 @@ def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int
         return code, failed[0].strip() if failed else ""
 
 
-def measured(tree: Path, files: tuple[str, ...], longest_s: float) -> Baseline:
-    """Runs the unchanged tests. Those that took too long are run again, since the first run may have spent the time on
-    compiling, and are left out when they take too long once more. Raises MutationError when one fails.
+def tried_in_forks(tree: Path, files: Iterable[str], mutants: list[Mutant], longest_s: float) -> Findings:
+    """Measures the unchanged tests, and tries the mutants in forks of that process; see `forked_mutants`. Raises
+    MutationError when a test fails.
     """
-    times = _times(tree, files)
-    long = [test for test, seconds in times.items() if seconds > longest_s]
-    if long:
-        times |= _times(tree, long)
-    return Baseline(times, longest_s)
-
-
-def _times(tree: Path, tests: Iterable[str]) -> dict[str, float]:
-    """Seconds of each test."""
-    report = tree / "mutation-baseline.xml"
-    code, failed = run_tests(tree, [f"--junitxml={report}", "-o", "junit_family=xunit1", *tests], BASELINE_LIMIT_S)
+    orders, answer = tree / "mutation-orders", tree / "mutation-findings"
+    orders.write_bytes(pickle.dumps(Orders(tuple(mutants), longest_s, answer)))
+    answer.unlink(missing_ok=True)
+    code, failed = run_tests(tree, ["-p", Findings.__module__, *files], FORKS_LIMIT_S, {ORDERS: str(orders)})
     if code == 5:  # pytest: there was no test
-        return {}
-    if code != 0:
-        raise MutationError(f"the tests fail without any fault (exit code {code}; {failed}): {' '.join(tests)}")
-    cases = ElementTree.parse(report).iter("testcase")
-    return {_name(case): float(case.get("time", 0.0)) for case in cases}
-
-
-def _name(case: ElementTree.Element) -> str:
-    """The name by which pytest selects a test: `file::class::name`, mostly without a class."""
-    file = case.get("file", "")
-    classes = case.get("classname", "").removeprefix(file.removesuffix(".py").replace("/", "."))
-    return "::".join([file, *filter(None, classes.split(".")), case.get("name", "")])
+        return Findings()
+    findings: Findings | None = pickle.loads(answer.read_bytes()) if answer.exists() else None
+    if findings is None or findings.broken:
+        broken = findings.broken if findings else failed
+        raise MutationError(f"the tests fail without any fault (exit code {code}; {broken}): {' '.join(files)}")
+    return findings
 
 
 def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
@@ -294,10 +289,11 @@ def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
     os.utime(file, ns=(changed_at_ns, changed_at_ns))
 
 
-def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool) -> list[Outcome]:
+def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool, quick: bool) -> list[Outcome]:
     """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once.
 
-    With `kills` it prints each killed one as well, with the test that failed.
+    With `kills` it prints each killed one as well, with the test that failed. With `quick` it tries nothing but in
+    forks, and returns only what could be tried there.
     """
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         trees: SimpleQueue[Path] = SimpleQueue()
@@ -314,23 +310,32 @@ def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool
             finally:
                 trees.put(tree)
 
-        def measure(files: tuple[str, ...]) -> Baseline:
-            with a_tree() as tree:
-                return measured(tree, files, longest_s)
-
         def attempt(mutant: Mutant) -> Outcome:
-            with a_tree() as tree:
-                ended = outcome(tree, mutant, baselines[mirrored_folder(mutant.file)].tests(reaching(mutant.file)))
+            found = findings[mirrored_folder(mutant.file)]
+            if quick and mutant not in found.killed:
+                ended = Outcome(mutant, "survived")
+            elif mutant in found.killed:
+                failed = found.killed[mutant]
+                ended = Outcome(mutant, "killed" if failed else "timed out", failed)
+            else:
+                with a_tree() as tree:
+                    ended = outcome(tree, mutant, Baseline(found.seconds, longest_s).tests(reaching(mutant.file)))
             if ended.lives or kills:
                 print(f"{ended.ending}: {mutant}{f'  ({ended.failed})' if ended.failed else ''}", flush=True)
             return ended
 
-        files: dict[Path, dict[str, None]] = {}
+        def try_in_forks(group: list[Mutant]) -> Findings:
+            with a_tree() as tree:
+                files = dict.fromkeys(file for mutant in group for file in reaching(mutant.file))
+                return tried_in_forks(tree, files, group, longest_s)
+
+        groups: dict[Path, list[Mutant]] = {}
         for mutant in mutants:
-            files.setdefault(mirrored_folder(mutant.file), {}).update(dict.fromkeys(reaching(mutant.file)))
+            groups.setdefault(mirrored_folder(mutant.file), []).append(mutant)
         with ThreadPoolExecutor(processes) as pool:
-            baselines = dict(zip(files, pool.map(measure, map(tuple, files.values())), strict=True))
-            return list(pool.map(attempt, mutants))
+            findings = dict(zip(groups, pool.map(try_in_forks, groups.values()), strict=True))
+            tried = {mutant for each in findings.values() for mutant in (*each.killed, *each.survived)}
+            return list(pool.map(attempt, [m for m in mutants if m in tried or not quick]))
 
 
 # ---- the command
@@ -346,6 +351,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--line", type=int, metavar="N")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--kills", action="store_true")
+    parser.add_argument("--quick", action="store_true")
     return parser.parse_args()
 
 
@@ -369,19 +375,23 @@ def main() -> int:
             return 0
         begun = time.monotonic()
         every = [mutant for mutants in chosen.values() for mutant in mutants]
-        ended = {each.mutant: each for each in run_all(every, options.processes, options.longest, options.kills)}
+        ended = {
+            each.mutant: each
+            for each in run_all(every, options.processes, options.longest, options.kills, options.quick)
+        }
     except MutationError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(f"\n{len(every)} mutants in {time.monotonic() - begun:.0f} s")
+    print(f"\n{len(ended)} mutants in {time.monotonic() - begun:.0f} s")
     enough = True
     for path, mutants in chosen.items():
-        killed = sum(not ended[mutant].lives for mutant in mutants)
-        timed_out = sum(ended[mutant].ending == "timed out" for mutant in mutants)
-        share = killed / len(mutants) if mutants else 1.0
+        endings = [ended[mutant] for mutant in mutants if mutant in ended]
+        killed = sum(not each.lives for each in endings)
+        timed_out = sum(each.ending == "timed out" for each in endings)
+        share = killed / len(endings) if endings else 1.0
         enough &= share >= TARGET
         print(
-            f"{path:<24} {killed} of {len(mutants)} killed ({share:.0%}), {timed_out} of them by the time limit; "
+            f"{path:<24} {killed} of {len(endings)} killed ({share:.0%}), {timed_out} of them by the time limit; "
             f"{left_out[path]} more are equivalent"
         )
     return 0 if enough else 1

@@ -43,8 +43,6 @@ class LockStepClock:
     def __init__(self, link: Link, period_s: float) -> None:
         self._link = link
         self._period_s = period_s
-        self._now = 0.0
-        self._tick_zero_s = 0.0
         self.synchronise()
 
     def synchronise(self) -> None:

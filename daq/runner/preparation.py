@@ -19,6 +19,7 @@ from daq.traces.room import require_room
 from daq.trajectories import Plan, control_period, plan, plan_move, start_angles
 from firmware_protocol.commands import StatusFlag
 from firmware_protocol.framing import FRAME_OVERHEAD
+from firmware_protocol.stamp import STAMP_BYTES
 
 LINE_SHARE = 0.6
 """Share of the line's capacity that samples of all joints may take; beyond it only the experiment's joints are
@@ -84,7 +85,7 @@ def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, 
     if spec.record is not None:
         return spec.record
     per_joint = 2 + 7
-    both_ways = 4 * FRAME_OVERHEAD + 1 + 5 + 5 + 6 + per_joint * len(EVERY_JOINT)
+    both_ways = 4 * FRAME_OVERHEAD + STAMP_BYTES + 1 + 5 + 5 + 6 + per_joint * len(EVERY_JOINT)
     room = controller.link.bytes_per_second * controller.period_s * LINE_SHARE
     return EVERY_JOINT if both_ways <= room else spec.joints
 

@@ -57,7 +57,7 @@ def _not_finite(plan: Plan) -> list[Violation]:
 
 def _widened(limits: Limits, plan: Plan, machine: Machine) -> Limits:
     """Limits that the plan's first set point just meets."""
-    ends = link_ends(machine, plan.angles[:1])[0]
+    (ends,) = link_ends(machine, plan.angles[:1])
     joints = []
     for joint, angle in enumerate(plan.angles[0].tolist(), start=1):
         own = limits.joint(joint)

@@ -135,7 +135,8 @@ def solve(
         if promised <= search.tolerance * cost:
             if fresh:
                 message = "no step promises anything any more"
-            jacobian = np.zeros((0, 0))
+            else:
+                jacobian = np.zeros((0, 0))
             continue
         tried = objective.residual(x + step)
         tried_cost, tried_weights = _cost_and_weights(tried, objective.samples, search.robust)

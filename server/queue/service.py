@@ -26,7 +26,8 @@ from server.queue.readiness import Circumstances, what_is_missing, why_paused
 from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
-"""Time (s) between two checks for due experiments, since the wall clock may be set meanwhile."""
+"""Time (s) between two checks for due experiments, since the wall clock may be set meanwhile, and for the presence of
+an operator."""
 log = logging.getLogger("server.queue")
 
 
@@ -53,8 +54,9 @@ class Ended:
 class QueueService:
     """One queue with its worker thread."""
 
-    def __init__(self, context: QueueContext) -> None:
+    def __init__(self, context: QueueContext, look_every: float = LOOK_EVERY) -> None:
         self._context = context
+        self._look_every = look_every
         self._lock = threading.RLock()
         self._changed = threading.Event()
         self._closing = False
@@ -292,7 +294,7 @@ class QueueService:
                     log.exception("queue")
                 told = fault
                 self._waiting_for = "an error occurred in the queue: see the log"
-            self._changed.wait(LOOK_EVERY)
+            self._changed.wait(self._look_every)
 
     def _settle(self) -> None:
         """Pauses the queue for any notice, and writes what could not be written before, before anything begins."""
@@ -430,7 +432,7 @@ class QueueService:
         """Waits for the answer. On a real arm that must be attended, an operator's absence ends the run by a stop."""
         while True:
             try:
-                return answer.result(LOOK_EVERY)
+                return answer.result(self._look_every)
             except TimeoutError:
                 if self._needs_attendance() and not self._attendance.left:
                     running = self._running

@@ -89,6 +89,55 @@ def test_a_register_short_of_a_joint_is_refused() -> None:
         parse_memory_map(short)
 
 
+BITS = {
+    "set_point": (10, 16),
+    "position": (12, 12),
+    "error": (8, 16),
+    "power": (8, 8),
+    "gain_p": (5, 8),
+    "gain_i": (5, 8),
+    "gain_d": (5, 8),
+    "process_inputs": (1, 8),
+    "process_outputs": (1, 8),
+    "gripper": (1, 1),
+}
+"""Fewest and most bits of each register: what a set point of 0 to 999, a reading of 12 bits or a gain of 0 to 20 needs,
+and what the controller's own register holds."""
+
+
+def with_bits(name: str, bits: int) -> str:
+    """Why the map that ships is refused with so many bits in one register; "" when it is not."""
+    data = default_memory_map().model_dump()
+    data["base"], data["size"] = 0xE000, 0x2000
+    own = data["registers"][name]
+    own["bits"] = bits
+    own["high"] = [0xE000 + i for i in range(len(own["low"]))] if bits > 8 else None
+    try:
+        MemoryMap.model_validate(data)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("name", default_memory_map().registers)
+def test_a_register_has_as_many_bits_as_its_use_allows(name: str) -> None:
+    fewest, most = BITS[name]
+    assert [with_bits(name, bits) for bits in (fewest, most)] == ["", ""]
+    for bits in {fewest - 1, most + 1} - {0, 17}:
+        assert f"register {name} has {bits} bits: allowed are {fewest} to {most}" in with_bits(name, bits)
+
+
+def test_the_memory_may_reach_to_the_end_of_the_address_space() -> None:
+    assert parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x400")).size == 0x400
+    with pytest.raises(MemoryMapError, match="1025 bytes from FC00: the address space ends at FFFF"):
+        parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x401"))
+
+
+def test_a_map_without_a_name_for_its_file_is_called_a_memory_map() -> None:
+    with pytest.raises(MemoryMapError, match=r"^memory map: not TOML: "):
+        parse_memory_map("version =")
+
+
 @given(st.text(max_size=60), st.integers(0, len(SHIPPED)), st.integers(0, 60))
 def test_a_file_damaged_anywhere_is_a_map_or_one_line(text: str, place: int, length: int) -> None:
     try:

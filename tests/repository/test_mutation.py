@@ -1,5 +1,8 @@
 """The mutation tool makes the faults it promises, and its list of equivalent mutants names faults that exist."""
 
+from types import FunctionType
+
+from benchmarks.forked_mutants import change_of
 from benchmarks.mutants import Mutant, mutants_of
 from benchmarks.mutation import ROOT, equivalents, mirrored_folder, reaching
 
@@ -53,6 +56,49 @@ def test_a_module_is_tried_by_the_tests_that_reach_it() -> None:
     assert mirrored_folder("server/queue/order.py").is_relative_to(ROOT / "tests" / "server")
     assert "tests/daq/link/test_transactions.py" in reaching("daq/link/pending.py")
     assert "tests/protocol/test_memory_map.py" not in reaching("firmware_protocol/framing.py")
+
+
+PARTS = b"""
+LIMIT = 2
+
+def outer(x, step=1):
+    def inner(y):
+        return y + 3
+    return [inner(each) for each in x]
+
+class Box:
+    size: int = 4
+    @property
+    def half(self):
+        return self.size / 5
+"""
+
+
+def test_only_the_code_of_functions_can_be_changed_in_a_process_that_has_imported_them() -> None:
+    """What a number belongs to, of which the mutant makes another: a function's own code or that of one inside it."""
+    changes = {
+        mutant.was: change_of(PARTS, mutant, "parts.py")
+        for mutant in mutants_of(PARTS, "parts.py")
+        if mutant.was.isdigit()
+    }
+    assert {was: None if change is None else change[0] for was, change in changes.items()} == {
+        "2": None,  # decided at import
+        "1": None,
+        "3": "outer",
+        "4": None,
+        "5": "Box.half",
+    }
+
+
+def test_the_changed_code_does_what_the_mutant_does() -> None:
+    (mutant,) = [each for each in mutants_of(PARTS, "parts.py") if each.was == "3"]
+    change = change_of(PARTS, mutant, "parts.py")
+    assert change is not None
+    space: dict[str, FunctionType] = {}
+    exec(compile(PARTS, "parts.py", "exec"), space)
+    before = space["outer"]([1, 2])
+    space["outer"].__code__ = change[1]
+    assert (before, space["outer"]([1, 2])) == ([4, 5], [5, 6])
 
 
 def test_every_equivalent_mutant_exists() -> None:

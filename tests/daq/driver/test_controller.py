@@ -6,28 +6,45 @@ from collections.abc import Callable
 
 import pytest
 
-from daq.driver import Controller, GainsNotTakenError, NoSampleError, ProtocolVersionError
-from daq.link import Link, LinkTimeoutError
+from daq.driver import (
+    Controller,
+    ControllerRestartedError,
+    GainsNotTakenError,
+    NoSampleError,
+    ProtocolVersionError,
+)
+from daq.link import Link, LinkState, LinkTimeoutError, RequestRefusedError
 from daq.transport import TransportError
 from firmware_protocol.commands import (
+    AFTER_NEWEST,
     Capability,
+    ErrorsPositionsPowers,
     Gains,
     GainsSet,
+    GripperSet,
     Hello,
     HelloReply,
+    OutputsWritten,
+    Process,
+    ReadStatus,
     Refusal,
     Refused,
+    Release,
+    Released,
     Reply,
+    ReportErrorsPositionsPowers,
     ReportGains,
     Request,
     Sample,
     SetGains,
+    SetGripper,
     SetPointsTaken,
     Snapshot,
     Status,
     StatusFlag,
     Stop,
     Stopped,
+    WriteOutputs,
     WriteSetPoints,
 )
 from firmware_protocol.joints import JointReading
@@ -206,3 +223,185 @@ def test_only_a_greeting_after_a_reset_of_the_board_says_that_it_has_restarted()
         True,
     ]
     assert controller.counters.restarts == 1
+
+
+def test_a_board_without_supply_is_told_by_the_first_status() -> None:
+    restarted = Status(7, StatusFlag.RESTARTED, 3, 0, 0)
+    taken = SetPointsTaken(7, StatusFlag.RESTARTED)
+    replies: dict[type[Request], Reply] = {ReadStatus: restarted, WriteSetPoints: taken}
+    controller = controller_that(lambda request: replies.get(type(request)))
+    with pytest.raises(ControllerRestartedError, match="gains are those of power-up"):
+        controller.set_points({1: 500})
+
+
+def test_a_sample_that_never_comes_from_a_board_that_restarted_is_a_restart() -> None:
+    restarted = Status(7, StatusFlag.RESTARTED, 3, 0, 0)
+    controller = controller_that(lambda request: restarted if isinstance(request, ReadStatus) else None)
+    with pytest.raises(ControllerRestartedError):
+        controller.next_snapshot(after=100)
+
+
+def test_what_is_refused_since_the_board_restarted_is_a_restart_and_no_refusal() -> None:
+    def answers(request: Request, status: int) -> Reply:
+        if isinstance(request, ReadStatus):
+            return Status(7, status, 3, 0, 0)
+        return Refused(request.OPCODE, Refusal.BAD_SESSION)
+
+    with pytest.raises(ControllerRestartedError):
+        controller_that(lambda request: answers(request, StatusFlag.RESTARTED)).set_points({1: 500})
+    with pytest.raises(RequestRefusedError, match="another host has taken the control"):
+        controller_that(lambda request: answers(request, 0)).set_points({1: 500})
+
+
+def test_set_points_that_were_refused_are_not_missed_later() -> None:
+    shown = Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),))
+    refused = Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)
+    controller = controller_that(lambda request: refused if isinstance(request, WriteSetPoints) else shown)
+    with pytest.raises(RequestRefusedError):
+        controller.next_snapshot(set_points={1: 510})
+    assert not controller.next_snapshot().set_points_missed
+
+
+def test_set_points_that_were_refused_are_not_the_right_ones_later() -> None:
+    """500 was taken in tick 7; a period 8 that shows 510, which the board refused, has missed them."""
+    replies = iter([SetPointsTaken(7, 0), Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)])
+    shown = Snapshot(8, 0, ((1, JointReading(510, 2089, 0, 0)),))
+    controller = controller_that(lambda request: next(replies) if isinstance(request, WriteSetPoints) else shown)
+    controller.set_points({1: 500})
+    with pytest.raises(RequestRefusedError):
+        controller.set_points({1: 510})
+    assert controller.next_snapshot().set_points_missed
+
+
+def test_set_points_travel_with_the_question_for_the_joints_asked_for() -> None:
+    asked: list[Request] = []
+
+    def answers(request: Request) -> Reply:
+        asked.append(request)
+        return (
+            SetPointsTaken(7, 0)
+            if isinstance(request, WriteSetPoints)
+            else Snapshot(
+                9, StatusFlag.FROZEN, ((2, JointReading(500, 2048, 0, 0)), (3, JointReading(501, 2052, 0, 0)))
+            )
+        )
+
+    found = controller_that(answers).next_snapshot(8, (2, 3), {3: 501, 2: 500})
+    assert asked == [WriteSetPoints(((2, 500), (3, 501))), Sample(8, 0b110)]
+    assert (found.tick, found.flags, found.missing_before) == (9, StatusFlag.FROZEN, 0)
+    assert (found.set_points, found.consistent_by, found.tick_is_estimate) == ({2: 500, 3: 501}, "sample", False)
+    assert not found.set_points_missed
+
+
+def test_the_next_sample_is_waited_for_where_none_is_named() -> None:
+    asked: list[Request] = []
+
+    def answers(request: Request) -> Reply:
+        asked.append(request)
+        return Snapshot(9, 0, ((1, JointReading(500, 2048, 0, 0)),))
+
+    controller = controller_that(answers)
+    assert controller.next_snapshot().missing_before == 0
+    assert asked == [Sample(AFTER_NEWEST, 0b111111)]
+    assert controller.counters.missing_samples == 0
+
+
+@pytest.mark.parametrize(("named", "sent"), [(None, 5), (3, 3)])
+def test_a_release_ends_the_newest_stop_unless_another_is_named(named: int | None, sent: int) -> None:
+    asked: list[Request] = []
+
+    def answers(request: Request) -> Reply:
+        asked.append(request)
+        return Released() if isinstance(request, Release) else Status(7, 0, 3, 0, 5)
+
+    controller_that(answers).release(named)
+    assert asked[-1] == Release(sent)
+
+
+def test_a_release_takes_the_control_back_from_another_host() -> None:
+    refused = iter([True])
+    asked: list[Request] = []
+
+    def answers(request: Request) -> Reply:
+        asked.append(request)
+        if isinstance(request, Release):
+            return Refused(Release.OPCODE, Refusal.BAD_SESSION) if next(refused, False) else Released()
+        return Status(7, 0, 3, 0, 5)
+
+    controller_that(answers).release()
+    assert [request for request in asked if isinstance(request, Release)] == [Release(5), Release(5)]
+
+
+@pytest.mark.parametrize("reason", [Refusal.OTHER_STOP, Refusal.FROZEN])
+def test_a_release_that_is_refused_for_another_reason_is_not_tried_again(reason: Refusal) -> None:
+    controller = controller_that(
+        lambda request: Refused(Release.OPCODE, reason) if isinstance(request, Release) else Status(7, 0, 3, 0, 5)
+    )
+    with pytest.raises(RequestRefusedError):
+        controller.release()
+    assert controller.counters.refused == 1
+
+
+def test_the_status_is_that_of_board_and_link() -> None:
+    status = controller_that(lambda _: Status(70, 5, 3, 9, 4)).status()
+    assert (status.tick, status.flags, status.boots, status.missed, status.stop) == (
+        70,
+        StatusFlag.FROZEN | StatusFlag.SET_POINT_MISSED,
+        3,
+        9,
+        4,
+    )
+    assert (status.link, status.counters.requests) == (LinkState.CONNECTED, 2)
+
+
+def test_the_identity_is_what_the_greeting_says() -> None:
+    simulated = HelloReply(2, Capability.SAMPLE | Capability.SIMULATED, 15_000, 8, 3, 0, 7)
+    own = controller_that(lambda _: None, simulated)
+    identity = own.identity
+    assert (identity.version, identity.period_s, identity.ring_depth, identity.boots) == (2, 0.015, 8, 3)
+    assert (identity.simulated, identity.restarted, own.period_s) == (True, False, 0.015)
+    assert not controller_that(lambda _: None).identity.simulated
+
+
+def test_outputs_and_gripper_are_asked_for_as_given() -> None:
+    asked: list[Request] = []
+    replies: dict[type[Request], Reply] = {WriteOutputs: OutputsWritten(), SetGripper: GripperSet()}
+
+    def answers(request: Request) -> Reply:
+        asked.append(request)
+        return replies.get(type(request), Process(1, 2, 1))
+
+    controller = controller_that(answers)
+    controller.write_outputs(0b11, 0b01)
+    controller.set_gripper(closed=True)
+    controller.set_gripper(closed=False)
+    assert asked == [WriteOutputs(0b11, 0b01), SetGripper(1), SetGripper(0)]
+    assert controller.process() == Process(1, 2, 1)
+
+
+def test_values_that_may_be_torn_are_read_for_the_joints_asked_for() -> None:
+    asked: list[Request] = []
+    reading = JointReading(500, 2048, 3, 6)
+
+    def answers(request: Request) -> Reply:
+        asked.append(request)
+        return ErrorsPositionsPowers(((2, reading),))
+
+    assert controller_that(answers).errors_positions_powers((2,)) == {2: reading}
+    assert asked == [ReportErrorsPositionsPowers(0b10)]
+
+
+def test_a_stop_s_confirmation_says_where_the_arm_was_frozen() -> None:
+    confirmation = controller_that(lambda _: Stopped(7, (1, 2, 3, 4, 5, 6))).stop()
+    assert (confirmation.sent, confirmation.acknowledged, confirmation.tick) == (True, True, 7)
+    assert confirmation.frozen == {1: 1, 2: 2, 3: 3, 4: 4, 5: 5, 6: 6}
+    assert confirmation.problem is None
+
+
+def test_the_frozen_set_points_are_due_in_the_period_after_the_stop_s() -> None:
+    """505 from period 8 on; period 7 may still show the old ones."""
+    for tick, missed in ((7, False), (8, True)):
+        controller = snapshots_of(Snapshot(tick, 0, ((1, JointReading(500, 2048, 0, 0)),)))
+        controller.set_points({1: 500})
+        controller.stop()
+        assert controller.next_snapshot().set_points_missed is missed

@@ -98,6 +98,17 @@ def test_readings_that_meet_the_change_of_the_memory_move_a_quarter_of_a_period_
     assert moved == pytest.approx([100.0 + 3.25 * PERIOD_S, 100.0 + 4.25 * PERIOD_S])
 
 
+def test_periods_that_have_moved_later_end_later() -> None:
+    bench = Bench()
+    bench.sampling.next(None, (1,), {})
+    bench.reader.disturbed = True
+    bench.sampling.next(1, (1,), {})
+    bench.reader.disturbed = False
+    bench.clock.time = 100.0 + 5.1 * PERIOD_S
+    late = bench.sampling.next(2, (1,), {})
+    assert (late.tick, late.missing_before) == (4, 1), "period 5 begins at 5.25"
+
+
 def test_a_period_without_a_reading_is_left_out_and_ten_in_a_row_are_an_error() -> None:
     bench = Bench()
     bench.reader.unreadable = 9

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from random import Random
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +13,13 @@ from daq.link.counters import Tally
 from daq.link.pending import SEQUENCE_NUMBERS, PendingReplies
 from daq.link.timing import HELLO_RETRIES, RETRIES
 from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Advance,
+    Advanced,
     Block,
+    Capability,
+    Hello,
+    HelloReply,
     ReadBlock,
     ReadStatus,
     Refusal,
@@ -224,6 +232,167 @@ def test_when_the_numbers_come_round_one_that_still_waits_is_passed_over() -> No
     for _ in range(SEQUENCE_NUMBERS - 1):
         pending.forget(pending.begin(ReadStatus()))
     assert (waiting.sequence, pending.begin(ReadStatus()).sequence) == (0, 1)
+
+
+def test_numbers_follow_each_other_round_the_circle_from_the_first() -> None:
+    pending = PendingReplies(Tally(), first=SEQUENCE_NUMBERS + 0xFFFE)
+    assert [pending.begin(ReadStatus()).sequence for _ in range(4)] == [0xFFFE, 0xFFFF, 0, 1]
+
+
+def test_a_second_reply_is_known_for_the_last_256_requests() -> None:
+    tally = Tally()
+    pending = PendingReplies(tally)
+    for _ in range(257):
+        assert pending.match(pending.begin(ReadStatus()).sequence, STATUS, 0.0) is not None
+    for sequence, counted in ((1, (0, 1)), (0, (1, 1)), (256, (1, 2))):
+        assert pending.match(sequence, STATUS, 0.0) is None
+        found = tally.snapshot(damaged=0)
+        assert (found.stale, found.duplicates) == counted
+
+
+def test_a_second_refusal_is_a_duplicate_too_and_another_reply_under_its_number_is_stale() -> None:
+    tally = Tally()
+    pending = PendingReplies(tally)
+    sequence = pending.begin(ReadStatus()).sequence
+    found = pending.match(sequence, Refused(ReadStatus.OPCODE, Refusal.FROZEN), 7.5)
+    assert found is not None
+    assert (found.answered_at, found.written, found.written_at, found.deadline) == (7.5, 0, 0.0, 0.0)
+    assert pending.match(sequence, Refused(ReadStatus.OPCODE, Refusal.FROZEN), 8.0) is None
+    assert pending.match(sequence, TAKEN, 8.0) is None
+    other = pending.begin(ReadStatus()).sequence
+    assert pending.match(other, Refused(WriteSetPoints.OPCODE, Refusal.FROZEN), 8.0) is None
+    counted = tally.snapshot(damaged=0)
+    assert (counted.duplicates, counted.stale, counted.requests) == (1, 2, 2)
+
+
+def greeted(*replies: HelloReply) -> HelloReply | None:
+    """What a greeting with nonce 5 takes for its answer."""
+    pending = PendingReplies(Tally())
+    sequence = pending.begin(Hello(PROTOCOL_VERSION, 5)).sequence
+    found = [pending.match(sequence, reply, 0.0) for reply in replies]
+    return next((one.reply for one in found if one is not None), None)  # type: ignore[return-value]
+
+
+def test_a_greeting_is_answered_by_its_own_nonce_or_by_another_version() -> None:
+    own = HelloReply(PROTOCOL_VERSION, Capability.SAMPLE, 20_000, 8, 3, 5, 7)
+    replayed = HelloReply(PROTOCOL_VERSION, Capability.SAMPLE, 20_000, 8, 3, 6, 7)
+    short = HelloReply(PROTOCOL_VERSION, Capability.SAMPLE, 20_000, 8, 3)
+    newer = HelloReply(PROTOCOL_VERSION + 1, Capability.SAMPLE, 20_000, 8, 3)
+    assert greeted(replayed, short, own) == own
+    assert greeted(newer) == newer
+    assert greeted(replayed, short) is None
+
+
+def test_in_lock_step_the_nonce_is_the_controller_s_time_so_that_a_run_repeats_to_the_bit() -> None:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        if isinstance(request, Advance):
+            return [(0.0, frame_of(sequence, Advanced(3 * 2**32 + 2**32 - 2, 0)))]
+        assert isinstance(request, Hello)
+        return [(0.0, frame_of(sequence, HelloReply(2, Capability.LOCK_STEP, 20_000, 0, 1, request.nonce, 7)))]
+
+    link, channel = scripted_link(answer, lock_step=True)
+    link.greet()
+    assert [type(request).__name__ for _, request in channel.asked] == ["Advance", "Hello"]
+    assert channel.asked[1][1] == Hello(2, 2**32 - 2)
+
+
+def test_a_controller_in_lock_step_that_knows_no_time_is_greeted_all_the_same() -> None:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        if isinstance(request, Advance):
+            return [(0.0, frame_of(sequence, Refused(Advance.OPCODE, Refusal.NOT_CAPABLE)))]
+        assert isinstance(request, Hello)
+        return [(0.0, frame_of(sequence, HelloReply(1, Capability.LOCK_STEP, 20_000, 0, 1)))]
+
+    link, _ = scripted_link(answer, lock_step=True)
+    assert link.greet().version == 1
+    assert link.counters.refused == 1
+
+
+class Chance(Random):
+    """Draws the largest number."""
+
+    def getrandbits(self, bits: int, /) -> int:
+        return (1 << bits) - 1
+
+
+def test_numbers_and_nonces_are_drawn_from_all_there_are() -> None:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, Hello)
+        return [(0.0, frame_of(sequence, HelloReply(2, Capability.SAMPLE, 20_000, 8, 1, request.nonce, 7)))]
+
+    channel = ScriptedChannel(answer)
+    link = Link(ScriptedEndpoint([channel]), now=channel.now, chance=Chance())
+    link.greet()
+    assert channel.asked == [(0xFFFF, Hello(2, 0xFFFFFFFF))]
+
+
+def test_a_refusal_among_several_is_counted_by_itself_and_the_link_stays_as_good_as_it_was() -> None:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        refused = Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)
+        return [(0.0, frame_of(sequence, refused if isinstance(request, WriteSetPoints) else right_reply(request)))]
+
+    link, _ = scripted_link(answer)
+    assert link.state is LinkState.CONNECTED
+    replies = link.exchange(WriteSetPoints(((1, 500),)), Sample(7, 1), WriteSetPoints(((1, 501),)))
+    assert [type(reply).__name__ for reply in replies] == ["Refused", "Snapshot", "Refused"]
+    assert (link.counters.refused, link.state) == (2, LinkState.CONNECTED)
+
+
+def test_a_link_that_answers_again_is_lost_no_longer_and_clean_after_a_hundred() -> None:
+    silent = iter([True] * (RETRIES + 1))
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        return [] if next(silent, False) else [(0.0, frame_of(sequence, STATUS))]
+
+    link, _ = scripted_link(answer)
+    with pytest.raises(LinkTimeoutError):
+        link.request(ReadStatus(), Status)
+    assert link.state is LinkState.LOST
+    link.request(ReadStatus(), Status)
+    assert link.state is LinkState.CONNECTED, "nothing had to be repeated since"
+    assert link.counters.timeouts == RETRIES + 1
+    assert link.counters.retries == RETRIES
+
+
+def test_after_a_reconnection_the_link_is_degraded_until_a_hundred_went_well() -> None:
+    def answer(sequence: int, _: Request) -> list[tuple[float, bytes]]:
+        return [(0.0, frame_of(sequence, STATUS))]
+
+    first, second = ScriptedChannel(answer), ScriptedChannel(answer)
+    link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
+    link.reconnect()
+    assert link.state is LinkState.DEGRADED
+    for _ in range(100):
+        assert link.state is LinkState.DEGRADED
+        link.request(ReadStatus(), Status)
+    assert link.state is LinkState.CONNECTED
+
+
+def test_reconnection_may_be_given_up_before_it_was_tried() -> None:
+    channel = ScriptedChannel(lambda _sequence, _request: [])
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    with pytest.raises(LinkLostError, match=r"^not connected again: not tried$"):
+        link.reconnect(_Waits(0))
+    assert link.counters.reconnections == 0
+
+
+def test_a_link_says_where_it_leads() -> None:
+    link, channel = scripted_link(lambda _sequence, _request: [])
+    assert (repr(link), link.url, link.bytes_per_second) == ("Link(script://, connected)", "script://", 11520.0)
+    assert (link.lock_step, link.control) == (False, None)
+    with link:
+        assert channel.broken is None
+    assert channel.broken == "closed"
+    with pytest.raises(LinkLostError, match="script: closed"):
+        link.request(ReadStatus(), Status)
+
+
+def test_a_sample_is_waited_for_as_long_as_the_controller_s_period_is() -> None:
+    link, channel = scripted_link(lambda _sequence, _request: [])
+    link.set_period(1.0)
+    with pytest.raises(LinkTimeoutError):
+        link.request(Sample(7, 1), Snapshot)
+    assert (RETRIES + 1) * 1.0 < channel.now() < (RETRIES + 1) * 1.1
 
 
 class _Waits:

@@ -19,14 +19,16 @@ class Written:
     def __init__(self) -> None:
         self.requests: list[str] = []
         self.during_release: Callable[[], Any] = lambda: None
+        self.released: int | None = None
         self.answer = StopConfirmation(sent=True, acknowledged=True, tick=7)
 
     def stop(self) -> StopConfirmation:
         self.requests.append("stop")
         return self.answer
 
-    def release(self, _stop: int | None = None) -> None:
+    def release(self, stop: int | None = None) -> None:
         self.requests.append("release")
+        self.released = stop
         self.during_release()
 
 
@@ -74,6 +76,54 @@ def test_only_a_reset_ends_a_halt() -> None:
     assert control.halted is None
     control.handle(Event.ARM)
     assert control.arm.state is State.ARMED
+
+
+@pytest.mark.parametrize("stop", [7, None])
+def test_a_reset_ends_the_stop_that_it_names(stop: int | None) -> None:
+    control, written = make()
+    control.stop("now")
+    assert control.handle(Event.RESET, stop=stop) is None
+    assert written.released == stop
+
+
+def test_what_became_of_a_freeze_is_the_answer_to_what_asked_for_it() -> None:
+    control, written = make()
+    assert control.handle(Event.ARM) is None
+    assert control.handle(Event.TRIP) is written.answer
+    assert (control.halted, control.arm.cause) == ("trip", "guard tripped")
+    assert control.stop("now") is written.answer
+    assert control.halted == "trip"
+
+
+def test_a_trip_that_says_why_is_halted_by_that() -> None:
+    control, _ = make()
+    control.handle(Event.TRIP, "joint 2 strayed")
+    with pytest.raises(StoppedError, match=r"^the arm has been stopped: joint 2 strayed$") as caught:
+        control.handle(Event.ARM)
+    assert (caught.value.cause, caught.value.exit_code) == ("joint 2 strayed", 6)
+
+
+def test_after_a_reset_an_error_freezes_anew() -> None:
+    control, written = make()
+    control.stop("now")
+    control.handle(Event.RESET)
+    written.requests.clear()
+    with pytest.raises(RuntimeError), control.frozen_on_error():
+        raise RuntimeError("a bug")
+    assert written.requests == ["stop"]
+    assert (control.halted, control.arm.cause) == ("RuntimeError: a bug", "RuntimeError: a bug")
+
+
+def test_an_arm_that_was_stopped_names_its_own_cause_when_the_run_ends() -> None:
+    control, _ = make()
+    with pytest.raises(StoppedError), control.frozen_on_error():
+        raise StoppedError("by anna")
+    assert control.halted == "by anna"
+
+
+def test_an_arm_that_has_just_been_connected_is_idle() -> None:
+    control, written = make()
+    assert (control.arm.state, control.halted, written.requests) == (State.IDLE, None, [])
 
 
 def test_the_first_cause_is_kept() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from daq.driver import GainsNotTakenError
+from daq.runner import StoppedError
 from daq.traces.reader import read_trace
 from tests.daq.runner.rig import SHORT, Rig
 
@@ -21,6 +24,7 @@ def test_gains_hold_for_the_run_and_are_put_back_after_it(arm: Rig) -> None:
         "joint 1: gains 4/0/0 for this run, 2/0/0 before"
     ]
     assert arm.ask("state")["gains"] == before
+    assert [(event.time, event.tick) for event in trace.events if event.kind == "gains"] == [(0.0, None)]
 
 
 def test_gains_that_cannot_be_put_back_are_a_fault(arm: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,6 +42,36 @@ def test_gains_that_cannot_be_put_back_are_a_fault(arm: Rig, monkeypatch: pytest
     assert arm.ask("state")["frozen"]
     assert (result.outcome, read_trace(result.trace).record.outcome) == ("fault", "fault")
     assert result.reason.startswith("the plan was carried out, but its gains could not be put back: joint 1: gains")
+
+
+def test_a_wish_to_end_before_the_gains_are_written_leaves_them_as_they_are(arm: Rig, tmp_path: Path) -> None:
+    before = arm.ask("state")["gains"]
+    arm.wants_end = "the parent has gone"
+    with pytest.raises(StoppedError, match="the parent has gone"):
+        arm.run(STIFF)
+    state = arm.ask("state")
+    assert (state["gains"], state["frozen"]) == (before, True)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wish_to_end_before_the_gains_are_put_back_is_a_stop(arm: Rig) -> None:
+    def end(fraction: float) -> None:
+        arm.wants_end = "the parent has gone" if fraction == 1.0 else None
+
+    arm.ears.at_progress = end
+    result = arm.run(STIFF)
+    state = arm.ask("state")
+    assert (result.outcome, result.reason, state["frozen"]) == ("stopped", "the parent has gone", True)
+    assert state["gains"][0] == [4, 0, 0]
+
+
+def test_gains_of_several_joints_are_set_in_the_order_of_the_joints(arm: Rig) -> None:
+    both = SHORT.model_copy(update={"gains": {3: (5, 1, 0), 1: (4, 0, 0)}})
+    trace = read_trace(arm.run(both).trace)
+    assert [event.message.partition(" for")[0] for event in trace.events if event.kind == "gains"] == [
+        "joint 1: gains 4/0/0",
+        "joint 3: gains 5/1/0",
+    ]
 
 
 def test_after_a_stop_the_gains_stay_and_the_trace_says_so(arm: Rig) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +101,8 @@ def test_repeated_requests_are_told_once_each(tmp_path: Path) -> None:
     told = [int(event.message.split()[0]) for event in read_trace(result.trace).events if event.kind == "retry"]
     assert len(told) >= 3
     assert 0 < sum(told) <= result.counters["retries"]
+    ticks = [event.tick for event in arm.ears.events if event.kind == "retry"]
+    assert all(tick is not None and tick % 50 == 0 for tick in ticks), "looked at once a second"
 
 
 def test_a_stop_on_the_way_to_the_start_leaves_a_frozen_arm_and_no_trace(arm: Rig, tmp_path: Path) -> None:
@@ -281,6 +286,82 @@ def test_a_disk_that_fills_up_freezes_the_arm_and_says_where_the_rest_is(
     assert arm.ask("state")["frozen"]
 
 
+AT_THE_START = pytest.mark.parametrize(
+    ("happens", "error", "line"),
+    [
+        (lambda arm: arm.stop_as_the_guardian_does(), StoppedError, "move to the start .* on request"),
+        (lambda arm: arm.ask("brown_out"), RunFaultError, "move to the start .* restarted"),
+        (lambda arm: arm.ask("disconnect"), RunFaultError, "move to the start .* emergency stop"),
+    ],
+    ids=["stop", "restart", "lost"],
+)
+
+
+@AT_THE_START
+def test_what_ends_the_wait_for_a_joint_to_arrive(
+    arm: Rig, tmp_path: Path, happens: Callable[[Rig], object], error: type[Exception], line: str
+) -> None:
+    """The way is so short that a stalled joint is missed only after it."""
+    near = SHORT.model_copy(update={"start": {1: math.radians(185)}})
+    arm.ask("fault_on", fault="stalled_joint:joint=1")
+
+    def at_the_end() -> None:
+        arm.ears.at_event["note"] = lambda: happens(arm)
+
+    arm.ears.at_event["note"] = at_the_end
+    with pytest.raises(error, match=line):
+        arm.run(near)
+    arm.ask("reconnect")
+    assert [event.message for event in arm.ears.events][:2] == ["slow move starts", "slow move ends"]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("what", "told"), [("brown_out", "restart"), ("disconnect", "link_lost")])
+def test_what_happens_after_a_stop_is_recorded_as_far_as_the_arm_answers(arm: Rig, what: str, told: str) -> None:
+    arm.ears.at_sample[12] = arm.stop_as_the_guardian_does
+    arm.ears.at_sample[20] = lambda: arm.ask(what)
+    result = arm.run()
+    arm.ask("reconnect")
+    trace = read_trace(result.trace)
+    kinds = [event.kind for event in trace.events]
+    assert (result.outcome, kinds[-1]) == ("stopped", told)
+    assert "stop" in kinds
+    assert 20 <= len(trace) <= 22
+    assert result.missing == 0
+
+
+def test_progress_is_told_from_the_first_set_point_to_the_last(arm: Rig) -> None:
+    fractions: list[float] = []
+    arm.ears.at_progress = fractions.append
+    arm.run()
+    assert (fractions[:2], fractions[-1]) == ([0.0, 0.0], 1.0)
+    assert np.diff(fractions[1:]) == pytest.approx(1 / (len(fractions) - 2), abs=1e-9)
+    assert (arm.ears.texts[0], arm.ears.texts[1], arm.ears.texts[-1]) == (
+        "moving to the start",
+        "0.0 of 0.5 s",
+        "0.5 of 0.5 s",
+    )
+
+
+def test_progress_of_a_long_motion_is_told_some_two_hundred_times(arm: Rig) -> None:
+    arm.run(ExperimentSpec(trajectory=Pause(duration=8.08), settle=0, hold=0))
+    assert 200 <= len(arm.ears.texts) <= 206
+    assert arm.ears.texts[-1] == "8.1 of 8.1 s"
+
+
+def test_the_trace_says_when_and_by_what_it_was_made(arm: Rig) -> None:
+    begun = datetime.now(UTC)
+    result = arm.run()
+    record = read_trace(result.trace).record
+    assert begun <= record.created <= datetime.now(UTC)
+    assert record.software == f"ma2000-daq {version('ma2000-daq')}"
+    assert record.drive_unit == "V"
+    assert record.clock is not None
+    assert record.clock["utc"] == record.created.timestamp()
+    assert {"monotonic", "controller_clock"} < record.clock.keys()
+    assert record.trace_id[:6] in result.trace.name
+
+
 def test_an_arm_at_its_start_already_needs_no_move(arm: Rig) -> None:
     still = ExperimentSpec(trajectory=Pause(duration=0.1), settle=0, hold=0)
     assert arm.run(still).outcome == "complete"
@@ -319,12 +400,15 @@ def test_limits_that_are_not_set_are_not_zero(arm: Rig) -> None:
 
 def test_a_slow_line_moves_to_the_start_all_the_same(tmp_path: Path) -> None:
     spec = ExperimentSpec(trajectory=Pause(duration=0.2), joints=(1,), settle=0, hold=0, start={1: math.radians(190)})
+    missed: list[int] = []
     with rig(tmp_path, "seed=5&baud=19200") as arm:
+        arm.ears.at_event["start"] = lambda: missed.append(arm.controller.counters.missing_samples)
         result = arm.run(spec)
     trace = read_trace(result.trace)
     assert result.outcome == "complete"
     assert trace.joints == (1,)
     assert math.degrees(trace.position[0, 0]) == pytest.approx(190, abs=1)
+    assert missed == [0], "a move takes the newest sample, and misses none of those it passes over"
 
 
 def signals(arm: Rig, spec: ExperimentSpec) -> list[np.ndarray]:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from daq.contracts.errors import DaqError, SafetyError, SpecError, TraceError
-from daq.contracts.experiment import ExperimentSpec, Ramp
+from daq.contracts.experiment import ExperimentSpec, Pause, Ramp
+from daq.contracts.machine import Machine
+from daq.driver import Controller
 from daq.runner import Consent, MissingConsentError
+from daq.runner.preparation import recorded_joints
 from tests.daq.runner.rig import SHORT, Rig
 
 OTHER_GAINS = SHORT.model_copy(update={"gains": {1: (9, 9, 9)}})
@@ -50,6 +55,70 @@ def test_a_real_arm_moves_with_consent_and_its_trace_says_real(arm: Rig) -> None
     assert arm.trace(result).record.source == "real"
 
 
+def test_one_line_tells_how_many_more_there_are(arm: Rig) -> None:
+    """Joints 2 and 3 would both be too fast, and joint 1 alone."""
+    fast = Ramp(amplitude=math.radians(40), duration=0.2)
+    only_one = SHORT.model_copy(update={"trajectory": fast, "joints": (1,), "gains": {}})
+    with pytest.raises(SafetyError) as alone:
+        arm.run(only_one)
+    with pytest.raises(SafetyError) as two:
+        arm.run(only_one.model_copy(update={"joints": (1, 4)}))
+    assert "more)" not in str(alone.value)
+    assert "(and 1 more); nothing moved" in str(two.value)
+
+
+@pytest.mark.parametrize(("ms", "allowed"), [(19.81, True), (20.19, True), (19.79, False), (20.21, False)])
+def test_a_period_may_differ_from_the_machine_files_by_a_hundredth(arm: Rig, ms: float, allowed: bool) -> None:
+    period = arm.machine.controller.period.model_copy(update={"value": ms * 1e-3})
+    machine = arm.machine.model_copy(
+        update={"controller": arm.machine.controller.model_copy(update={"period": period})}
+    )
+    if allowed:
+        assert arm.run(machine=machine).outcome == "complete"
+    else:
+        with pytest.raises(SafetyError, match="speeds would be wrong"):
+            arm.run(machine=machine)
+
+
+def test_an_arm_may_be_nearly_as_far_from_its_set_point_as_the_limit(arm: Rig) -> None:
+    arm.ask("fault_on", fault="stalled_joint:joint=3")
+    arm.controller.set_points({3: arm.controller.next_snapshot()[3].set_point + 15})
+    arm.controller.next_snapshot()
+    away = abs(arm.controller.next_snapshot()[3].error)
+    still = ExperimentSpec(trajectory=Pause(duration=0.04), settle=0, hold=0)
+
+    def within(counts: int) -> Machine:
+        own = arm.machine.limits.model_copy(update={"following_error_counts": counts})
+        return arm.machine.model_copy(update={"limits": own})
+
+    few = 4  # more than the readings' noise
+    with pytest.raises(SafetyError, match=rf"^joint 3 is -?\d+ ADC counts from its set point, .*±{away - few}:"):
+        arm.run(still, machine=within(away - few))
+    assert arm.run(still, machine=within(away + few)).outcome == "complete"
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a chosen rate, with a controller of 20 ms behind it."""
+
+    bytes_per_second: float
+    period_s: float = 0.02
+
+    @property
+    def link(self) -> Line:
+        return self
+
+
+def test_all_joints_are_recorded_where_they_take_no_more_than_the_lines_share() -> None:
+    """61 + 9n bytes for n joints, as PROTOCOL.md counts them: 115 for all six, of 60 % of what the line carries."""
+    least = 115 / 0.02 / 0.6
+    spec = ExperimentSpec(joints=(1, 3))
+    for rate, joints in ((least + 1, (1, 2, 3, 4, 5, 6)), (least - 1, (1, 3))):
+        assert recorded_joints(cast(Controller, Line(rate)), spec) == joints
+    wanted = spec.model_copy(update={"record": (1, 3, 5)})
+    assert recorded_joints(cast(Controller, Line(1.0)), wanted) == (1, 3, 5)
+
+
 def test_an_arm_that_was_stopped_by_another_host(arm: Rig) -> None:
     arm.controller.stop()
     refused(arm, SafetyError, r"has been stopped .* `daq reset`")
@@ -63,9 +132,12 @@ def test_an_arm_that_is_not_where_its_controller_holds_it(arm: Rig) -> None:
     refused(arm, SafetyError, r"joint 1 is \d+ ADC counts from its set point, allowed are ±127.*blocked")
 
 
-def test_an_arm_with_a_joint_without_drive_is_refused(arm: Rig) -> None:
-    arm.controller.set_gains(2, 0, 5, 5)
-    refused(arm, SafetyError, r"joints 2 have gain P = 0 and no drive: support the arm, then `daq gains set` them")
+@pytest.mark.parametrize("joint", [1, 2, 6])
+def test_an_arm_with_a_joint_without_drive_is_refused(arm: Rig, joint: int) -> None:
+    arm.controller.set_gains(joint, 0, 5, 5)
+    without = SHORT if joint == 1 else OTHER_GAINS
+    line = rf"joints {joint} have gain P = 0 and no drive: support the arm, then `daq gains set` them"
+    refused(arm, SafetyError, line, without)
 
 
 def test_an_experiment_that_would_take_a_joints_drive(arm: Rig) -> None:

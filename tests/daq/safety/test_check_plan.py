@@ -75,6 +75,68 @@ def test_a_step_is_judged_by_its_size_and_not_by_its_speed() -> None:
     )
 
 
+def test_every_posture_from_0_to_999_may_be_sent() -> None:
+    unit = 1.5 * math.pi / 1000
+    lowest = MA2000.calibration(1).posture_to_rad(0)
+    assert check_plan(plan_of(1, lowest, lowest + 999 * unit), MA2000, Limits()) == []
+    (below,) = check_plan(plan_of(1, math.pi, lowest - unit), MA2000, Limits())
+    (above,) = check_plan(plan_of(1, math.pi, lowest + 1000 * unit), MA2000, Limits())
+    assert [(v.rule, v.joint, v.value, v.limit) for v in (below, above)] == [
+        ("posture", 1, -1, 0),
+        ("posture", 1, 1000, 999),
+    ]
+    assert [v.time for v in (below, above)] == [0.02, 0.02]
+
+
+def test_an_angle_may_lie_half_a_posture_unit_and_a_rounding_outside() -> None:
+    slack = math.pi / 1000 / 2 + 1e-9
+    for joint_limits, side in ((JointLimits(high=0.0), 1), (JointLimits(low=0.0), -1)):
+        own = Limits(joints=(*[JointLimits()] * 3, joint_limits))
+        assert check_plan(plan_of(4, side * slack), MA2000, own) == []
+        (found,) = check_plan(plan_of(4, side * math.nextafter(slack, 1)), MA2000, own)
+        assert (found.rule, found.joint, found.time, found.limit) == ("range", 4, 0.0, 0.0)
+        side_said = "any to 0.00°" if side > 0 else "0.00° to any"
+        assert str(found).endswith(f"allowed are {side_said}")
+
+
+def test_the_largest_speed_and_the_largest_step_are_allowed() -> None:
+    own = Limits(joints=(*[JointLimits()] * 3, JointLimits(speed=0.5)), following_error_counts=112)
+    change = 0.5 * 0.02 + 1e-9
+    assert check_plan(plan_of(4, 0.0, change), MA2000, own) == []
+    (found,) = check_plan(plan_of(4, 0.0, math.nextafter(change, 1)), MA2000, own)
+    assert (found.rule, found.joint, found.time, found.limit) == ("speed", 4, 0.0, 0.5)
+    step = 100 * math.pi / 4096 + 1e-9
+    assert check_plan(plan_of(4, 0.0, step, jumps=True), MA2000, own) == []
+    (found,) = check_plan(plan_of(4, 0.0, math.nextafter(step, 1), jumps=True), MA2000, own)
+    assert (found.rule, found.joint, found.time) == ("step", 4, 0.02)
+
+
+def test_a_step_of_one_count_is_always_allowed() -> None:
+    for limit in (1, 12, 13):
+        assert largest_step(MA2000, Limits(following_error_counts=limit), 4) == pytest.approx(math.pi / 4096)
+    assert largest_step(MA2000, Limits(following_error_counts=14), 4) == pytest.approx(2 * math.pi / 4096)
+
+
+def test_set_points_are_subdivided_where_they_are_more_than_a_degree_apart() -> None:
+    """The arm reaches furthest when its forearm is straight: between these set points."""
+    straight = float(np.linalg.norm(link_ends(MA2000, plan_of(3, 0.0).angles), axis=2).max())
+
+    def passing(degrees: float) -> list[str]:
+        way = plan_of(3, -math.radians(degrees) / 2, math.radians(degrees) / 2)
+        return [f"{v.rule} {v.joint} {v.time:.2f}" for v in check_plan(way, MA2000, Limits(reach=straight - 1e-7))]
+
+    assert passing(0.99) == []
+    assert passing(1.01) == ["reach 3 0.01"]
+
+
+def test_an_arm_beyond_its_reach_may_come_back_but_not_go_further() -> None:
+    near, far = math.radians(60), math.radians(30)
+    reach = Limits(reach=float(np.linalg.norm(link_ends(MA2000, plan_of(3, math.radians(90)).angles), axis=2).max()))
+    assert [v.rule for v in check_plan(plan_of(3, near), MA2000, reach)] == ["reach"]
+    assert check_move_to_start(plan_of(3, near, math.radians(90)), MA2000, reach) == []
+    assert [v.rule for v in check_move_to_start(plan_of(3, near, far), MA2000, reach)] == ["reach"]
+
+
 def test_a_joint_of_smaller_range_may_make_smaller_steps() -> None:
     assert largest_step(MA2000, LIMITS, 4) == pytest.approx(largest_step(MA2000, LIMITS, 1) / 1.5)  # type: ignore[operator]
     assert largest_step(MA2000, Limits(), 1) is None
@@ -84,6 +146,8 @@ def test_a_link_below_the_floor_is_a_violation() -> None:
     way = np.linspace(REST[1], math.radians(-44), 501)
     (found,) = check_plan(plan_of(2, *way), MA2000, LIMITS)
     assert str(found) == "end of link 3: height of -315 mm at 10.00 s: allowed are -300 mm and above"
+    assert (found.rule, found.joint, found.limit) == ("floor", 3, -0.3)
+    assert (found.value, found.time) == (pytest.approx(-0.315, abs=5e-4), pytest.approx(10.0))
 
 
 def test_a_link_beyond_the_reach_is_a_violation() -> None:
@@ -91,6 +155,8 @@ def test_a_link_beyond_the_reach_is_a_violation() -> None:
     assert check_plan(plan_of(3, *way), MA2000, limits(reach=0.4545)) == []
     (found,) = check_plan(plan_of(3, *way), MA2000, limits(reach=0.45))
     assert str(found) == "end of link 3: 454 mm from the base at 10.00 s: allowed are up to 450 mm"
+    assert (found.rule, found.joint, found.limit) == ("reach", 3, 0.45)
+    assert (found.value, found.time) == (pytest.approx(0.454, abs=5e-4), pytest.approx(10.0))
 
 
 def test_the_floor_is_watched_between_set_points_too() -> None:
@@ -112,6 +178,7 @@ def test_not_a_number_is_refused(bad: float) -> None:
     angles[2, 4] = bad
     (found,) = check_plan(dataclasses.replace(good, angles=angles), MA2000, LIMITS)
     assert str(found) == f"joint 5: set point of {bad} rad at 0.04 s: must be finite"
+    assert (found.joint, found.time) == (5, pytest.approx(0.04))
     assert check_move_to_start(dataclasses.replace(good, angles=angles), MA2000, LIMITS)[0].rule == "finite"
 
 
@@ -126,6 +193,7 @@ def test_limits_that_are_not_set_are_not_checked_and_said_to_be_so() -> None:
         "following_error_counts not set, not checked",
         "following_error_time not set, not checked",
     ]
+    assert unchecked(MA2000, Limits())[0] == "joint 1: low, high, speed not set, not checked"
     assert unchecked(MA2000, LIMITS) == ["reach not set, not checked"]
 
 

@@ -9,10 +9,13 @@ from hypothesis import strategies as st
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
+from daq.contracts.sample import SampleRow
 from daq.safety import RestGuards, RunningGuards, Verdict
-from daq.safety.findings import Finding
+from daq.safety.findings import Finding, Watched
+from daq.safety.following_error import FollowingError
 from daq.trajectories import plan, start_angles
 from firmware_protocol.commands import StatusFlag
+from firmware_protocol.units import JointCalibration
 from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, row
 
 REST_POSTURES = {1: 500, 2: 333, 3: 500}
@@ -43,6 +46,60 @@ def test_they_go_on_when_it_is_back_inside() -> None:
     verdict = guards.check(row(2, error=(127, 0, 0)), {})
     assert not verdict.hold
     assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points go on after 0.04 s")]
+
+
+def test_a_pause_is_counted_from_the_period_in_which_it_began() -> None:
+    guards = running()
+    assert guards.check(row(100, error=(0, -130, 0)), {}).findings == (
+        Finding("pause", "joint 2: positional error of -130 ADC counts, set points pause outside ±127", 2),
+    )
+    assert guards.check(row(103), {}).findings[-1].message == "set points go on after 0.06 s"
+
+
+def test_a_set_point_may_be_exactly_as_far_from_the_arm_as_the_limit() -> None:
+    """A joint of 4 rad has 1024 counts a rad, so that nothing is rounded here."""
+    watched = Watched((1,), (JointCalibration(1, 4.0, 0.0),), 0.02, Limits(following_error_counts=127))
+    for counts, held in ((127, False), (128, True), (-127, False), (-128, True)):
+        at = 2.0 - counts / 1024
+        sample = SampleRow(0, 0.0, 0.0, (at,), (at,), (0.0,), (0.0,), (0,), 0)
+        verdict = FollowingError(watched).check(sample, {1: 500})
+        assert verdict.hold is held
+        assert [f.joint for f in verdict.findings] == [1] * held
+
+
+def test_joints_that_are_not_sent_anything_do_not_hide_those_behind_them() -> None:
+    verdict = running().check(row(0), {2: REST_POSTURES[2] + 40, 3: 500})
+    (finding,) = verdict.findings
+    assert verdict.hold
+    assert (finding.kind, finding.joint) == ("pause", 2)
+    assert finding.message.startswith("joint 2: next set point is 16")
+    (missed,) = running().check(row(4), {}, expected={3: 510}).findings
+    assert missed.message == "joint 3: tick 4 took posture 500, sent was 510"
+
+
+def test_a_run_of_missed_set_points_begins_anew_after_one_that_was_taken() -> None:
+    guards = running()
+    missed = [True] * 10 + [False] + [True] * 11
+    trips = [
+        guards.check(row(tick, status=StatusFlag.SET_POINT_MISSED if one else 0), {}).trips
+        for tick, one in enumerate(missed)
+    ]
+    assert [tick for tick, trip in enumerate(trips) if trip] == [21]
+    assert trips[21] == ("11 set points missed in a row, allowed are 10",)
+
+
+def test_a_missed_set_point_says_in_which_period() -> None:
+    (finding,) = running().check(row(9, status=StatusFlag.SET_POINT_MISSED), {}).findings
+    assert finding.message == "tick 9: the controller wanted the memory while the host had it"
+
+
+def test_the_end_of_a_gap_is_judged_by_its_own_tick() -> None:
+    guards = running()
+    guards.check(row(5), {})
+    guards.check(row(15), {})
+    assert guards.check(row(16), {}) == Verdict()
+    (trip,) = guards.check(row(16), {}).trips
+    assert trip == "stale sample: tick 16 came twice"
 
 
 def test_a_pause_that_lasts_is_a_fault() -> None:
@@ -130,6 +187,7 @@ def test_a_slow_arm_makes_the_plan_wait_and_still_gets_it_all() -> None:
         ((5, 5), ("stale sample: tick 5 came twice",)),
         ((5, 3), ("the board has restarted: tick 3 after 5",)),
         ((5, 9), ()),
+        ((5, 15), ()),
         ((5, 16), ("10 control periods between ticks 5 and 16 have no sample; allowed are gaps up to 0.2 s",)),
     ],
 )

@@ -51,6 +51,20 @@ def test_each_event_leads_to_its_state_and_actions(before: State, event: Event) 
             advance(UP[before], event)
 
 
+@pytest.mark.parametrize("before", [State.ARMED, State.RUNNING])
+def test_an_arm_whose_link_was_lost_is_reset_as_one_that_is_not_there(before: State) -> None:
+    lost, _ = advance(UP[before], Event.LINK_LOST)
+    assert lost == Arm(State.FAULT, connected=False, cause="link lost")
+    assert advance(lost, Event.RESET) == (Arm(State.DISCONNECTED, connected=False, cause="link lost"), ())
+    back, actions = advance(lost, Event.CONNECTED)
+    assert (back, actions) == (Arm(State.FAULT, connected=True, cause="link lost"), (Action.FREEZE,))
+
+
+def test_a_stop_without_a_reason_was_on_request() -> None:
+    assert advance(UP[State.IDLE], Event.STOP)[0].cause == "on request"
+    assert advance(UP[State.IDLE], Event.TRIP)[0].cause == "guard tripped"
+
+
 def test_a_refusal_says_what_to_do() -> None:
     with pytest.raises(IllegalEventError, match=r"^cannot start while idle: arm first$"):
         advance(UP[State.IDLE], Event.START)

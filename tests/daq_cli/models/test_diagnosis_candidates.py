@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from daq_cli.models.diagnosis_text import candidates_lines
-from model.discrepancy.diagnosis import Candidate, Step, Where
-
-WHERE = Where(joint=None, phase=None, summary="", cells=(), dependences=())
+from model.discrepancy.diagnosis import Candidate, Step
+from tests.model.discrepancy import steps
 
 
 def fitted(effect: str, evidence: float) -> Candidate:
@@ -17,18 +16,7 @@ def probed(effect: str, evidence: float) -> Candidate:
 
 
 def step(effect: str, *candidates: Candidate) -> Step:
-    return Step(
-        effect=effect,
-        joints=(1,),
-        parameters={},
-        evidence=0.0,
-        margin=0.0,
-        candidates=candidates,
-        rmse_fit=(),
-        where=WHERE,
-        reason="",
-        adopted=True,
-    )
+    return steps.step(effect, candidates=candidates)
 
 
 def test_probes_stand_below_what_was_fitted_however_much_they_promise() -> None:

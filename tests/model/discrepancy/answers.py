@@ -16,7 +16,6 @@ from model.discrepancy.diagnosis import (
     GapStage,
     NextExperiment,
     SignalError,
-    Step,
 )
 from model.discrepancy.explanation.reasons import reason
 from model.discrepancy.explanation.renderer import with_sentences
@@ -28,6 +27,7 @@ from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from tests.model.discrepancy.motions import trace_of
+from tests.model.discrepancy.steps import step
 from tests.model.fitting import imagined
 
 EFFECT = "coulomb_friction"
@@ -59,9 +59,9 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
     )
     speaks = reason(EFFECT, (2,), {NAME: value}, model=after, before=before, records=records, rival=candidates[1])
     comparison = compare([("before", before), ("after", after)], [fit, held], [held.record.trace_id])
-    step = Step(
-        effect=EFFECT,
-        joints=(2,),
+    taken = step(
+        EFFECT,
+        (2,),
         parameters={NAME: value},
         evidence=2410.0,
         margin=520.0,
@@ -72,9 +72,7 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
         sum_lambda2_before=0.31,
         sum_lambda2_after=1.42,
         where=locate(left),
-        reason=UNWRITTEN,
         reason_data=speaks,
-        adopted=True,
     )
     asked = NextExperiment(
         name="slow reversals on joint 2",
@@ -87,7 +85,7 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
     answer = Diagnosis(
         verdict="named",
         summary=UNWRITTEN,
-        steps=(step,),
+        steps=(taken,),
         remaining=remaining_shapes(left),
         next_experiment=asked,
         model_before=before,

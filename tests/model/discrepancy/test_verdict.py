@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from model.discrepancy.diagnosis import Candidate, SignalError, Step, Where
+from model.discrepancy.diagnosis import Candidate, SignalError
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.verdict import first_to_withdraw, rises_too_much, unexplained, verdict, withdrawn
+from tests.model.discrepancy.steps import step
 
 LINES = Thresholds(unexplained=0.3, unnamed=0.12, least_share=0.9)
 
@@ -15,23 +16,6 @@ LINES = Thresholds(unexplained=0.3, unnamed=0.12, least_share=0.9)
 def error(joint: int, before: float, after: float) -> SignalError:
     """Variances in floors."""
     return SignalError(joint=joint, unit="rad", before=before**0.5, after=after**0.5, floor=1.0)
-
-
-def step(effect: str, joints: tuple[int, ...]) -> Step:
-    """A step that was taken into the model."""
-    nowhere = Where(joint=None, phase=None, summary="", cells=(), dependences=())
-    return Step(
-        effect=effect,
-        joints=joints,
-        parameters={},
-        evidence=50.0,
-        margin=50.0,
-        candidates=(),
-        rmse_fit=(),
-        where=nowhere,
-        reason="",
-        adopted=True,
-    )
 
 
 def test_errors_at_the_noise_floor_are_explained() -> None:

@@ -101,6 +101,31 @@ def test_progress_never_goes_back_and_ends_at_one() -> None:
     assert told[-1] == 1.0
 
 
+ONE = FitOptions(
+    parameters=("load.mass",), sensor_bend=False, friction_form=False, start_posture=False, replicas=0, rounds=3
+)
+
+
+def test_progress_says_what_is_done_and_how_much_of_it() -> None:
+    """Half of it is the searches, each nearer to its end with every evaluation, and most of the rest the rounds."""
+    told: list[tuple[float, str]] = []
+    found = fit(
+        arm(),
+        traces(arm(), 1, 3.0),
+        ONE.model_copy(update={"starts": 2}),
+        lambda fraction, text: told.append((fraction, text)),
+    )
+    for start in (0, 1):
+        own = [(f, t) for f, t in told if t.startswith(f"start {start + 1} of 2: ")]
+        assert own[0][1].startswith(f"start {start + 1} of 2: 1 evaluations, residual ")
+        counts = np.arange(1, len(own) + 1)
+        np.testing.assert_allclose([f for f, _ in own], 0.25 * (start + 1 - np.exp(-counts / 20)))
+    rounds = [(round(f, 6), t) for f, t in told if t.startswith("round")]
+    assert rounds == [(round(0.5 + 0.4 * k / 3, 6), f"round {k + 1}: noise and whitening") for k in range(len(rounds))]
+    assert told[-2:] == [(0.95, "intervals and identifiability"), (1.0, "done")]
+    assert (found.converged, found.message, len(rounds)) == (True, "no value moves any more", 1)
+
+
 class After:
     """A cancel that comes after some questions."""
 

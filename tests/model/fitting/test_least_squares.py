@@ -123,3 +123,68 @@ def test_says_when_it_was_not_given_enough_evaluations() -> None:
     solution = solve(curve(), [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9, 2))
     assert not solution.converged
     assert solution.evaluations == 2
+
+
+@dataclass
+class Watched(Curve):
+    """Keeps every point that was simulated."""
+
+    tried: list[Floats] = field(default_factory=list)
+    differentiated: list[Floats] = field(default_factory=list)
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        (self.differentiated if derivatives else self.tried).append(values.copy())
+        return super().evaluate(values, derivatives)
+
+
+def marquardt(problem: Curve, scale: Floats, start: Floats, tolerance: float) -> tuple[list[Floats], list[Floats]]:
+    """The points of Levenberg's and Marquardt's search in coordinates over `scale`, without bounds: the damping begins
+    at a thousandth, falls to a tenth (not below 1e-9) after a step that gains more than 60 % of what it promised, and
+    rises eightfold after one that gains less than a quarter; a step that gains less than a thousandth is not taken, and
+    a Jacobian serves while its steps gain more than 60 %."""
+
+    def both(v: Floats) -> tuple[Floats, Floats]:
+        fall = np.exp(-v[1] * problem.time)
+        J = np.stack([fall, -v[0] * problem.time * fall, np.ones_like(fall)], axis=1)
+        return (problem.model(v) - problem.measured) / 0.01, J * scale / 0.01
+
+    x = np.asarray(start, dtype=float)
+    residual, _ = both(x)
+    cost, damping = 0.5 * residual @ residual, 1e-3
+    tried, differentiated = [x], []
+    J = None
+    while True:
+        fresh = J is None
+        if J is None:
+            J = both(x)[1]
+            differentiated.append(x)
+        while True:
+            A, g = J.T @ J, J.T @ residual
+            step = np.linalg.solve(A + damping * np.diag(np.diag(A)) + 1e-12 * np.eye(3), -g)
+            promised = -(g @ step + 0.5 * step @ A @ step)
+            if promised <= tolerance * cost:
+                if fresh:
+                    return tried, differentiated
+                break
+            new = x + scale * step
+            tried.append(new)
+            after, _ = both(new)
+            gain = (cost - 0.5 * after @ after) / promised
+            damping = max(damping / 10, 1e-9) if gain > 0.6 else damping * (1 if gain > 0.25 else 8)
+            if gain > 1e-3:
+                x, residual, cost, fresh = new, after, 0.5 * after @ after, False
+            if gain <= 0.6 and not (fresh and gain <= 1e-3):
+                break
+        J = None
+
+
+@pytest.mark.parametrize("begin", [(1.0, 0.5, 0.0), (1.0, 4.0, 0.2), (-3.0, 0.3, 3.0), (3.0, 0.1, -1.0)])
+def test_the_way_of_the_search_is_marquardt_s(begin: tuple[float, float, float]) -> None:
+    problem = curve(bounds=((-1e6, 1e6),) * 3)
+    watched = Watched(problem.measured, problem.bounds)
+    solution = solve(watched, [white(0.01)], np.array(begin), Never(), Search(False, 1e-6, 500))
+    tried, differentiated = marquardt(problem, np.array([1.0, 0.5, 2e6]), np.array(begin), 1e-6)
+    assert solution.converged
+    assert solution.evaluations == len(tried)
+    np.testing.assert_allclose(watched.tried, tried, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(watched.differentiated, differentiated, rtol=1e-4, atol=1e-6)

@@ -18,6 +18,7 @@ from model.discrepancy.diagnosis import (
 )
 from model.machine_model.model import base_model
 from model.trial.truth import Detectability, HiddenEffect, Kind, SeenEffect, Truth
+from tests.model.discrepancy.steps import step as plain_step
 
 MACHINE = load_machine("ma2000")
 MODEL = base_model(MACHINE)
@@ -43,18 +44,15 @@ def step(
     errors = ()
     if holdout is not None:
         errors = (SignalError(joint=1, unit="rad", before=holdout[0] * 1e-3, after=holdout[1] * 1e-3, floor=1e-3),)
-    return Step(
-        effect=effect,
-        joints=joints,
+    return plain_step(
+        effect,
+        joints,
         parameters=parameters or {},
         evidence=100.0,
-        margin=50.0,
         candidates=tuple(candidate(name, *joints) for name in ranked),
         group=tuple(candidate(name, *joints) for name in group),
-        rmse_fit=(),
         rmse_holdout=errors,
         where=Where(joint=seen_at, phase=None, summary="", cells=(), dependences=()),
-        reason="",
         adopted=adopted,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -26,13 +27,20 @@ from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from tests.server.clocks import HandClock
-from tests.server.meanwhile import Meanwhile
+from tests.server.meanwhile import Happening, Meanwhile
 
 CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
 MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
 REAL = MOCK.model_copy(update={"simulated": False})
 FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
+
+ONLY_WHEN_WOKEN = 3600.0
+"""s: a queue that looks so rarely shows whether what happens wakes it."""
+AT_ONCE = 0.01
+"""s: of a queue that has to look by itself."""
+TOO_LONG = 20.0
+"""s: what has not happened by then never happens."""
 
 
 @dataclass
@@ -57,12 +65,27 @@ class Arm:
         self.orders.append(order)
 
 
+class Asked(Future[Answer]):
+    """What becomes of an experiment. looks: how often the queue has looked for it"""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.looks = threading.Semaphore(0)
+
+    def result(self, timeout: float | None = None) -> Answer:
+        """As every future's."""
+        self.looks.release()
+        return super().result(timeout)
+
+
 class Bench:
     """A queue, its stores, at whose calls something may happen, an arm, and all events.
 
-    answer:   what the arm answers an experiment with; None while it moves
-    fails_at: the event whose listener fails, once
-    lost:     raised for a trace that is to be taken into the catalogue
+    answer:  what the arm answers an experiment with; None while it moves
+    request: what the arm was asked for last
+    happens: what is done when an event is recorded, once, by its text
+    events:  kind and text of each; records: the same with who did it and the number of the experiment
+    lost:    raised for a trace that is to be taken into the catalogue
     """
 
     def __init__(self, folder: Path) -> None:
@@ -72,14 +95,16 @@ class Bench:
         self.schedules: Any = Meanwhile(ScheduleStore(self.store))
         self.clock = HandClock()
         self.answer: Answer | None = Answer(number=1, problem="refused", exit_code=2)
-        self.asked: Future[Answer] = Future()
+        self.asked = Asked()
         self.moves = threading.Event()
-        self.fails_at = ""
+        self.request: dict[str, Any] = {}
+        self.happens: dict[str, Happening] = {}
         self.lost: Exception | None = None
         self.looked_for_traces = 0
         self.orders: list[object] = []
         self._heard = threading.Condition()
         self.events: list[str] = []
+        self.records: list[tuple[str, str | None, str | None]] = []
         self.control = ControlService(
             self.clock, lambda who: self._end("lapsed", who), lambda who: self._end("given_back", who)
         )
@@ -96,7 +121,7 @@ class Bench:
         self.control.close()
         self.store.close()
 
-    def begun_anew(self) -> QueueService:
+    def begun_anew(self, look_every: float = ONLY_WHEN_WOKEN) -> QueueService:
         """The queue as a service that begins now has it."""
         context = QueueContext(
             robot=self.robot,
@@ -110,14 +135,14 @@ class Bench:
             add_unfinished_traces=self._look_for_traces,
             unattended=False,
         )
-        return QueueService(context)
+        return QueueService(context, look_every)
 
     def _end(self, how: str, who: str) -> None:
         """The queue is made after the control, and anew by some tests."""
         {"lapsed": self.queue.control_lapsed, "given_back": self.queue.control_given_back}[how](who)
 
-    def _ask(self, _order: object, **_fields: object) -> Future[Answer]:
-        self.asked = Future()
+    def _ask(self, order: object, **fields: object) -> Future[Answer]:
+        self.request, self.asked = {"order": order, **fields}, Asked()
         if self.answer is not None:
             self.asked.set_result(self.answer)
         self.moves.set()
@@ -131,19 +156,23 @@ class Bench:
         self.looked_for_traces += 1
 
     def _record_event(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
-        del actor, experiment
         with self._heard:
             self.events.append(f"{kind}: {text}")
+            self.records.append((self.events[-1], actor, experiment))
             self._heard.notify_all()
-            if text == self.fails_at:
-                self.fails_at = ""
-                raise FULL
+        self.happens.pop(text, lambda: None)()
 
     def until(self, said: Callable[[str], bool]) -> str:
-        """Waits for such an event; the test's own time limit ends the wait."""
+        """Waits for such an event."""
         with self._heard:
-            self._heard.wait_for(lambda: any(said(event) for event in self.events))
+            assert self._heard.wait_for(lambda: any(said(event) for event in self.events), TOO_LONG), self.events
             return next(event for event in self.events if said(event))
+
+    def until_it_waits(self, line: str) -> None:
+        """Waits until this is what the queue says it waits for."""
+        end = time.monotonic() + TOO_LONG
+        while self.queue.status().waiting_for != line:
+            assert time.monotonic() < end, self.queue.status()
 
     def submit(self) -> Experiment:
         """An experiment that may run at once."""

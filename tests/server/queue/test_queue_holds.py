@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
+
 import pytest
 
 from server.queue.attendance import ATTENDANCE
+from server.queue.service import QueueService
 from server.robot.control import LEASE_TIME
-from tests.server.queue.bench import CALM, REAL, Bench
+from tests.server.queue.bench import CALM, REAL, TOO_LONG, Bench
 
 LOOK = "look at the arm, then resume the queue"
+ASKS = "an operator must allow the queue to move this arm: pause it, then resume it (moves_real_arm)"
 LOST = CALM.model_copy(update={"link": "lost"})
 
 
@@ -124,9 +129,7 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
     bench.queue.resume("anna", moves_real_arm=False)  # nothing was there to be asked about
     bench.submit()
     bench.queue.start()
-    while not (waiting_for := bench.queue.status().waiting_for):
-        pass
-    assert "moves_real_arm" in waiting_for  # the word that the next person has to give
+    bench.until_it_waits(ASKS)  # the word that the next person has to give
 
 
 def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -> None:
@@ -158,9 +161,7 @@ def test_a_word_that_was_given_for_one_connection_is_none_for_the_next(bench: Be
     bench.queue.resume("bert", moves_real_arm=False)
     bench.submit()
     bench.queue.start()
-    while not (waiting_for := bench.queue.status().waiting_for):
-        pass
-    assert "moves_real_arm" in waiting_for
+    bench.until_it_waits(ASKS)
 
 
 def test_an_attempt_to_connect_that_fails_holds_nothing(bench: Bench) -> None:
@@ -193,3 +194,23 @@ def test_a_service_that_begins_with_work_waiting_lets_nobody_begin_it_but_a_pers
     assert bench.queue.status().reason == f"{line}: {LOOK}"
     bench.queue.resume("anna", moves_real_arm=False)
     bench.until(lambda event: event == "experiment: failed: refused")
+
+
+@pytest.mark.parametrize(
+    "happens",
+    [
+        lambda queue: queue.on_arm_report(LOST),
+        lambda queue: queue.stop_asked("anna"),
+        lambda queue: queue.control_lapsed("anna"),
+        lambda queue: queue.connection_ended("exit code 0"),
+    ],
+    ids=["link", "stop", "control", "connection"],
+)
+def test_what_holds_the_queue_wakes_it(bench: Bench, happens: Callable[[QueueService], None]) -> None:
+    bench.queue.connection_made()
+    looked = threading.Event()
+    bench.experiments.after("due", looked.set)
+    bench.queue.start()
+    assert looked.wait(TOO_LONG)
+    happens(bench.queue)
+    bench.until(lambda event: event.startswith("queue: paused"))

@@ -16,7 +16,7 @@ from server.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
 from tests.server.meanwhile import raising
-from tests.server.queue.bench import CALM, FULL, REAL, SPEC, Bench, done
+from tests.server.queue.bench import AT_ONCE, CALM, FULL, REAL, SPEC, Bench, done
 
 
 def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_room(
@@ -36,6 +36,7 @@ def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_r
 
 
 def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench) -> None:
+    bench.queue = bench.begun_anew(look_every=AT_ONCE)
     schedule = bench.schedule()
     bench.experiments.before("submit", raising(FULL))
     bench.queue.start()
@@ -44,6 +45,7 @@ def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench) -> None:
 
 
 def test_an_experiment_is_made_only_with_the_count_of_its_run(bench: Bench) -> None:
+    bench.queue = bench.begun_anew(look_every=AT_ONCE)
     schedule = bench.schedule()
     bench.schedules.before("count_run", raising(FULL))
     bench.queue.start()
@@ -100,7 +102,7 @@ def _is_free(bench: Bench) -> bool:
 def test_a_fault_before_the_arm_is_asked_ends_the_experiment_gives_the_control_back_and_holds_the_queue(
     bench: Bench,
 ) -> None:
-    bench.fails_at = "started"
+    bench.happens["started"] = raising(FULL)
     made, following = bench.submit(), bench.submit()
     bench.queue.start()
     bench.until(lambda event: event.startswith("queue: paused"))
@@ -234,3 +236,22 @@ def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
         bench.clock.turn(10)
     assert len([event for event in bench.events if "skipped" in event]) == 1
     assert bench.counted(schedule) == 5
+
+
+def test_runs_that_are_left_out_are_told_again_after_one_that_was_made(bench: Bench) -> None:
+    schedule = bench.schedule(every=10)
+    bench.queue.pause("by anna", "anna")
+    runs = DueRuns(bench.queue._context)
+    for _ in range(2):
+        runs.submit()
+        bench.clock.turn(10)
+    bench.queue.cancel(bench.runs(schedule)[0].id, "anna")
+    for _ in range(3):
+        runs.submit()
+        bench.clock.turn(10)
+    assert [event.startswith("experiment: queued") for event in bench.events if "schedule" in event] == [
+        True,
+        False,
+        True,
+        False,
+    ]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from daq.contracts.service.experiments import ExperimentRequest
+from server.experiments.states import Event
 from server.owner.messages import Answer, HaltRun
 from server.problems import ProblemError
 from server.queue.attendance import ATTENDANCE
-from tests.server.queue.bench import REAL, SPEC, Bench, done
+from tests.server.meanwhile import raising
+from tests.server.queue.bench import AT_ONCE, FULL, REAL, SPEC, TOO_LONG, Bench, done
 
 STOPPED = Answer(number=1, problem="the arm has been stopped", exit_code=6)
 LOOK = "look at the arm, then resume the queue"
@@ -113,6 +115,101 @@ def test_an_operator_who_leaves_is_missed_though_nothing_waits_and_nobody_comes_
     bench.clock.turn(ATTENDANCE)
     bench.queue.start()
     bench.until(lambda event: event == f"queue: paused: no operator confirms presence any more: {LOOK}")
+
+
+def test_an_operator_who_leaves_during_a_run_stops_the_arm_once(bench: Bench) -> None:
+    bench.queue = bench.begun_anew(look_every=AT_ONCE)
+    bench.robot.identity = REAL
+    bench.queue.resume("anna", moves_real_arm=True)
+    identity = _running(bench)
+    bench.clock.turn(ATTENDANCE)
+    for _ in range(4):
+        assert bench.asked.looks.acquire(timeout=TOO_LONG)
+    bench.asked.set_result(STOPPED)
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", identity)
+    assert (ended.state, bench.orders) == ("cancelled", [HaltRun()])
+    assert ended.reason == "cancelled by the service: no operator confirmed to be present"
+
+
+def test_a_run_on_a_simulated_arm_needs_no_operator(bench: Bench) -> None:
+    bench.queue = bench.begun_anew(look_every=AT_ONCE)
+    _running(bench)
+    for _ in range(4):
+        assert bench.asked.looks.acquire(timeout=TOO_LONG)
+    assert bench.orders == []
+
+
+def test_one_that_is_cancelled_before_the_arm_was_asked_never_moves_it(bench: Bench) -> None:
+    made = bench.submit()
+    bench.happens["started"] = lambda: bench.queue.cancel(made.id, "anna")
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", made.id)
+    assert (ended.state, ended.reason) == ("cancelled", "cancelled by anna")
+    assert (bench.request, bench.orders) == ({}, [])
+
+
+def test_one_that_cannot_be_begun_leaves_the_robot_free_and_is_tried_again(bench: Bench) -> None:
+    bench.experiments.before("begin", raising(FULL))
+    made = bench.submit()
+    bench.queue.start()
+    bench.until_it_waits("an error occurred in the queue: see the log")
+    bench.control.require_free_of_others(None)
+    assert bench.queue.running is None
+    bench.queue.wake()
+    bench.until(lambda event: event == "experiment: failed: refused")
+    assert bench.experiments.get("ma2000", made.id).state == "failed"
+
+
+def test_an_end_that_is_written_already_is_not_written_again(bench: Bench) -> None:
+    identity = _running(bench)
+    bench.experiments.end("ma2000", identity, Event.COMPLETED, bench.clock.utc(), "by hand", "complete")
+    bench.asked.set_result(Answer(number=1, problem="refused", exit_code=2))
+    bench.until(lambda event: event == "experiment: failed: refused")
+    assert bench.experiments.get("ma2000", identity).reason == "by hand"
+    bench.answer = done()
+    following = bench.submit()
+    bench.until(lambda event: event == "experiment: completed")
+    assert bench.experiments.get("ma2000", following.id).state == "done"
+
+
+def test_a_run_that_left_no_whole_trace_is_looked_for(bench: Bench) -> None:
+    bench.answer = Answer(number=1, problem="the disk is full", exit_code=5)
+    bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    assert bench.looked_for_traces == 1
+
+
+def test_one_that_was_refused_left_no_trace_and_holds_nothing(bench: Bench) -> None:
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda _: bench.events.count("experiment: failed: refused") == 2)
+    assert bench.looked_for_traces == 0
+    assert [bench.experiments.get("ma2000", each.id).state for each in (made, following)] == ["failed", "failed"]
+    assert not bench.queue.status().paused
+
+
+def test_what_runs_shows_itself_only_while_it_runs(bench: Bench) -> None:
+    identity = _running(bench)
+    assert bench.robot.experiment == identity
+    shown = bench.queue.cancel(identity, "anna")
+    assert (shown.id, shown.state) == (identity, "running")
+    bench.asked.set_result(done())
+    bench.until(lambda event: event.startswith("experiment: completed"))
+    ended = bench.experiments.get("ma2000", identity)
+    assert bench.queue.with_progress(ended) == ended
+    bench.queue.close(10)
+    assert (bench.robot.experiment, bench.queue.running, bench.queue.status().running) == (None, None, None)
+
+
+def test_a_service_that_ends_begins_nothing_more(bench: Bench) -> None:
+    bench.queue.start()
+    bench.queue.close(10)
+    bench.submit()
+    bench.queue.resume("anna", moves_real_arm=False)
+    assert bench.events == ["experiment: queued", "queue: resumed"]
 
 
 def test_the_same_request_under_the_same_key_is_queued_once(bench: Bench) -> None:

@@ -7,13 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
+from model.discrepancy.diagnosis import FoundValue
 from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.explanation.patterns import lags_after_turns, lags_alike, swings_with_position
 from model.discrepancy.explanation.renderer import step_with_sentences
 from model.discrepancy.explanation.samples import Samples
 from model.discrepancy.grounds import Reason
 from model.discrepancy.numbers import ReadingUnits, from_to, plain
+from tests.model.discrepancy.steps import step
 
 TURNS = ReadingUnits(math.degrees(1.0), "°", "°", "V", "N·m", least=math.radians(0.0062))
 SLIDES = ReadingUnits(1e3, "mm", "mm", "V", "N", turns=False)
@@ -112,20 +113,8 @@ def test_cycles_are_counted_a_turn_or_a_metre() -> None:
 
 
 def torque_reason(effect: str, values: dict[str, FoundValue], removed: float, *, slides: bool) -> str:
-    step = Step(
-        effect=effect,
-        joints=(1,),
-        parameters=values,
-        evidence=50.0,
-        margin=50.0,
-        candidates=(),
-        rmse_fit=(),
-        where=Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
-        reason=UNWRITTEN,
-        reason_data=Reason(removed=removed, slides=slides),
-        adopted=True,
-    )
-    return step_with_sentences(step).reason
+    taken = step(effect, parameters=values, reason_data=Reason(removed=removed, slides=slides))
+    return step_with_sentences(taken).reason
 
 
 def test_a_reason_in_torques_says_what_cycles_are_counted_in() -> None:

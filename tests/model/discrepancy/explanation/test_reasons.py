@@ -30,6 +30,7 @@ from model.discrepancy.verdict import worse_held_out
 from model.effects.library import effect
 from model.fitting.records import records_of, resolution
 from model.machine_model.model import Model
+from tests.model.discrepancy import steps
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
 
@@ -89,25 +90,13 @@ def step_with(
     joints: tuple[int, ...],
     parameters: dict[str, FoundValue],
     speaks: Reason | None = None,
-    *,
+    where: Where = JOINT_2,
     evidence: float = 900.0,
     margin: float = 300.0,
-    where: Where = JOINT_2,
-    adopted: bool = True,
 ) -> Step:
-    """A step as the workflow leaves it, before its sentences are made."""
-    return Step(
-        effect=effect,
-        joints=joints,
-        parameters=parameters,
-        evidence=evidence,
-        margin=margin,
-        candidates=(),
-        rmse_fit=(),
-        where=where,
-        reason=UNWRITTEN,
-        reason_data=speaks,
-        adopted=adopted,
+    """A step with an evidence, where the arm disagreed with the model."""
+    return steps.step(
+        effect, joints, parameters=parameters, reason_data=speaks, where=where, evidence=evidence, margin=margin
     )
 
 
@@ -296,7 +285,7 @@ def test_an_undecided_answer_lists_the_group_with_its_evidence(arm: Model) -> No
 def test_an_answer_with_nothing_significant_says_what_was_refused(arm: Model) -> None:
     assert answer(arm, verdict="nothing-significant").summary.startswith("Nothing significant")
     refusal = Refusal(kind="error-rises", numbers={"rise": 15.0, "deviation": 7.0})
-    step = step_with("stiction", (2,), {}, evidence=120.0, adopted=False).model_copy(update={"refusal": refusal})
+    step = step_with("stiction", (2,), {}, evidence=120.0).model_copy(update={"refusal": refusal, "adopted": False})
     found = answer(arm, verdict="nothing-significant", steps=(step,))
     assert found.steps[0].rejected_because == (
         "the error on the held-out traces rises: its sum of squares by 15 ± 7 variances of a reading"

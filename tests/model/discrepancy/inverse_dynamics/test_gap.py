@@ -4,32 +4,25 @@ from __future__ import annotations
 
 import math
 
-from model.discrepancy.diagnosis import SignalError, Step, Where
+from model.discrepancy.diagnosis import SignalError, Step
 from model.discrepancy.inverse_dynamics.gap import torque_gap
+from tests.model.discrepancy.steps import step
 
 
 def errors(before: float, after: float) -> tuple[SignalError, ...]:
     return (SignalError(joint=1, unit="N·m", before=before, after=after, floor=0.1),)
 
 
-def step(effect: str, before: float, after: float, *, adopted: bool = True) -> Step:
-    return Step(
-        effect=effect,
-        joints=(1,),
-        parameters={},
-        evidence=50.0,
-        margin=50.0,
-        candidates=(),
-        rmse_fit=errors(before, after),
-        rmse_holdout=errors(10 * before, 10 * after),
-        where=Where(joint=None, phase=None, summary="", cells=(), dependences=()),
-        reason="",
-        adopted=adopted,
-    )
+def taken(effect: str, before: float, after: float, *, adopted: bool = True) -> Step:
+    return step(effect, rmse_fit=errors(before, after), rmse_holdout=errors(10 * before, 10 * after), adopted=adopted)
 
 
 def test_it_goes_from_the_given_model_to_each_effect_that_was_taken() -> None:
-    steps = [step("gear_loss", 3.0, 2.5, adopted=False), step("coulomb_friction", 3.0, 2.0), step("backlash", 2.0, 1.0)]
+    steps = [
+        taken("gear_loss", 3.0, 2.5, adopted=False),
+        taken("coulomb_friction", 3.0, 2.0),
+        taken("backlash", 2.0, 1.0),
+    ]
     found = torque_gap(errors(4.0, 0.9), errors(40.0, 9.0), steps)
     assert [(s.kind, s.effect, s.fitted[0], s.held_out[0]) for s in found.stages] == [
         ("given", None, 4.0, 40.0),

@@ -10,12 +10,13 @@ import pytest
 from daq.contracts.progress import Never, silent
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit
 from model.discrepancy.candidates.ranking import Ranking
-from model.discrepancy.diagnosis import FoundValue, Step, Where
+from model.discrepancy.diagnosis import FoundValue
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.selection import diagnose, last_fit
 from model.discrepancy.selection.last_fit import _is_nothing, update_to_last_fit
 from model.discrepancy.thresholds import Thresholds
 from tests.model.discrepancy.candidate_fits import candidate_fit
+from tests.model.discrepancy.steps import step
 
 
 def after_ranking(
@@ -76,22 +77,7 @@ def test_the_search_ends_after_three_refused_candidates(monkeypatch: pytest.Monk
 
 def test_an_effect_that_a_later_one_explains_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both have come out with the same interval; only one of them has its null in it, and the newest stays anyway."""
-    nowhere = Where(joint=None, phase=None, summary="", cells=(), dependences=())
     value = FoundValue(value=0.1, low=-0.1, high=0.3, unit="1")
-
-    def step(effect: str) -> Step:
-        return Step(
-            effect=effect,
-            joints=(1,),
-            parameters={effect: value},
-            evidence=50.0,
-            margin=50.0,
-            candidates=(),
-            rmse_fit=(),
-            where=nowhere,
-            reason="",
-            adopted=True,
-        )
 
     def parameter(name: str, null: float, low: float = -1.0) -> Any:
         return SimpleNamespace(name=name, null=null, low=low, effect=name, joints=(1,))
@@ -103,7 +89,7 @@ def test_an_effect_that_a_later_one_explains_is_removed(monkeypatch: pytest.Monk
     monkeypatch.setattr(last_fit, "_without", lambda _p, names: gone.extend(names) or without)
     monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
     monkeypatch.setattr(last_fit, "found_values", lambda _c, own, _m: {p.name: value for p in own})
-    now, steps = update_to_last_fit(current, [step("a"), step("b"), step("c")])
+    now, steps = update_to_last_fit(current, [step(name, parameters={name: value}) for name in "abc"])
     assert [s.adopted for s in steps] == [False, True, True]
     assert steps[0].refusal == Refusal(kind="superfluous")
     assert gone == ["a"]
@@ -117,24 +103,13 @@ def test_the_parameters_of_a_step_are_those_of_the_last_fit(monkeypatch: pytest.
         FoundValue(value=value, low=low, high=high, unit="V")
         for value, low, high in ((0.747, 0.724, 0.77), (0.7475, 0.6732, 0.8217))
     )
-    step = Step(
-        effect="dead_zone",
-        joints=(2,),
-        parameters={name: before},
-        evidence=50.0,
-        margin=50.0,
-        candidates=(),
-        rmse_fit=(),
-        where=Where(joint=2, phase=None, summary="", cells=(), dependences=()),
-        reason="",
-        adopted=True,
-    )
-    refused = step.model_copy(update={"adopted": False})
+    taken = step("dead_zone", (2,), parameters={name: before})
+    refused = taken.model_copy(update={"adopted": False})
     known = {name: SimpleNamespace(name=name, null=0.0, low=0.0)}
     current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
     monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
     monkeypatch.setattr(last_fit, "found_values", lambda _c, own, _m: {p.name: last for p in own})
-    _, steps = update_to_last_fit(current, [step, refused])
+    _, steps = update_to_last_fit(current, [taken, refused])
     assert steps[0].parameters == {name: last}
     assert steps[1] == refused
 

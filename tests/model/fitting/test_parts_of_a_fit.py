@@ -1,0 +1,338 @@
+"""The arithmetic between simulation and result, on numbers small enough to be done by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import rosen
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.progress import Never
+from model.arrays import Floats
+from model.fitting.covariance import sandwich
+from model.fitting.fit import fit_problem, fitted_parameter
+from model.fitting.identifiability import judged
+from model.fitting.least_squares import Search, solve
+from model.fitting.nelder_mead import climb
+from model.fitting.options import FitOptions
+from model.fitting.problem import Evaluation, whitened
+from model.fitting.robust import huber, influence
+from model.fitting.unknowns import Unknown
+from model.fitting.whitening import Whitener, fitted_whitener, white
+from model.machine_model.parameter import Kind, Parameter
+from tests.model.fitting.imagined import arm
+from tests.model.fitting.test_identifiability import unknown
+from tests.model.fitting.test_records import record_of
+
+# ---- what one parameter's result says
+
+
+def named(value: float, deviation: float, verdict: str, **fields: float) -> dict[str, object]:
+    """The result for a mass of 1 kg between 0.5 and 3 kg, expected 1.1 ± 0.2 kg."""
+    jacobian = np.array([[100.0 if verdict == "known" else 0.01]])
+    mass = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=1.0)
+    own = Unknown(mass, 1.0, **{"low": 0.5, "high": 3.0, "expected": 1.1, "deviation": 0.2, **fields})
+    report = judged(jacobian, np.array([value]), [own])
+    assert report.verdict("load.mass").verdict == verdict
+    return dict(fitted_parameter(own, value, deviation, report.verdict("load.mass")))
+
+
+def test_a_known_parameter_has_the_interval_that_holds_95_percent() -> None:
+    found = named(2.0, 0.1, "known")
+    assert (found["value"], found["deviation"], found["model_value"], found["before"]) == (2.0, 0.1, 2.0, 1.0)
+    assert (found["low"], found["high"]) == (pytest.approx(2.0 - 0.1959964), pytest.approx(2.0 + 0.1959964))
+    assert (found["expected"], found["expected_deviation"], found["at_bound"]) == (1.1, 0.2, None)
+
+
+def test_an_interval_ends_at_the_bounds() -> None:
+    assert named(0.55, 0.1, "known")["low"] == 0.5
+    assert named(2.95, 0.1, "known")["high"] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("value", "at"), [(0.5, "low"), (0.5 + 1e-7, "low"), (0.5 + 3e-7, None), (3.0 - 1e-7, "high"), (3.0 - 3e-7, None)]
+)
+def test_a_value_within_a_millionth_of_its_size_of_a_bound_lies_at_it(value: float, at: str | None) -> None:
+    assert named(value, 0.1, "known")["at_bound"] == at
+
+
+def test_what_is_not_known_has_no_number_but_the_model_s() -> None:
+    found = named(2.0, 0.1, "unknown")
+    assert [found[name] for name in ("value", "deviation", "low", "high")] == [None] * 4
+    assert found["model_value"] == 2.0
+
+
+def test_nothing_is_expected_where_no_deviation_is_claimed() -> None:
+    mass = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=1.0)
+    own = Unknown(mass, 1.0, expected=1.1)
+    verdict = judged(np.array([[100.0]]), np.ones(1), [own]).verdict("load.mass")
+    assert fitted_parameter(own, 1.0, 0.1, verdict).expected is None
+    assert verdict.reason == "the data alone give it to 0.01 of its value"
+    assert verdict.expected_deviation is None
+
+
+# ---- verdicts
+
+
+def test_a_parameter_is_known_where_the_data_leave_half_of_its_size_at_most() -> None:
+    for slope, verdict in ((2.01, "known"), (1.99, "unknown")):
+        report = judged(np.array([[slope]]), np.ones(1), [unknown("a", "m", 1.0, 1.0)])
+        assert report.verdict("a").verdict == verdict
+    told = judged(np.array([[20.0]]), np.ones(1), [unknown("a", "m", 1.0, 0.5)]).verdict("a")
+    assert told.reason == "the data alone give it to 0.1 of its expected deviation"
+    assert (told.data_deviation, told.alone, told.expected_deviation) == (
+        pytest.approx(0.05),
+        pytest.approx(0.05),
+        0.5,
+    )
+
+
+def test_a_parameter_that_others_can_stand_in_for_is_part_of_a_combination() -> None:
+    jacobian = np.array([[10.0, 10.0]])
+    told = judged(jacobian, np.ones(2), [unknown("a", "m", 1.0, 0.5), unknown("b", "m", 1.0, 0.5)]).verdict("a")
+    assert told.verdict == "combination"
+    assert told.reason.startswith("alone it would be known to 0.2 of its expected deviation, but others can stand in")
+    assert told.reason.endswith((": together a +1 %, b −1 %", ": together a −1 %, b +1 %"))
+    assert (told.alone, told.data_deviation) == (pytest.approx(0.1), None)
+
+
+@pytest.mark.parametrize(("slope", "told"), [(1 / 29.0, 29.0), (1 / 31.0, None)])
+def test_a_deviation_of_more_than_thirty_sizes_is_not_told(slope: float, told: float | None) -> None:
+    found = judged(np.array([[slope]]), np.ones(1), [unknown("a", "m", 1.0, 1.0)]).verdict("a")
+    assert found.data_deviation == (None if told is None else pytest.approx(told, rel=1e-3))
+    assert found.reason.startswith(f"its expected deviation changes these records by {slope:.2g} standard deviations")
+
+
+def test_a_change_of_what_is_zero_is_told_in_its_own_unit() -> None:
+    jacobian = np.array([[10.0, 10.0]])
+    unknowns = [unknown("a", "V", 0.0, 2.0), unknown("b", "V", 0.0, 2.0)]
+    (only,) = judged(jacobian, np.zeros(2), unknowns).undetermined
+    assert only.text in ("together a +0.02 V, b −0.02 V", "together a −0.02 V, b +0.02 V")
+    assert not any(member.relative for member in only.members)
+    assert only.deviation is None
+
+
+def test_a_direction_known_worse_than_expected_has_a_deviation() -> None:
+    jacobian = np.array([[10.0, 10.0], [0.1, -0.1]])
+    unknowns = [unknown(name, "V", 2.0, 1.0) for name in "ab"]
+    (only,) = judged(jacobian, np.full(2, 2.0), unknowns).undetermined
+    assert only.deviation == pytest.approx(5.0), "a change of (1, −1) changes the records by 0.2"
+    assert sorted(member.change for member in only.members) == pytest.approx([-1.0, 1.0])
+
+
+@pytest.mark.parametrize(("correlation", "together"), [(0.949, False), (0.951, True)])
+def test_estimates_correlated_by_more_than_19_in_20_belong_together(correlation: float, together: bool) -> None:
+    covariance = 1e-6 * np.array([[1.0, correlation], [correlation, 1.0]])
+    jacobian = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    report = judged(jacobian, np.ones(2), [unknown("a", "V", 1.0, 1.0), unknown("b", "V", 1.0, 1.0)])
+    assert report.correlated == ((("a", "b"),) if together else ())
+
+
+def test_a_chain_of_correlated_estimates_is_one_group() -> None:
+    steps = np.cumsum(np.eye(3), axis=0)  # each next one is the one before and a little more
+    covariance = 1e-6 * (steps * [1.0, 0.05, 0.05]) @ steps.T
+    jacobian = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    report = judged(jacobian, np.ones(3), [unknown(name, "V", 1.0, 1.0) for name in "cab"])
+    assert report.correlated == (("c", "a", "b"),)
+
+
+# ---- losses, whitening, covariance
+
+
+def test_huber_s_loss_grows_straight_beyond_four_deviations_for_data_alone() -> None:
+    squares = np.array([9.0, 16.0, 100.0, 100.0])
+    loss, slope, curvature = huber(squares, 3)
+    np.testing.assert_allclose(loss, [9.0, 16.0, 2 * 4 * 10 - 16, 100.0])
+    np.testing.assert_allclose(slope, [1.0, 1.0, 0.4, 1.0])
+    np.testing.assert_allclose(curvature, [0.0, 0.0, -0.5 * 4 / 1000, 0.0])
+    np.testing.assert_allclose(influence(np.array([-9.0, -4.0, 1.0, 5.0])), [-4.0, -4.0, 1.0, 4.0])
+
+
+class Two:
+    """Two records of two signals, the first in two stretches, with the derivatives by one unknown."""
+
+    runs = ((slice(0, 2), slice(3, 5)), (slice(1, 3),))
+    residual = (np.arange(10.0).reshape(5, 2), 10.0 * np.arange(6.0).reshape(3, 2))
+
+    def evaluations(self) -> list[Evaluation]:
+        return [Evaluation(r, -r[None]) for r in self.residual]
+
+
+def test_stretches_are_whitened_signal_by_signal_and_stand_one_behind_the_other() -> None:
+    data = whitened(Two(), Two().evaluations(), [white(1.0), white(2.0)])  # type: ignore[arg-type]
+    rows = [(0, 0.5), (2, 1.5), (6, 3.5), (8, 4.5), (20, 15), (40, 25)]
+    np.testing.assert_allclose(data.residual, rows)
+    np.testing.assert_allclose(data.jacobian[:, :, 0], -np.array(rows))
+    assert data.starts == (0, 2, 4, 6)
+    squares = [a * a + b * b for a, b in rows]
+    np.testing.assert_allclose(data.information, [[sum(squares)]])
+    assert [s[:, 0].tolist() for s in data.scores()] == [[-s for s in squares[k : k + 2]] for k in (0, 2, 4)]
+    ones = data.scores(np.ones((6, 2)))
+    np.testing.assert_allclose(np.concatenate(ones)[:, 0], [-a - b for a, b in rows])
+
+
+def test_a_filter_of_second_order_predicts_the_first_samples_from_what_there_is() -> None:
+    filter_ = Whitener((np.zeros(0), np.array([0.5]), np.array([0.4, -0.2])), np.array([4.0, 2.0, 1.0]))
+    found = filter_.whitened(np.array([8.0, 6.0, 5.0, 4.0]))
+    np.testing.assert_allclose(found, [8 / 4, (6 - 4) / 2, 5 - 0.4 * 6 + 0.2 * 8, 4 - 0.4 * 5 + 0.2 * 6])
+    assert filter_.order == 2
+    np.testing.assert_allclose(filter_.whitened(np.array([8.0])), [2.0])
+
+
+def test_the_memory_of_a_filter_is_a_twentieth_of_the_samples_at_most() -> None:
+    wave = [np.sin(0.3 * np.arange(count)) for count in (39, 40, 60)]
+    assert [fitted_whitener([one], 8, floor=1e-9).order for one in wave] == [1, 2, 3]
+    assert fitted_whitener([wave[2]], 2, floor=1e-9).order == 2
+
+
+def test_a_plain_sandwich_is_done_by_hand() -> None:
+    """Four samples of one parameter: scores 1, −1, 2, 0 of its own, no neighbours counted."""
+    scores = [np.array([[1.0], [-1.0], [2.0], [0.0]])]
+    middle = 6.0 * 4 / 3 + 0.5
+    found = sandwich(np.array([[2.0]]), scores, np.array([0.5]), bandwidth=0)
+    np.testing.assert_allclose(found, [[middle / 2.5**2]])
+    least = sandwich(np.array([[20.0]]), scores, np.array([0.5]), bandwidth=0)
+    np.testing.assert_allclose(least, [[1 / 20.5]])
+
+
+# ---- searches
+
+
+class Rosenbrock:
+    """Residuals of Rosenbrock's valley, whose lowest point is (1, 1)."""
+
+    def __init__(self, high: float = math.inf, fails_beyond: float = math.inf) -> None:
+        self.high, self.fails_beyond = high, fails_beyond
+        self.tried: list[Floats] = []
+        self.runs = [[slice(0, 2)]]
+        self.floor = np.array([1e-3])
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        return tuple(
+            Unknown(Parameter(name=n, kind=Kind.EFFECT, part=n, unit="1", value=-0.5), -0.5, -2.0, self.high, size=0.5)
+            for n in "xy"
+        )
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        self.tried.append(values.copy())
+        x, y = values
+        if x > self.fails_beyond:
+            raise SpecError("it does not stay finite")
+        jacobian = np.array([[-20.0 * x, -1.0], [10.0, 0.0]])[:, :, None] if derivatives else None
+        return [Evaluation(np.array([[10.0 * (y - x**2)], [1.0 - x]]), jacobian)]
+
+
+START = np.array([-0.5, -0.5])
+
+
+def test_the_simplex_finds_the_lowest_point_and_says_what_it_costs() -> None:
+    problem, told = Rosenbrock(), []
+    found = climb(problem, START, Never(), 2000, 1e-9, lambda count, rms: told.append((count, rms)))
+    np.testing.assert_allclose(found.values, [1.0, 1.0], atol=1e-4)
+    assert found.converged
+    assert found.evaluations == len(problem.tried) == len(told)
+    assert [count for count, _ in told] == list(range(1, len(told) + 1))
+    assert told[0][1] == pytest.approx(math.sqrt(rosen(START) / 2))
+    assert found.cost == pytest.approx(min(rms for _, rms in told) ** 2)
+    np.testing.assert_allclose(problem.tried[:3], [(-0.5, -0.5), (0.0, -0.5), (-0.5, 0.0)])
+
+
+def test_the_simplex_begins_towards_the_side_with_more_room_and_stays_within_the_bounds() -> None:
+    problem = Rosenbrock(high=0.9)
+    found = climb(problem, np.array([0.5, 0.6]), Never(), 2000, 1e-9)
+    np.testing.assert_allclose(problem.tried[:3], [[0.5, 0.6], [0.0, 0.6], [0.5, 0.1]])
+    assert max(values.max() for values in problem.tried) <= 0.9
+    np.testing.assert_allclose(found.values, [0.9, 0.81], atol=1e-3)
+
+
+def test_the_simplex_ends_at_its_goal_or_after_as_many_evaluations_as_allowed() -> None:
+    found = climb(Rosenbrock(), START, Never(), 2000, 1e-9, goal=0.5)
+    assert (found.converged, found.message) == (True, "the error asked for is reached")
+    assert found.cost <= 0.5
+    short = climb(Rosenbrock(), START, Never(), 10, 1e-9)
+    assert (short.converged, short.evaluations) == (False, 10)
+
+
+def test_where_the_simulation_diverges_the_searches_turn_back() -> None:
+    assert climb(Rosenbrock(fails_beyond=0.5), START, Never(), 2000, 1e-9).values[0] <= 0.5
+    found = solve(Rosenbrock(fails_beyond=0.5), [white(1.0)], START, Never(), Search(False, 1e-9, 200))
+    assert found.values[0] <= 0.5
+    assert found.cost < 0.5 * rosen(START)
+
+
+def test_a_search_that_cannot_begin_says_so() -> None:
+    with pytest.raises(SpecError, match="does not stay finite"):
+        solve(Rosenbrock(fails_beyond=-1.0), [white(1.0)], START, Never())
+
+
+def test_a_search_tells_its_evaluations_and_gives_the_information_at_its_end() -> None:
+    told: list[tuple[int, float]] = []
+    search = Search(False, 1e-12, 200, lambda count, rms: told.append((count, rms)))
+    found = solve(Rosenbrock(), [white(2.0)], START, Never(), search)
+    assert found.converged
+    np.testing.assert_allclose(found.values, [1.0, 1.0], atol=1e-6)
+    assert [count for count, _ in told] == list(range(1, found.evaluations + 1))
+    assert told[0][1] == pytest.approx(math.sqrt(rosen(START) / 2) / 2)
+    J = np.array([[-20.0, -1.0], [10.0, 0.0]]).T / 2
+    assert found.information is not None
+    np.testing.assert_allclose(found.information, J.T @ J, rtol=1e-4)
+
+
+def test_a_search_that_begins_at_a_bound_is_moved_inside_by_a_thousandth() -> None:
+    problem = Rosenbrock(high=0.5)
+    solve(problem, [white(1.0)], np.array([-2.0, 0.5]), Never(), Search(False, 1e-9, 1))
+    np.testing.assert_allclose(problem.tried[0], [-2.0 + 0.5e-3, 0.5 - 0.5e-3])
+
+
+def test_what_is_expected_pulls_as_its_deviation_says() -> None:
+    """One straight unknown: the data say 3 ± 1, the prior 1 ± 0.5, so the answer is their weighted mean."""
+
+    class Straight(Rosenbrock):
+        @property
+        def unknowns(self) -> tuple[Unknown, ...]:
+            part = Parameter(name="x", kind=Kind.EFFECT, part="x", unit="1", value=0.0)
+            return (Unknown(part, 0.0, expected=1.0, deviation=0.5),)
+
+        def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+            return [Evaluation(np.array([[values[0] - 3.0]]), np.ones((1, 1, 1)) if derivatives else None)]
+
+    problem = Straight()
+    problem.runs = [[slice(0, 1)]]
+    found = solve(problem, [white(1.0)], np.zeros(1), Never(), Search(False, 1e-12))
+    assert found.values[0] == pytest.approx((3.0 + 4 * 1.0) / 5)
+    assert found.cost == pytest.approx(0.5 * (1.6**2 + (0.4 / 0.5) ** 2))
+    assert found.information is not None
+    assert found.information[0, 0] == pytest.approx(1 + 4)
+
+
+# ---- what is fitted
+
+
+def test_a_fit_needs_more_samples_than_parameters() -> None:
+    ten = [record_of(list(range(10)), still=0)]
+    names = tuple(p.name for p in arm().parameters)
+    assert len(fit_problem(arm(), ten, FitOptions(parameters=names[:9])).unknowns) > 9, "nuisances do not count"
+    with pytest.raises(TraceError, match="10 samples for 10 parameters: there must be more samples than parameters"):
+        fit_problem(arm(), ten, FitOptions(parameters=names[:10]))
+
+
+def test_nuisances_are_fitted_as_the_options_say() -> None:
+    given = [record_of(list(range(100)))]
+
+    def kinds(**options: object) -> tuple[int, int, int]:
+        problem = fit_problem(arm(), given, FitOptions(parameters=("load.mass",), **options))  # type: ignore[arg-type]
+        names = [u.name for u in problem.unknowns if u.nuisance]
+        bends = sum("nonlinearity" in name for name in names)
+        forms = sum("presliding" in name for name in names)
+        assert (problem.signal, problem.loop) == ("position", options.get("loop", "closed"))
+        return bends, forms, len(names) - bends - forms
+
+    assert kinds(sensor_bend=True, bend_terms=2) == (6, 6, 3)
+    assert kinds(sensor_bend=False) == (0, 6, 3)
+    assert kinds(sensor_bend=False, friction_form=False) == (0, 0, 3)
+    assert kinds(sensor_bend=False, start_posture=False) == (0, 6, 0)
+    assert kinds(sensor_bend=True, method="nelder_mead") == (0, 0, 0)
+    assert kinds(sensor_bend=False, loop="open") == (0, 6, 3)

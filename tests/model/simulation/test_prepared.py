@@ -1,0 +1,253 @@
+"""A record in the units of compiled code: rounding of set points, gains of the controller, and where a run begins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import Machine, load_machine, parse_machine
+from daq.contracts.trace import Trace
+from model import layout as at
+from model.arrays import Floats
+from model.drives import controller as pid
+from model.dynamics.dual import DUAL_STEP
+from model.machine_model.model import base_model
+from model.machine_model.parameter import initial_position
+from model.simulation.batch import seed
+from model.simulation.inputs import inputs_of
+from model.simulation.prepared import Options, Prepared, prepare
+from model.simulation.simulate import parameter_vectors
+from tests.model.simulation.machines import SLIDE, pendulum, slide
+from tests.model.simulation.records import trace_of
+
+MA2000 = load_machine("ma2000")
+START = np.array([3.1, 0.7, 0.0])
+
+
+def still(count: int = 60, **signals: Floats) -> Trace:
+    """Set points at a posture of the MA2000, or the signals given."""
+    return trace_of(np.tile(START, (count, 1)), **signals)
+
+
+def prepared(machine: Machine, trace: Trace, **options: object) -> Prepared:
+    return prepare(base_model(machine), inputs_of(trace, machine), Options(**options))  # type: ignore[arg-type]
+
+
+# ---- set points and settings
+
+
+def test_the_board_takes_set_points_in_whole_posture_units_and_those_in_whole_counts() -> None:
+    unit = 1.5 * np.pi / 1000
+    low = MA2000.calibration(1).posture_to_rad(0)
+    wanted = np.tile(START, (4, 1))
+    wanted[:, 0] = low + unit * np.array([500.0, 500.49, 500.51, 501.0])
+    found = prepared(MA2000, trace_of(wanted))
+    assert found.set_points[:, 0].tolist() == [2048.0, 2048.0, 2052.0, 2052.0]  # 2048 and 2052.096
+    assert found.settings[at.CONTROLLER] == at.BOARD_PID
+    assert found.settings[at.PUBLISHED_LOADS] == 1
+    assert found.settings[at.DRIVE_RECORDED] == 0
+    assert found.period == 0.02
+
+
+def test_a_board_with_a_finer_sensor_counts_in_its_own_counts() -> None:
+    first = MA2000.joints[0]
+    assert first.sensor is not None
+    finer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"bits": 14})})
+    machine = MA2000.model_copy(update={"joints": (finer, *MA2000.joints[1:])})
+    wanted = np.tile(START, (4, 1))
+    wanted[:, 0] = machine.calibration(1).posture_to_rad(501)
+    found = prepare(base_model(machine), inputs_of(trace_of(wanted), machine), Options())
+    assert found.set_points[0, 0] == round(501 * 2**14 / 1000)
+
+
+def test_a_sampled_controller_rounds_set_points_to_its_own_step_half_up() -> None:
+    text = SLIDE.replace(
+        "gains = [[4.0", 'set_point_resolution = { value = 0.01, unit = "m", source = "t" }\ngains = [[4.0'
+    )
+    wanted = np.array([[0.004], [0.006], [0.016], [-0.004]])
+    found = prepared(parse_machine(text), trace_of(wanted, 0.01))
+    np.testing.assert_allclose(found.set_points[:, 0], [0.0, 0.01, 0.02, 0.0], atol=1e-12)
+    assert found.settings[at.CONTROLLER] == at.CASCADE
+    assert found.settings[at.PUBLISHED_LOADS] == 0
+    plain = prepared(slide(), trace_of(wanted, 0.01))
+    np.testing.assert_array_equal(plain.set_points, wanted)
+    single = parse_machine(SLIDE.replace("velocity_gains = [[40.0, 0.0, 0.0]]\n", ""))
+    assert prepared(single, trace_of(wanted, 0.01)).settings[at.CONTROLLER] == at.SAMPLED_PID
+
+
+def test_without_a_controller_and_in_open_loop_nothing_controls() -> None:
+    numbers = np.ones((60, 3))
+    assert prepared(MA2000, still(drive=numbers), loop="open").settings[at.CONTROLLER] == at.NO_CONTROLLER
+    np.testing.assert_array_equal(prepared(MA2000, still(drive=numbers), loop="open").set_points[0], START)
+    swing = trace_of(np.zeros((60, 1)), 0.01, drive=np.ones((60, 1)))
+    assert prepared(pendulum(), swing, recorded_drive=True).settings[at.DRIVE_RECORDED] == 0
+    driven = prepared(MA2000, still(drive=numbers), recorded_drive=True)
+    assert driven.settings[at.DRIVE_RECORDED] == 1
+    assert driven.with_setting(at.DRIVE_RECORDED, 0).settings[at.DRIVE_RECORDED] == 0
+    assert driven.settings[at.DRIVE_RECORDED] == 1, "the first is left as it was"
+
+
+@pytest.mark.parametrize("quantise", [True, False])
+def test_options_reach_the_record(quantise: bool) -> None:
+    noise, initial = 0.3 * np.ones((60, 3)), np.ones((3, 2))
+    found = prepared(MA2000, still(), quantise=quantise, noise=noise, initial=initial, following=0.25)
+    assert found.settings[at.QUANTISE] == quantise
+    np.testing.assert_array_equal(found.noise, noise)
+    np.testing.assert_array_equal(found.initial, initial)
+    assert found.following == 0.25
+    plain = prepared(MA2000, still())
+    assert (plain.following, plain.noise.any(), plain.settings[at.QUANTISE]) == (0.0, False, 1)
+
+
+def test_inputs_of_other_joints_are_refused() -> None:
+    inputs = replace(inputs_of(still(), MA2000), joints=(1, 2))
+    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), the model moves joints \(1, 2, 3\)"):
+        prepare(base_model(MA2000), inputs, Options())
+
+
+# ---- gains
+
+
+def test_gains_are_the_record_s_own_else_the_machine_s() -> None:
+    controller = MA2000.controller
+    record = still().record.model_copy(update={"gains": {2: (7, 3, 1)}})
+    found = inputs_of(replace(still(), record=record), MA2000).gains
+    assert found.shape == (3, pid.GAINS)
+    assert found[1, [pid.P, pid.I, pid.D]].tolist() == [7, 3, 1]
+    for row in (0, 2):
+        assert found[row, [pid.P, pid.I, pid.D]].tolist() == list(controller.gains[row])  # type: ignore[union-attr]
+    assert (found[:, pid.SCALE] == controller.dac_counts_per_adc_count.value).all()  # type: ignore[union-attr]
+    assert not found[:, [pid.INNER_P, pid.INNER_I, pid.INNER_D, pid.RESOLUTION]].any()
+
+
+def test_a_cascade_has_gains_of_its_inner_loop_and_a_step_of_its_drive() -> None:
+    text = SLIDE.replace("gains = [[4.0, 0.0", "gains = [[4.0, 0.5").replace("[[40.0, 0.0, 0.0]]", "[[40.0, 2.0, 1.0]]")
+    own = text.replace(
+        "gains = [[4.0", 'drive_resolution = { value = 0.125, unit = "V", source = "t" }\ngains = [[4.0', 1
+    )
+    trace = trace_of(np.zeros((60, 1)), 0.01)
+    (found,) = inputs_of(trace, parse_machine(own)).gains
+    assert found[[pid.P, pid.I, pid.D]].tolist() == [4.0, 0.5, 0.0]
+    assert found[[pid.INNER_P, pid.INNER_I, pid.INNER_D]].tolist() == [40.0, 2.0, 1.0]
+    assert found[pid.RESOLUTION] == 0.125
+    assert inputs_of(trace, parse_machine(text)).gains[0, pid.RESOLUTION] == 0.0
+    swing = trace_of(np.zeros((60, 1)), 0.01, drive=np.ones((60, 1)))
+    assert not inputs_of(swing, pendulum()).gains.any()
+
+
+# ---- the grid of periods, and the start
+
+
+def test_the_period_is_the_record_s_else_the_controller_s_else_that_of_the_samples() -> None:
+    def period(machine: Machine, joints: int, **signals: Floats) -> float:
+        made = trace_of(np.zeros((60, joints)), 0.03, **signals)
+        record = made.record.model_copy(update={"period": None})
+        return inputs_of(replace(made, record=record, tick=None), machine).period
+
+    assert inputs_of(trace_of(np.zeros((60, 1)), 0.03), slide()).period == 0.03
+    assert period(slide(), 1) == 0.01
+    assert period(pendulum(), 1, drive=np.ones((60, 1))) == pytest.approx(0.03)
+
+
+def test_ticks_count_from_the_first() -> None:
+    late = replace(still(), tick=np.arange(60) + 1000)
+    found = inputs_of(late, MA2000)
+    assert (len(found), found.rows[0], found.rows[-1]) == (60, 0.0, 59.0)
+
+
+@pytest.mark.parametrize(("off", "whole"), [(0.049, True), (0.051, False)])
+def test_times_within_a_twentieth_of_a_period_are_those_of_periods(off: float, whole: bool) -> None:
+    made = still(4)
+    time = 0.02 * np.array([0.0, 1.0 - off, 2.0 + off, 3.0])
+    found = inputs_of(replace(made, tick=None, time=time), MA2000)
+    assert (found.rows.tolist() == [0, 1, 2, 3]) is whole
+    assert len(found) == 4
+
+
+@pytest.mark.parametrize(("angle", "allowed"), [(20.0, True), (20.001, False), (-20.001, False)])
+def test_angles_of_more_than_20_rad_are_taken_for_degrees(angle: float, allowed: bool) -> None:
+    position = np.tile(START, (60, 1))
+    position[30, 1] = angle
+    if allowed:
+        assert len(inputs_of(still(position=position), MA2000)) == 60
+    else:
+        with pytest.raises(TraceError, match=r"joint 2 reaches 20 rad; degrees\? angles must be in rad, up to 20"):
+            inputs_of(still(position=position), MA2000)
+
+
+def test_a_carriage_and_a_shaft_without_a_sensor_may_go_further() -> None:
+    far = np.full((60, 1), 25.0)
+    assert len(inputs_of(trace_of(np.zeros((60, 1)), 0.01, position=far), slide())) == 60
+    assert len(inputs_of(trace_of(np.zeros((60, 1)), 0.01, position=far, drive=far), pendulum())) == 60
+
+
+def test_without_drive_a_machine_without_a_controller_cannot_move() -> None:
+    with pytest.raises(TraceError, match="has no drive, and pendulum has no controller to form one"):
+        inputs_of(trace_of(np.zeros((60, 1)), 0.01), pendulum())
+    with pytest.raises(TraceError, match="trace made: has neither set points nor drive: nothing moves the model"):
+        inputs_of(replace(still(), set_point=None), MA2000)
+
+
+COUNT = 1.5 * np.pi / 4096
+
+
+@pytest.mark.parametrize(
+    ("readings", "moves_at", "start"),
+    [
+        ([1.0, 0.0, 1.0, 0.0], 4, 0.5),
+        ([1.0, 0.0, 1.0, 0.0], 3, 2 / 3),
+        ([0.0, 1.9, 1.9, 9.0], 50, 3.8 / 3),
+        ([0.0, 2.1, 0.0, 0.0], 50, 0.0),
+        ([0.0, -2.1, 0.0, 0.0], 50, 0.0),
+        ([1.0] * 24 + [0.0] * 26, 50, 24 / 25),
+    ],
+    ids=["rest", "until it moves", "until it is led away", "two counts", "two counts below", "25 readings"],
+)
+def test_the_arm_begins_at_the_mean_of_what_it_read_at_rest(readings: list[float], moves_at: int, start: float) -> None:
+    position = np.tile(START, (60, 1))
+    position[: len(readings), 0] += COUNT * np.array(readings)
+    points = np.tile(START, (60, 1))
+    points[moves_at:] += 0.1
+    found = inputs_of(trace_of(points, position=position), MA2000)
+    assert (found.initial[0, 0] - START[0]) / COUNT == pytest.approx(start)
+    assert found.initial[:, 1].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_inputs_carry_what_the_record_says() -> None:
+    found = inputs_of(still(), MA2000)
+    assert (found.joints, found.name, found.has_set_points, found.has_drive) == ((1, 2, 3), "made", True, False)
+    assert found.noise.shape == (60, 3)
+    assert not found.noise.any()
+
+
+# ---- derivatives
+
+
+def test_a_parameter_is_differentiated_at_all_its_places_and_an_initial_posture_at_its_own() -> None:
+    model = base_model(MA2000)
+    vector, initial = model.vector.astype(np.complex128), np.zeros((3, 2), dtype=np.complex128)
+    mass = model.parameter("load.mass")
+    seed(mass, vector, initial)
+    assert np.flatnonzero(vector.imag).tolist() == sorted(mass.slots)
+    assert (vector.imag[list(mass.slots)] == DUAL_STEP).all()
+    assert not initial.imag.any()
+    np.testing.assert_array_equal(vector.real, model.vector)
+    seed(initial_position(2), vector, initial)
+    assert np.flatnonzero(vector.imag).tolist() == sorted(mass.slots)
+    assert initial.imag[:, 0].tolist() == [0.0, DUAL_STEP, 0.0]
+    assert not initial.imag[:, 1].any()
+
+
+def test_vectors_of_parameters_have_their_values_in_place() -> None:
+    model = base_model(MA2000)
+    names = ("load.mass", "link1.mass")
+    found = parameter_vectors(model, names, np.array([[1.0, 2.0], [3.0, 4.0]]))
+    for row, values in zip(found, ((1.0, 2.0), (3.0, 4.0)), strict=True):
+        for name, value in zip(names, values, strict=True):
+            assert (row[list(model.parameter(name).slots)] == value).all()
+    assert parameter_vectors(model, ("load.mass",), np.array([1.5])).shape == (1, len(model.vector))
+    rest = [k for k in range(len(model.vector)) if all(k not in model.parameter(name).slots for name in names)]
+    np.testing.assert_array_equal(found[1, rest], model.vector[rest])

@@ -1,0 +1,249 @@
+"""What the queue tells of itself: every event with who did it and the experiment it is about, and its state."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+
+from daq.acquisition.messages import EventHappened, Progress
+from daq.contracts.experiment import ExperimentSpec, SlowRamp
+from daq.contracts.service.experiments import ExperimentRequest
+from daq.contracts.trace import TraceEvent
+from server.owner.messages import Opened
+from server.problems import ProblemError
+from server.queue.attendance import ATTENDANCE, Attendance
+from tests.server.clocks import HandClock
+from tests.server.queue.bench import CALM, REAL, SPEC, Bench, done
+
+LOOK = "look at the arm, then resume the queue"
+OPENED = Opened(simulated=True, protocol=2, period=0.02, boots=1)
+
+
+def test_what_becomes_of_an_experiment_is_told_with_its_number_and_whoever_asked_for_it(bench: Bench) -> None:
+    bench.answer = done()
+    bench.queue.pause("for a look", "anna")
+    made, other = bench.submit(), bench.submit()
+    bench.queue.cancel(other.id, "bert")
+    bench.queue.start()
+    bench.queue.resume("anna", moves_real_arm=False)
+    bench.until(lambda event: event == "experiment: completed")
+    assert bench.records == [
+        ("queue: paused: for a look", "anna", None),
+        ("experiment: queued", "anna", made.id),
+        ("experiment: queued", "anna", other.id),
+        ("experiment: cancelled", "bert", other.id),
+        ("queue: resumed", "anna", None),
+        ("experiment: started", None, made.id),
+        ("experiment: completed", None, made.id),
+    ]
+
+
+def test_a_run_of_a_schedule_is_told_with_its_experiment(bench: Bench) -> None:
+    schedule = bench.schedule()
+    bench.queue.start()
+    bench.until(lambda event: event == "experiment: failed: refused")
+    (run,) = bench.runs(schedule)
+    assert (f"experiment: queued by schedule {schedule.id}", None, run.id) in bench.records
+
+
+def test_a_run_that_the_last_service_left_is_told_when_the_next_begins(bench: Bench) -> None:
+    made = bench.submit()
+    bench.experiments.begin("ma2000", made.id, bench.clock.utc())
+    bench.records.clear()
+    bench.clock.turn(60)
+    queue = bench.begun_anew()
+    ((event, actor, identity),) = bench.records
+    assert (event.startswith("experiment: interrupted: "), actor, identity) == (True, None, made.id)
+    line = f"the service was restarted with 0 waiting and 1 interrupted: {LOOK}"
+    status = queue.status()
+    assert (status.paused, status.reason, status.since) == (True, line, bench.clock.utc())
+    assert bench.queues.get("ma2000").reason == line
+    bench.clock.turn(60)
+    assert bench.begun_anew().status() == status, "the next service finds it as it was"
+
+
+def test_a_queue_with_nothing_to_do_is_open_and_the_database_knows_it(bench: Bench) -> None:
+    line = "nothing was waiting when the service started"
+    status = bench.queue.status()
+    assert (status.paused, status.reason, status.since) == (False, line, bench.clock.utc())
+    assert (status.queued, status.running, status.waiting_for, status.attended_until) == (0, None, "", None)
+    kept = bench.queues.get("ma2000")
+    assert (kept.paused, kept.reason, kept.since) == (False, line, bench.clock.utc())
+
+
+def test_the_first_reason_stays_unless_a_person_gives_another(bench: Bench) -> None:
+    bench.queue.pause("the first")
+    begun = bench.clock.utc()
+    bench.clock.turn(5)
+    bench.queue.pause("the second")
+    status = bench.queue.status()
+    assert (status.reason, status.since) == ("the first", begun)
+    bench.queue.pause("a look", "anna")
+    status = bench.queue.status()
+    assert (status.reason, status.since) == ("a look", begun + timedelta(seconds=5))
+    assert bench.events == ["queue: paused: the first", "queue: paused: a look"]
+    assert bench.queues.get("ma2000").reason == "a look"
+
+
+def test_who_resumed_the_queue_is_its_reason(bench: Bench) -> None:
+    bench.queue.pause("a look", "anna")
+    bench.clock.turn(5)
+    bench.queue.resume("bert", moves_real_arm=False)
+    status = bench.queue.status()
+    assert (status.paused, status.reason, status.since) == (False, "resumed by bert", bench.clock.utc())
+    assert bench.queues.get("ma2000").reason == "resumed by bert"
+
+
+def test_the_presence_of_an_operator_is_shown_where_it_is_needed(bench: Bench) -> None:
+    bench.queue.resume("anna", moves_real_arm=True)
+    assert bench.queue.status().attended_until is None, "a simulated arm needs none"
+    bench.robot.identity = REAL
+    assert bench.queue.status().attended_until == bench.clock.utc() + timedelta(seconds=ATTENDANCE)
+    bench.clock.turn(20)
+    assert bench.queue.status().attended_until == bench.clock.utc() + timedelta(seconds=ATTENDANCE - 20)
+    bench.queue.attend()
+    assert bench.queue.status().attended_until == bench.clock.utc() + timedelta(seconds=ATTENDANCE)
+
+
+def test_presence_lapses_once() -> None:
+    clock = HandClock()
+    presence = Attendance(clock)
+    assert (presence.left, presence.has_lapsed()) == (0.0, False)
+    presence.say()
+    clock.turn(ATTENDANCE - 1)
+    assert (presence.left, presence.has_lapsed()) == (1.0, False)
+    clock.turn(2)
+    assert presence.left == 0.0
+    assert [presence.has_lapsed(), presence.has_lapsed()] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("arm", "line"),
+    [
+        (None, "the robot is not connected. no such port"),
+        (CALM.model_copy(update={"link": "lost"}), "the link to the robot is lost"),
+        (CALM.model_copy(update={"activity": "jog"}), "the arm is busy: jog"),
+    ],
+)
+def test_what_the_queue_waits_for_is_shown_until_nothing_waits(bench: Bench, arm: object, line: str) -> None:
+    bench.robot.arm, bench.robot.problem = arm, "no such port"
+    bench.queue.on_report(CALM if arm is None else arm)  # type: ignore[arg-type]
+    bench.queue.notices.pop_reason()
+    bench.queue.start()
+    made = bench.submit()
+    bench.until_it_waits(line)
+    assert not bench.queue.status().paused
+    bench.queue.pause("a look", "anna")
+    assert bench.queue.status().waiting_for == "", "it waits for a person"
+    bench.queue.cancel(made.id, "anna")
+    bench.queue.resume("anna", moves_real_arm=False)
+    bench.until_it_waits("")
+    assert "experiment: started" not in bench.events
+
+
+def test_whoever_has_control_keeps_the_queue_waiting(bench: Bench) -> None:
+    lease = bench.control.take("anna", moves_real_arm=True).lease
+    bench.queue.start()
+    bench.submit()
+    bench.until_it_waits("somebody has control of the robot")
+    assert not bench.queue.status().paused
+    bench.control.give_back(lease)
+    bench.until(lambda event: event == f"queue: paused: anna gave control back while 1 experiment waited: {LOOK}")
+
+
+def test_a_queue_that_meets_an_error_says_so(bench: Bench) -> None:
+    def fails() -> None:
+        raise RuntimeError("a bug")
+
+    bench.experiments.before("due", fails)
+    bench.submit()
+    bench.queue.start()
+    bench.until_it_waits("an error occurred in the queue: see the log")
+    bench.queue.wake()
+    bench.until(lambda event: event == "experiment: failed: refused")
+
+
+def test_reports_of_the_owner_reach_the_queue(bench: Bench) -> None:
+    bench.answer = None
+    made = bench.submit()
+    bench.queue.start()
+    bench.moves.wait()
+    bench.queue.on_report(Progress(fraction=0.5, text="moving"))
+    running = bench.queue.running
+    assert running is not None
+    assert (running.id, running.progress, running.text) == (made.id, 0.5, "moving")
+    bench.queue.on_report(CALM.model_copy(update={"link": "lost"}))
+    assert bench.queue.status().reason == f"the link to the robot was lost: {LOOK}"
+
+
+def test_a_robot_that_is_connected_while_work_waits_pauses_the_queue(bench: Bench) -> None:
+    bench.submit()
+    bench.queue.on_report(OPENED)
+    assert bench.queue.status().reason == f"the robot was connected while 1 experiment waited: {LOOK}"
+
+
+def test_connecting_with_nothing_waiting_pauses_nothing(bench: Bench) -> None:
+    bench.queue.on_report(OPENED)
+    assert not bench.queue.status().paused
+
+
+def test_an_event_of_the_robot_makes_the_queue_look_again(bench: Bench) -> None:
+    bench.robot.arm = CALM.model_copy(update={"activity": "jog"})
+    bench.submit()
+    bench.queue.start()
+    bench.until_it_waits("the arm is busy: jog")
+    bench.robot.arm = CALM
+    bench.queue.on_report(EventHappened(event=TraceEvent(time=0.0, kind="note", message="the jog has ended", tick=1)))
+    bench.until(lambda event: event == "experiment: failed: refused")
+
+
+@pytest.mark.parametrize(
+    ("spec", "name"),
+    [
+        (SPEC.model_copy(update={"name": "monday"}), "monday"),
+        (ExperimentSpec(trajectory=SlowRamp(), joints=(1,)), "slow ramp"),
+    ],
+)
+def test_people_know_an_experiment_by_its_name_or_its_kind(bench: Bench, spec: ExperimentSpec, name: str) -> None:
+    bench.answer = done("fault")
+    bench.queue.submit(ExperimentRequest(spec=spec), "anna", None)
+    bench.queue.start()
+    bench.until(lambda event: event == f"queue: paused: {name} failed (): {LOOK}")
+
+
+def test_the_arm_is_asked_for_what_was_submitted_under_the_word_that_was_given(bench: Bench) -> None:
+    bench.robot.identity, bench.answer = REAL, done()
+    bench.queue.resume("anna", moves_real_arm=True)
+    bench.queue.start()
+    made = bench.submit()
+    bench.until(lambda event: event == "experiment: completed")
+    number = bench.experiments.trace_number(made.id)
+    asked = {name: bench.request[name] for name in ("spec", "trace_id", "moves_real_arm", "asked")}
+    assert asked == {"spec": SPEC, "trace_id": number, "moves_real_arm": True, "asked": bench.clock.monotonic()}
+
+
+def test_a_second_person_who_resumes_does_not_take_back_the_word_of_the_first(bench: Bench) -> None:
+    bench.robot.identity, bench.answer = REAL, done()
+    bench.queue.resume("anna", moves_real_arm=True)
+    bench.queue.resume("bert", moves_real_arm=False)
+    bench.queue.start()
+    bench.submit()
+    bench.until(lambda event: event == "experiment: completed")
+
+
+def test_without_anybody_s_word_a_simulated_arm_is_asked_all_the_same(bench: Bench) -> None:
+    bench.answer = done()
+    bench.queue.start()
+    bench.submit()
+    bench.until(lambda event: event == "experiment: completed")
+    assert bench.request["moves_real_arm"] is False
+
+
+def test_a_stopped_arm_is_named_to_whoever_wants_to_resume(bench: Bench) -> None:
+    bench.queue.pause("a look", "anna")
+    bench.robot.arm = CALM.model_copy(update={"arm": "fault", "cause": "joint 2 strayed"})
+    with pytest.raises(ProblemError, match="the arm is fault: joint 2 strayed"):
+        bench.queue.resume("anna", moves_real_arm=False)
+    assert bench.queue.status().reason == "a look"
+    assert bench.events == ["queue: paused: a look"]
