@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
@@ -268,6 +268,7 @@ class Machine(FrozenRecord):
     """A machine file. `modelled_joints` are the joints (from 1) whose motion the model describes; the others are held
     and their mass is part of `load`, a point mass at the end of the last modelled link."""
 
+    shown: ClassVar[tuple[str, ...]] = ("name", "title", "modelled_joints")
     version: Literal[1]
     """Of the format."""
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]

@@ -128,6 +128,14 @@ class Trace:
     status: Integers | None = None
     events: tuple[TraceEvent, ...] = field(default=())
 
+    def __repr__(self) -> str:
+        """One line: a notebook shows it, and an array of every signal would fill the page."""
+        record = self.record
+        name = record.spec.name if record.spec is not None and record.spec.name else record.robot
+        span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
+        joints = ", ".join(map(str, self.joints))
+        return f"<Trace {record.trace_id}: {name}, {len(self.time)} samples in {span}, joints {joints}>"
+
     def __post_init__(self) -> None:
         count = len(self.time)
         if not self.joints or len(set(self.joints)) != len(self.joints):

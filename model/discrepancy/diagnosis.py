@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -280,6 +280,7 @@ class Acquired(FrozenRecord):
 class Diagnosis(FrozenRecord):
     """The whole answer."""
 
+    shown: ClassVar[tuple[str, ...]] = ("verdict", "summary", "traces", "holdout")
     format: Annotated[int, Field(ge=1)] = ANSWER_FORMAT
     verdict: Verdict
     summary: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ class JointError(FrozenRecord):
 class FitResult(FrozenRecord):
     """What a fit found. `names` and `covariance` are of everything that was free, nuisances included."""
 
+    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "samples", "whitened_mean_square", "converged")
     format: Annotated[int, Field(ge=1)] = RESULT_FORMAT
     model: Model
     """The fitted model, its lineage naming parent and traces. Nuisances are not part of it."""

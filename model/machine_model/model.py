@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,7 @@ class Model(FrozenRecord):
     Raises SpecError (through the methods that change it) for an unknown effect, joint or parameter.
     """
 
+    shown: ClassVar[tuple[str, ...]] = ("identity", "machine", "effects", "values")
     format: Annotated[int, Field(ge=1)] = MODEL_FORMAT
     machine: Machine
     effects: tuple[EffectUse, ...] = ()

@@ -40,6 +40,11 @@ class Simulation:
     power: Floats
     rows: Floats
 
+    def __repr__(self) -> str:
+        """One line, for notebooks."""
+        joints = ", ".join(map(str, self.joints))
+        return f"<Simulation: {len(self.time)} periods to {self.time[-1]:.1f} s, joints {joints}>"
+
     def at_samples(self, signal: Floats) -> Floats:
         """A signal (k, …) at the samples of the record, (m, …): picked, or interpolated between periods."""
         return at_rows(signal, self.rows)

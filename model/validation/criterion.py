@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
@@ -52,6 +53,7 @@ class Fidelity(FrozenRecord):
     The model explains the record when `sum_of_contributions` (Σλ²) is at least 1.
     """
 
+    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "sum_of_contributions", "explains")
     model: str
     traces: tuple[str, ...]
     outputs: tuple[int, ...]

@@ -1,0 +1,114 @@
+"""MA2000 DAQ for programs and notebooks: connect, run, read, simulate, fit, validate, diagnose.
+
+    import ma2000
+
+    with ma2000.connect("mock://?lock_step=1") as arm:
+        trace = arm.run("ramp").trace
+    model = ma2000.base_model(ma2000.load_machine("ma2000"))
+    answer = ma2000.diagnose(model, [trace])
+
+What `__all__` names is the public interface (docs/python.md); everything else of the packages is internal and may
+change with any version.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from ma2000.own_packages import require_own_packages
+
+if TYPE_CHECKING:
+    from daq.client import Client as Client
+    from daq.contracts.errors import DaqError as DaqError
+    from daq.contracts.experiment import ExperimentSpec as ExperimentSpec
+    from daq.contracts.machine import Machine as Machine
+    from daq.contracts.machine import load_machine as load_machine
+    from daq.contracts.trace import Trace as Trace
+    from daq.trajectories.presets import PRESETS as PRESETS
+    from ma2000.arm import Arm as Arm
+    from ma2000.arm import connect as connect
+    from ma2000.files import read_trace as read_trace
+    from ma2000.files import read_traces as read_traces
+    from ma2000.files import write_trace as write_trace
+    from ma2000.pictures import plot as plot
+    from ma2000.running import Run as Run
+    from ma2000.running import RunError as RunError
+    from ma2000.running import run as run
+    from ma2000.studies import design as design
+    from ma2000.studies import diagnose as diagnose
+    from ma2000.studies import validate as validate
+    from model.design.search import DesignedExperiments as DesignedExperiments
+    from model.design.search import DesignOptions as DesignOptions
+    from model.discrepancy.diagnosis import Diagnosis as Diagnosis
+    from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
+    from model.fitting.fit import fit as fit
+    from model.fitting.options import FitOptions as FitOptions
+    from model.fitting.result import FitResult as FitResult
+    from model.machine_model.model import Model as Model
+    from model.machine_model.model import base_model as base_model
+    from model.machine_model.model_file import load_model as load_model
+    from model.machine_model.model_file import save_model as save_model
+    from model.simulation.simulate import Simulation as Simulation
+    from model.simulation.simulate import simulate as simulate
+    from model.validation.criterion import Fidelity as Fidelity
+
+_HOME = {
+    "PRESETS": "daq.trajectories.presets",
+    "Arm": "ma2000.arm",
+    "Client": "daq.client",
+    "DaqError": "daq.contracts.errors",
+    "DesignOptions": "model.design.search",
+    "DesignedExperiments": "model.design.search",
+    "Diagnosis": "model.discrepancy.diagnosis",
+    "DiagnosisOptions": "model.discrepancy.options",
+    "ExperimentSpec": "daq.contracts.experiment",
+    "Fidelity": "model.validation.criterion",
+    "FitOptions": "model.fitting.options",
+    "FitResult": "model.fitting.result",
+    "Machine": "daq.contracts.machine",
+    "Model": "model.machine_model.model",
+    "Run": "ma2000.running",
+    "RunError": "ma2000.running",
+    "Simulation": "model.simulation.simulate",
+    "Trace": "daq.contracts.trace",
+    "base_model": "model.machine_model.model",
+    "connect": "ma2000.arm",
+    "design": "ma2000.studies",
+    "diagnose": "ma2000.studies",
+    "fit": "model.fitting.fit",
+    "load_machine": "daq.contracts.machine",
+    "load_model": "model.machine_model.model_file",
+    "plot": "ma2000.pictures",
+    "read_trace": "ma2000.files",
+    "read_traces": "ma2000.files",
+    "run": "ma2000.running",
+    "save_model": "model.machine_model.model_file",
+    "simulate": "model.simulation.simulate",
+    "validate": "ma2000.studies",
+    "write_trace": "ma2000.files",
+}
+"""Module of each public name. They are imported when they are first used: a notebook that only reads traces waits for
+no compiler."""
+
+__all__ = [  # noqa: PLE0604
+    *_HOME,
+    "__version__",
+]
+__version__ = version("ma2000-daq")
+
+require_own_packages()
+
+
+def __getattr__(name: str) -> object:
+    """Imports a public name on its first use."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'ma2000' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
+    found: object = getattr(import_module(_HOME[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,33 @@
+"""Traces in files, by names that a notebook has at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from daq.contracts.trace import Trace
+from daq.traces import reader, store
+from daq.traces.csv_table import import_csv
+
+
+def read_trace(path: Path | str) -> Trace:
+    """The trace in a file: MCAP, or CSV as docs/own-machine.md describes it. Raises TraceError, SpecError."""
+    path = Path(path)
+    return import_csv(path) if path.suffix == ".csv" else reader.read_trace(path)
+
+
+def read_traces(folder: Path | str, pattern: str = "*.mcap") -> tuple[Trace, ...]:
+    """Every trace of a folder whose file's name matches, in the order of names, which is that of time.
+
+    Raises TraceError for a file that cannot be read.
+    """
+    return tuple(map(read_trace, _sorted(Path(folder).glob(pattern))))
+
+
+def write_trace(trace: Trace, path: Path | str) -> Path:
+    """Writes a trace as MCAP; nothing is written over. Returns the path. Raises TraceError."""
+    return store.write_trace(trace, Path(path))
+
+
+def _sorted(paths: Iterable[Path]) -> list[Path]:
+    return sorted(paths, key=lambda path: path.name)

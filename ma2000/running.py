@@ -1,0 +1,113 @@
+"""Runs an experiment in an acquisition process of its own, as `daq run` does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from daq.acquisition.messages import Failed, Finished, Job, Progress
+from daq.acquisition.parent import Acquisition
+from daq.config.robot_files import load_memory_map
+from daq.contracts.consent import require_word
+from daq.contracts.documents import read_text
+from daq.contracts.errors import DaqError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import Machine, load_machine
+from daq.contracts.progress import Progress as ToldProgress
+from daq.contracts.progress import silent
+from daq.contracts.trace import Outcome, Trace
+from daq.traces.reader import read_trace
+from daq.trajectories.presets import preset
+from daq.transport import parse_port_url
+
+MOCK = "mock://?lock_step=1"
+"""The port where none is named: a mock that runs as fast as this computer can, and moves nothing."""
+
+
+class RunError(DaqError):
+    """Nothing was recorded."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code  # type: ignore[misc]
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a run ended. `reason` is empty for a complete one; `missing` samples were not received."""
+
+    file: Path
+    outcome: Outcome
+    samples: int
+    missing: int
+    reason: str = ""
+
+    @cached_property
+    def trace(self) -> Trace:
+        """What was recorded. Raises TraceError if the file cannot be read any more."""
+        return read_trace(self.file)
+
+
+def run(
+    experiment: ExperimentSpec | str = "ramp",
+    port: str = MOCK,
+    *,
+    folder: Path | str = "traces",
+    machine: Machine | None = None,
+    memory_map: Path | None = None,
+    moves_real_arm: bool = False,
+    progress: ToldProgress = silent,
+) -> Run:
+    """Runs an experiment, or the preset of that name, and records its trace in `folder`.
+
+    An interrupt (Ctrl-C, a notebook's stop button) stops the arm; the trace so far is closed, and a note of the
+    KeyboardInterrupt names it.
+
+    Args:
+        port: URL of the controller's port: `serial:///dev/ttyUSB0`, `tcp://…`, `mock://…`.
+        machine: the machine that the limits and angles are of; None for the MA2000.
+        memory_map: file of the controller's addresses; None for the one that ships.
+        moves_real_arm: the operator's consent. Without it, a controller that is not simulated is refused.
+        progress: is told the fraction done and one line.
+
+    Raises:
+        SpecError: for an unknown preset, a port or a file that is not valid.
+        SafetyError, RunError: nothing was recorded: no controller, a motion outside the limits, no consent.
+    """
+    spec = preset(experiment).spec if isinstance(experiment, str) else experiment
+    machine = machine or load_machine("ma2000")
+    parse_port_url(port)  # an invalid port is refused without starting a process
+    if memory_map is not None:
+        load_memory_map(memory_map)
+    job = Job(
+        url=port,
+        machine=machine,
+        limits=machine.limits,
+        spec=spec,
+        folder=Path(folder),
+        memory_map=None if memory_map is None else read_text(memory_map, f"memory map {memory_map}"),
+        moves_real_arm=require_word(moves_real_arm),
+    )
+    with Acquisition(job) as process:
+        try:
+            end = _end_of(process, progress)
+        except KeyboardInterrupt as interrupt:
+            process.stop()
+            stopped = _end_of(process, silent)
+            if isinstance(stopped, Finished):
+                interrupt.add_note(f"the arm was stopped; recorded until then: {stopped.trace}")
+            raise
+    if isinstance(end, Failed):
+        raise RunError(end.message, end.exit_code)
+    return Run(end.trace, end.outcome, end.samples, end.missing, end.reason)
+
+
+def _end_of(process: Acquisition, progress: ToldProgress) -> Finished | Failed:
+    """Hears the reports of a run to its last."""
+    for report in process:
+        if isinstance(report, Progress):
+            progress(report.fraction, report.text)
+        elif isinstance(report, Finished | Failed):
+            return report
+    raise AssertionError("an acquisition always ends with a report")

@@ -1,0 +1,73 @@
+"""Design, validation and diagnosis with the defaults of the commands of the same names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from daq.contracts.progress import Cancel, Progress, silent
+from daq.contracts.trace import Trace
+from daq.safety.planned import planned
+from model.design import search
+from model.design.search import DesignedExperiments, DesignOptions
+from model.discrepancy import workflow
+from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.options import DiagnosisOptions
+from model.fitting.options import FitOptions
+from model.machine_model.model import Model
+from model.simulation.prepared import Options
+from model.validation.criterion import Fidelity
+from model.validation.fidelity import validate_by_distortion
+from model.validation.names import names_to_validate
+from server.jobs.next_experiment import experiment_chooser
+
+
+def validate(
+    model: Model,
+    traces: Sequence[Trace],
+    parameters: Sequence[str] | None = None,
+    *,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> Fidelity:
+    """Whether expected deviations of the parameters explain the model's errors, by distortion: Σλ² (thesis, chapter 4).
+
+    Args:
+        parameters: names or patterns (`joint2.*`); None for those that were fitted, or else for all uncertain ones.
+
+    Raises SpecError, TraceError; CancelledError when asked to end.
+    """
+    names = names_to_validate(model, parameters)
+    options = Options(quantise=False)
+    return validate_by_distortion(model, traces, names, options=options, progress=progress, cancel=cancel)
+
+
+def diagnose(
+    model: Model,
+    traces: Sequence[Trace],
+    holdout: Sequence[Trace] = (),
+    options: DiagnosisOptions | None = None,
+    *,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> Diagnosis:
+    """Where a model and traces disagree, which effects are missing, and what to measure next.
+
+    Raises TraceError, SpecError for input that cannot give an answer; CancelledError when asked to end.
+    """
+    chooser = experiment_chooser(model.machine)
+    return workflow.diagnose(model, traces, holdout, options, progress, cancel, chooser)
+
+
+def design(
+    model: Model,
+    options: DesignOptions | None = None,
+    fit_options: FitOptions | None = None,
+    *,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> DesignedExperiments:
+    """Experiments within the machine's limits that make the parameters of `fit_options` best known together.
+
+    Raises SpecError when no candidate is within the limits; CancelledError when asked to end.
+    """
+    return search.design(model, lambda spec: planned(spec, model.machine), options, fit_options, progress, cancel)

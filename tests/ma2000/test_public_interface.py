@@ -1,0 +1,93 @@
+"""`import ma2000`: its names, what it loads, and what it says of files in its way."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ma2000
+from daq.contracts.machine import load_machine
+from ma2000 import _HOME
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "python.md").read_text("utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+
+
+def python(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command, environment = [sys.executable, *arguments], {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_every_public_name_is_there_and_has_a_docstring() -> None:
+    for name in _HOME:
+        found = getattr(ma2000, name)
+        assert found.__doc__, name
+        assert name in dir(ma2000)
+
+
+def test_types_see_the_names_that_programs_get() -> None:
+    tree = ast.parse(Path(ma2000.__file__).read_text("utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    seen = {alias.asname: node.module for node in imports for alias in node.names if alias.asname}
+    assert seen == _HOME
+
+
+def test_the_page_names_what_is_public_and_nothing_else() -> None:
+    table = PAGE.partition("## The public names")[2]
+    rows = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} == set(ma2000.__all__)
+    used = {name for block in BLOCKS for name in re.findall(r"ma2000\.(\w+)", block)}
+    assert used <= set(ma2000.__all__)
+
+
+def test_an_unknown_name_is_told_with_those_there_are() -> None:
+    with pytest.raises(AttributeError, match=r"no attribute 'simulat'; it has .*simulate"):
+        ma2000.simulat  # noqa: B018
+
+
+def test_reading_traces_loads_no_compiler_and_no_service(tmp_path: Path) -> None:
+    heavy = "{'numba', 'scipy', 'fastapi', 'matplotlib', 'mujoco'}"
+    done = python(
+        "-c", f"import sys, ma2000; ma2000.read_trace; print(sorted({heavy} & set(sys.modules)))", folder=tmp_path
+    )
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "[]", "")
+
+
+@pytest.mark.parametrize("name", ["model.py", "server/__init__.py"])
+def test_a_file_that_hides_a_package_is_named_in_one_line(tmp_path: Path, name: str) -> None:
+    hiding = tmp_path / name
+    hiding.parent.mkdir(exist_ok=True)
+    hiding.write_text("mine = 1\n")
+    done = python("-c", "import ma2000", folder=tmp_path)
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith(f"ma2000.own_packages.HiddenPackageError: {tmp_path / Path(name).parts[0]}: has the name of")
+    assert "rename it" in last
+
+
+def test_what_a_notebook_shows_of_a_machine_or_model_is_short() -> None:
+    model = ma2000.base_model(load_machine("ma2000"))
+    assert (
+        repr(model.machine)
+        == "Machine(name='ma2000', title='TQ MA2000 educational robot arm', modelled_joints=(1, 2, 3))"
+    )
+    assert len(repr(model)) < 500
+    assert model.identity in repr(model)
+
+
+@pytest.mark.slow
+def test_the_page_s_programs_run_and_pass_a_strict_check_of_types(tmp_path: Path) -> None:
+    program = "\n".join(BLOCKS).replace("first_file", "sorted(Path('traces').glob('*.mcap'))[0]")
+    file = tmp_path / "program.py"
+    file.write_text(f"from pathlib import Path\n{program}\n")
+    checked = python(
+        "-m", "mypy", "--strict", "--no-error-summary", "--ignore-missing-imports", file.name, folder=tmp_path
+    )
+    assert checked.returncode == 0, checked.stdout
+    done = python(file.name, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
