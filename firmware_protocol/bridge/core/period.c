@@ -1,0 +1,282 @@
+/* Following the controller by watching its memory.
+ *
+ * Once a period the controller stores what it measured, and some bit of six positions of 12 bits changes nearly every
+ * time, since converters are noisy. The first change that is seen gives the phase. From then on the bridge looks only
+ * around the moment when the next results are due, and counts periods by its own clock where nothing changes. */
+#include "period.h"
+
+#include <string.h>
+
+#include "registers.h"
+#include "ring.h"
+#include "sampling.h"
+#include "session.h"
+#include "stop.h"
+
+/* From the beginning of a period, when the controller fetches set points, to its storing the results. Assumed: the
+ * mock's computing delay. If it is wrong, set points may be reported with a tick that is one off. */
+#define STORED_AFTER_US 6000ul
+/* The memory is left alone for so long around the fetch: longer than the bridge's longest access, and than the fetch. */
+#define CLEAR_BEFORE_FETCH_US 600ul
+#define CLEAR_AFTER_FETCH_US 500ul
+/* Longer than the controller takes to store all results of a period (assumed, as in PROTOCOL.md, section 5). */
+#define STORING_US 2000ul
+/* Between the two readings of a snapshot, and between further ones while they disagree. */
+#define READ_AGAIN_US 100ul
+/* A snapshot that has not become whole by then, after its results began to be stored, is missing. */
+#define GIVE_UP_US 8000ul
+
+/* A look is a reading of all positions. While nothing is known, one a millisecond: each may cost the controller a
+ * fetch. Around the due moment, more often. Where periods are not followed, only a loss of supply is looked for. */
+#define SEARCH_EVERY_US 1000ul
+#define EXPECT_EVERY_US 200ul
+#define SUPPLY_EVERY_US 40000ul
+#define EXPECT_EARLY_US 500ul
+#define EXPECT_LATE_US 1000ul
+/* After so many periods without any change the controller has stopped, or its board is not the one expected. */
+#define MOST_UNCHANGED_PERIODS 25u
+/* A result that comes late moves the expected moment by this part of the delay: most are seen late, none early. */
+#define LATE_SHARE 8u
+
+enum following {
+    SEARCHING, /* the phase is unknown */
+    EXPECTING, /* the next results are due PERIOD_US after the last */
+    SETTLING   /* results are being stored, or are read */
+};
+
+static enum period_source source;
+static enum following following;
+static uint32_t tick;           /* number of the period whose results were stored last */
+static uint32_t stored_us;      /* when their storing began */
+static uint32_t looked_us;      /* when the memory was read last */
+static bool has_looked;
+static bool has_supply;
+static uint8_t positions[POSITION_BYTES]; /* at the last look */
+static uint8_t unchanged_periods;
+static struct snapshot first_reading;
+static bool is_read_once;
+static uint32_t written_tick; /* period_tick() when set points were written last */
+static uint32_t missed;
+
+void period_start(enum period_source period_source)
+{
+    source = period_source;
+    following = SEARCHING;
+    tick = 0;
+    has_looked = false;
+    has_supply = true;
+    unchanged_periods = 0;
+    is_read_once = false;
+    written_tick = 0;
+    missed = 0;
+    ring_clear();
+}
+
+bool period_is_followed(void)
+{
+    return source == PERIOD_TOLD || following != SEARCHING;
+}
+
+uint32_t period_tick(uint32_t now_us)
+{
+    const bool next_has_begun =
+        source == PERIOD_WATCHED && following != SEARCHING && now_us - stored_us >= PERIOD_US - STORED_AFTER_US;
+    return next_has_begun ? tick + 1u : tick;
+}
+
+bool period_wants_memory(uint32_t now_us)
+{
+    const uint32_t since_us = now_us - stored_us;
+    return source == PERIOD_WATCHED && following != SEARCHING &&
+           since_us >= PERIOD_US - STORED_AFTER_US - CLEAR_BEFORE_FETCH_US &&
+           since_us < PERIOD_US - STORED_AFTER_US + CLEAR_AFTER_FETCH_US;
+}
+
+void period_set_points_written(uint32_t now_us)
+{
+    written_tick = period_tick(now_us);
+}
+
+uint32_t period_missed_set_points(void)
+{
+    return missed;
+}
+
+/* ---- the board's supply */
+
+static void begin_new_life(void)
+{
+    session_board_was_reset();
+    sampling_board_was_reset();
+    ring_clear();
+    following = SEARCHING;
+    tick = 0;
+    written_tick = 0;
+    unchanged_periods = 0;
+    is_read_once = false;
+}
+
+/* A memory in which all positions are zero belongs to a board without supply. */
+static bool all_zero(const uint8_t bytes[POSITION_BYTES])
+{
+    for (uint8_t i = 0; i < POSITION_BYTES; ++i) {
+        if (bytes[i] != 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Reads the positions. True when they differ from the last look, and the board had its supply at both. */
+static bool look(uint32_t now_us)
+{
+    uint8_t seen[POSITION_BYTES];
+    read_positions(seen);
+    const bool powered = !all_zero(seen);
+    const bool changed = has_looked && has_supply && powered && memcmp(seen, positions, POSITION_BYTES) != 0;
+    if (!powered && has_supply) {
+        session_end();
+        ring_clear();
+        following = SEARCHING;
+        tick = 0;
+    } else if (powered && !has_supply) {
+        begin_new_life();
+    }
+    has_supply = powered;
+    has_looked = true;
+    looked_us = now_us;
+    memcpy(positions, seen, POSITION_BYTES);
+    return changed;
+}
+
+static bool look_is_due(uint32_t now_us, uint32_t every_us)
+{
+    return !has_looked || now_us - looked_us >= every_us;
+}
+
+/* ---- snapshots */
+
+static void read_snapshot(struct snapshot *snapshot)
+{
+    snapshot->status = 0;
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        struct reading reading;
+        read_joint(joint, &reading);
+        pack(&reading, snapshot->joints[joint]);
+    }
+}
+
+/* Whether the controller has left set points in the memory that it should have taken in period `tick`. */
+static bool has_missed(uint16_t in_memory, uint16_t taken)
+{
+    return written_tick < tick && in_memory <= LARGEST_SET_POINT && in_memory != taken;
+}
+
+/* Puts in the set points that the controller took, which are not those in the memory while it has missed some, or when
+ * others were written since. */
+static void keep_snapshot(struct snapshot *snapshot)
+{
+    bool missed_one = false;
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        struct reading reading;
+        unpack(snapshot->joints[joint], &reading);
+        const uint16_t taken = set_point_taken(&reading);
+        missed_one = missed_one || has_missed(reading.set_point, taken);
+        reading.set_point = taken;
+        pack(&reading, snapshot->joints[joint]);
+    }
+    snapshot->status = (uint8_t)((stop_is_in_force() ? STATUS_FROZEN : 0) | (missed_one ? STATUS_SET_POINT_MISSED : 0));
+    missed += missed_one;
+    ring_add(tick, snapshot);
+}
+
+/* ---- following */
+
+static void begin_settling(uint32_t began_us)
+{
+    stored_us = began_us;
+    ++tick;
+    following = SETTLING;
+    is_read_once = false;
+}
+
+static void search(uint32_t now_us)
+{
+    if (tick > 0 && now_us - stored_us >= PERIOD_US) { /* once followed, ticks go on by the bridge's own clock */
+        stored_us += PERIOD_US;
+        ++tick;
+    }
+    if (look_is_due(now_us, SEARCH_EVERY_US) && look(now_us)) {
+        unchanged_periods = 0;
+        begin_settling(now_us);
+    }
+}
+
+static void expect(uint32_t now_us)
+{
+    const uint32_t since_us = now_us - stored_us;
+    if (since_us < PERIOD_US - EXPECT_EARLY_US || !look_is_due(now_us, EXPECT_EVERY_US)) {
+        return;
+    }
+    if (look(now_us)) {
+        unchanged_periods = 0;
+        const uint32_t due_us = stored_us + PERIOD_US;
+        begin_settling(since_us < PERIOD_US ? now_us : due_us + (now_us - due_us) / LATE_SHARE);
+    } else if (following == EXPECTING && since_us >= PERIOD_US + EXPECT_LATE_US) {
+        if (++unchanged_periods > MOST_UNCHANGED_PERIODS) {
+            following = SEARCHING;
+            ring_clear();
+        } else {
+            begin_settling(stored_us + PERIOD_US);
+        }
+    }
+}
+
+static void settle(uint32_t now_us)
+{
+    const uint32_t since_us = now_us - stored_us;
+    if (since_us < STORING_US || now_us - looked_us < READ_AGAIN_US) {
+        return;
+    }
+    struct snapshot reading;
+    read_snapshot(&reading);
+    const bool agree = is_read_once && memcmp(&reading, &first_reading, sizeof reading) == 0;
+    first_reading = reading;
+    is_read_once = true;
+    looked_us = now_us;
+    if (!agree && since_us < GIVE_UP_US) {
+        return;
+    }
+    following = EXPECTING;
+    look(now_us); /* what the next results are compared with, and whether the board has its supply */
+    if (agree && has_supply && tick > 0) {
+        keep_snapshot(&reading);
+    }
+}
+
+void period_work(uint32_t now_us)
+{
+    if (source != PERIOD_WATCHED) {
+        if (look_is_due(now_us, SUPPLY_EVERY_US)) {
+            look(now_us);
+        }
+    } else if (following == SEARCHING) {
+        search(now_us);
+    } else if (following == EXPECTING) {
+        expect(now_us);
+    } else {
+        settle(now_us);
+    }
+}
+
+void period_ended(uint32_t now_us)
+{
+    if (source != PERIOD_TOLD) {
+        return;
+    }
+    struct snapshot reading;
+    ++tick;
+    stored_us = now_us;
+    read_snapshot(&reading);
+    keep_snapshot(&reading);
+}

@@ -1,0 +1,32 @@
+"""What the tests compile of the bridge in C: with its own Makefile, into build/, once for all workers."""
+
+from __future__ import annotations
+
+import fcntl
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCES = ROOT / "firmware_protocol" / "bridge"
+BUILD = ROOT / "build" / "firmware"
+PACKAGES = {"gcc": "gcc", "make": "make", "avr-gcc": "gcc-avr avr-libc", "clang": "clang", "cppcheck": "cppcheck"}
+"""Program → what Debian calls the packages that it needs."""
+
+
+def need(*programs: str) -> None:
+    """Skips the test where a program is missing; under CI a skip is an error."""
+    for program in programs:
+        if shutil.which(program) is None:
+            pytest.skip(f"no {program}: apt install {PACKAGES[program]}")
+
+
+def made(target: str, file: str, *settings: str) -> Path:
+    """The file that a target of the bridge's Makefile leaves in build/firmware."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        subprocess.run(["make", "-s", "-C", SOURCES, f"BUILD={BUILD}", *settings, target], check=True)
+    return BUILD / file
