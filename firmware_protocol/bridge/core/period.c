@@ -134,13 +134,8 @@ static bool look(uint32_t now_us)
     read_positions(seen);
     const bool powered = !all_zero(seen);
     const bool changed = has_looked && has_supply && powered && memcmp(seen, positions, POSITION_BYTES) != 0;
-    if (!powered && has_supply) {
-        session_end();
-        ring_clear();
-        following = SEARCHING;
-        tick = 0;
-    } else if (powered && !has_supply) {
-        begin_new_life();
+    if (powered != has_supply && (!powered || session_is_open())) {
+        begin_new_life(); /* when the supply fails, and when it returns to hosts that have greeted meanwhile */
     }
     has_supply = powered;
     has_looked = true;
@@ -257,7 +252,7 @@ static void settle(uint32_t now_us)
 void period_work(uint32_t now_us)
 {
     if (source != PERIOD_WATCHED) {
-        if (look_is_due(now_us, SUPPLY_EVERY_US)) {
+        if (look_is_due(now_us, has_supply ? SUPPLY_EVERY_US : SEARCH_EVERY_US)) {
             look(now_us);
         }
     } else if (following == SEARCHING) {

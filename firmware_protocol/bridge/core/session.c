@@ -47,6 +47,11 @@ void session_end(void)
     present = 0;
 }
 
+bool session_is_open(void)
+{
+    return present != 0;
+}
+
 void session_board_was_reset(void)
 {
     session_end();

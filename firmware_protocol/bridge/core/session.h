@@ -17,6 +17,7 @@ uint32_t newest_number(void);
 uint32_t session_greet(uint32_t nonce);
 
 void session_end(void);
+bool session_is_open(void);
 
 /* The board was reset: the session ends, and hosts are told. */
 void session_board_was_reset(void);
