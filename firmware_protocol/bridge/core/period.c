@@ -35,8 +35,9 @@
 #define EXPECT_LATE_US 1000ul
 /* After so many periods without any change the controller has stopped, or its board is not the one expected. */
 #define MOST_UNCHANGED_PERIODS 25u
-/* A result that comes late moves the expected moment by this part of the delay: most are seen late, none early. */
-#define LATE_SHARE 8u
+/* A result that comes late moves the expected moment by this part of the delay, so that clocks may differ by 1 %; one
+ * that comes early moves it at once, since a change may be seen late but never early. */
+#define LATE_SHARE 2u
 
 enum following {
     SEARCHING, /* the phase is unknown */

@@ -1,0 +1,39 @@
+/* Timer 1 counts half microseconds; its overflows, every 32.768 ms, are counted by an interrupt. */
+#include "clock.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
+
+#include "../core/core.h"
+
+#define US_PER_OVERFLOW 32768ul
+
+static volatile uint32_t overflowed_us;
+
+void clock_start(void)
+{
+    TCCR1A = 0;
+    TCCR1B = 1u << CS11; /* 16 MHz / 8 */
+    TIMSK1 = 1u << TOIE1;
+}
+
+ISR(TIMER1_OVF_vect)
+{
+    overflowed_us += US_PER_OVERFLOW;
+}
+
+uint32_t board_time_us(void)
+{
+    uint32_t us = 0;
+    uint16_t half_us = 0;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        half_us = TCNT1;
+        us = overflowed_us;
+        if ((TIFR1 & (1u << TOV1)) != 0 && half_us < 0x8000u) {
+            us += US_PER_OVERFLOW; /* it has overflowed, and the interrupt is still to come */
+        }
+    }
+    return us + (half_us >> 1);
+}

@@ -1,0 +1,44 @@
+#include "uart.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+
+#ifndef BAUD
+#define BAUD 115200ul
+#endif
+/* With double speed, rounded to the nearest: 117,647 baud at 115200, as every Mega has, its USB adapter too. */
+#define DIVISOR ((F_CPU + 4ul * BAUD) / (8ul * BAUD) - 1ul)
+
+/* 256 bytes, so that places wrap by themselves: more than comes while a stop reads the posture (8 ms). */
+static volatile uint8_t received[256];
+static volatile uint8_t received_end;
+static uint8_t received_begin;
+
+void uart_start(void)
+{
+    UBRR0 = (uint16_t)DIVISOR;
+    UCSR0A = 1u << U2X0;
+    UCSR0C = (1u << UCSZ01) | (1u << UCSZ00);
+    UCSR0B = (1u << RXCIE0) | (1u << RXEN0) | (1u << TXEN0);
+}
+
+ISR(USART0_RX_vect)
+{
+    received[received_end] = UDR0;
+    ++received_end;
+}
+
+int16_t uart_next_byte(void)
+{
+    return received_begin == received_end ? -1 : received[received_begin++];
+}
+
+bool uart_can_send(void)
+{
+    return (UCSR0A & (1u << UDRE0)) != 0;
+}
+
+void uart_send(uint8_t byte)
+{
+    UDR0 = byte;
+}
