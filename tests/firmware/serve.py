@@ -17,13 +17,18 @@ from mock_controller.device import Device, build_device
 from mock_controller.options import Options, read_options
 from mock_controller.server import Server
 from tests.firmware.hosted_link import HostedLink
+from tests.firmware.mega_link import MegaLink, board_on_the_bus
 
 
 def _hosted(device: Device, options: Options) -> Any:
     return HostedLink(device, sees_period=options.sample)
 
 
-LINKS: dict[str, Callable[[Device, Options], Any]] = {"hosted": _hosted}
+def _mega2560(device: Device, options: Options) -> Any:
+    return MegaLink(device)
+
+
+LINKS: dict[str, Callable[[Device, Options], Any]] = {"hosted": _hosted, "mega2560": _mega2560}
 
 
 def main(arguments: list[str]) -> int:
@@ -31,11 +36,12 @@ def main(arguments: list[str]) -> int:
     if not arguments or arguments[0] not in LINKS:
         print(__doc__, file=sys.stderr)
         return 2
-    link = LINKS[arguments[0]]
+    name = arguments[0]
 
     def build(options: Options, disconnect: Callable[[float], None]) -> Device:
+        options = board_on_the_bus(options) if name == "mega2560" else options
         device = build_device(options, disconnect)
-        return replace(device, link=link(device, options))
+        return replace(device, link=LINKS[name](device, options))
 
     signal.signal(signal.SIGTERM, _interrupt)
     try:

@@ -75,7 +75,8 @@ class Simulator:
 
     def give(self) -> bytes:
         """Bytes from the UART."""
-        return self._room.raw[: self._library.simulator_give(self._room, _ROOM)]
+        given: int = self._library.simulator_give(self._room, _ROOM)
+        return self._room.raw[:given]
 
     @property
     def bus(self) -> BusReport:

@@ -44,20 +44,25 @@ static void keep_state(void)
     }
 }
 
-static void serve_line(void)
+/* Whether there is more to do for the line at once. */
+static bool serve_line(void)
 {
+    bool busy = !uart_can_send();
     if (uart_can_send()) {
         const int16_t reply = bridge_next_byte();
         if (reply >= 0) {
             uart_send((uint8_t)reply);
+            busy = true;
         }
     }
     if (bridge_wants_byte()) {
         const int16_t byte = uart_next_byte();
         if (byte >= 0) {
             bridge_take_byte((uint8_t)byte);
+            busy = true;
         }
     }
+    return busy;
 }
 
 int main(void)
@@ -68,8 +73,11 @@ int main(void)
     sei();
     start_bridge();
     for (;;) {
-        serve_line();
+        const bool busy = serve_line();
         bridge_work();
         keep_state();
+        if (!busy) {
+            clock_rest();
+        }
     }
 }

@@ -27,6 +27,7 @@ static uint8_t (*read_memory)(uint16_t, uint64_t);
 static void (*write_memory)(uint16_t, uint8_t, uint64_t);
 static struct bus_report report;
 
+static uint64_t timer_since; /* when timer 0 was started */
 static uint8_t address;
 static uint8_t port_g = NPGFC | READ_NOT_WRITE;
 static uint8_t data_out;
@@ -49,11 +50,26 @@ static void note_least(int32_t *least, int32_t value)
     }
 }
 
-/* When 1MHzE rose last, as timer 0 has it. */
+/* When 1MHzE rose last. */
 static uint64_t last_rise(void)
 {
-    const avr_io_addr_t io = AVR_DATA_TO_IO(TCNT0);
-    return avr->cycle - avr->io[io].r.c(avr, TCNT0, avr->io[io].r.param);
+    return avr->cycle - (avr->cycle - timer_since) % (2u * HALF);
+}
+
+/* Timer 0 as far as this firmware uses it, 0 to 15 with every clock: simavr's own would interrupt the simulation a
+ * million times a second for it. check_clock() sees that it is set up so. */
+static void timer_starts(avr_t *processor, avr_io_addr_t io, uint8_t value, void *parameter)
+{
+    (void)parameter;
+    processor->data[io] = value;
+    timer_since = processor->cycle + 1u;
+}
+
+static uint8_t timer_is_read(avr_t *processor, avr_io_addr_t io, void *parameter)
+{
+    (void)parameter;
+    processor->data[io] = (uint8_t)((processor->cycle - timer_since) % (2u * HALF));
+    return processor->data[io];
 }
 
 static void put_on_data_lines(uint8_t value)
@@ -211,6 +227,9 @@ void bus_model_start(avr_t *processor, uint8_t (*read_byte)(uint16_t, uint64_t),
     memset(&report, 0, sizeof report);
     report.least_select_setup_ns = report.least_address_setup_ns = INT32_MAX;
     report.least_hold_ns = report.least_data_hold_ns = INT32_MAX;
+    timer_since = 0;
+    avr->io[AVR_DATA_TO_IO(TCCR0B)].w.c = timer_starts;
+    avr->io[AVR_DATA_TO_IO(TCNT0)].r.c = timer_is_read;
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('A'), IOPORT_IRQ_REG_PORT), port_a_written, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_REG_PORT), port_c_written, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_DIRECTION_ALL), port_c_turned,

@@ -52,16 +52,22 @@ static void uart_sends(struct avr_irq_t *irq, uint32_t value, void *parameter)
     (void)queue_put(&from_uart, (uint8_t)value);
 }
 
-static void uart_has_room_now(struct avr_irq_t *irq, uint32_t value, void *parameter)
+/* Hands over bytes until the UART says that it is full. */
+static void feed_uart(void)
+{
+    uint8_t byte = 0;
+    while (uart_has_room && queue_get(&to_uart, &byte)) {
+        avr_raise_irq(uart_input, byte);
+    }
+}
+
+static void uart_has_room_again(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
     (void)irq;
     (void)value;
     (void)parameter;
     uart_has_room = true;
-    uint8_t byte = 0;
-    while (uart_has_room && queue_get(&to_uart, &byte)) {
-        avr_raise_irq(uart_input, byte);
-    }
+    feed_uart();
 }
 
 static void uart_is_full(struct avr_irq_t *irq, uint32_t value, void *parameter)
@@ -72,6 +78,13 @@ static void uart_is_full(struct avr_irq_t *irq, uint32_t value, void *parameter)
     uart_has_room = false;
 }
 
+/* Sleep takes no time of this computer: the caller says how far the clock may go. */
+static void sleep_without_waiting(avr_t *processor, avr_cycle_count_t clocks)
+{
+    (void)processor;
+    (void)clocks;
+}
+
 static void connect_uart(void)
 {
     uint32_t flags = 0;
@@ -80,7 +93,8 @@ static void connect_uart(void)
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     uart_input = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), uart_sends, NULL);
-    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XON), uart_has_room_now, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XON), uart_has_room_again,
+                            NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XOFF), uart_is_full, NULL);
 }
 
@@ -97,6 +111,7 @@ int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t, uint64_t),
         return -1;
     }
     avr->frequency = CLOCK_HZ;
+    avr->sleep = sleep_without_waiting;
     avr_load_firmware(avr, &firmware);
     memset(avr->data + avr->ramend / 2u, UNTOUCHED, avr->ramend / 2u);
     memset(&to_uart, 0, sizeof to_uart);
@@ -109,7 +124,7 @@ int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t, uint64_t),
 
 int simulator_run(uint64_t clock)
 {
-    uart_has_room_now(NULL, 0, NULL);
+    feed_uart();
     while (avr->cycle < clock) {
         const int state = avr_run(avr);
         if (state == cpu_Done || state == cpu_Crashed) {
