@@ -6,11 +6,9 @@ simulated one. Everything else is the mock's: `--pty`, `--no-sample`, `--start`,
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from types import FrameType
 from typing import Any
 
 from mock_controller.device import Device, build_device
@@ -43,7 +41,6 @@ def main(arguments: list[str]) -> int:
         device = build_device(options, disconnect)
         return replace(device, link=LINKS[name](device, options))
 
-    signal.signal(signal.SIGTERM, _interrupt)
     try:
         Server(read_options(arguments[1:]), build).run()
     except KeyboardInterrupt:
@@ -52,10 +49,6 @@ def main(arguments: list[str]) -> int:
         print(f"serve: {error}", file=sys.stderr)
         return 2
     return 0
-
-
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":

@@ -16,8 +16,8 @@ static uint8_t received_begin;
 
 void uart_start(void)
 {
-    UBRR0 = (uint16_t)DIVISOR;
     UCSR0A = 1u << U2X0;
+    UBRR0 = (uint16_t)DIVISOR;
     UCSR0C = (1u << UCSZ01) | (1u << UCSZ00);
     UCSR0B = (1u << RXCIE0) | (1u << RXEN0) | (1u << TXEN0);
 }
