@@ -2,6 +2,7 @@
 #include "core.h"
 
 #include "framing.h"
+#include "moments.h"
 #include "numbers.h"
 #include "period.h"
 #include "registers.h"
@@ -19,6 +20,7 @@ void bridge_start(const struct bridge_settings *settings)
 {
     can_sample = settings->period_source != PERIOD_UNSEEN;
     simulated = settings->simulated;
+    moments_read_clock();
     framing_start();
     session_start(settings->first_number);
     stop_start(settings->frozen);
@@ -36,7 +38,7 @@ static uint8_t status(void)
 static void hello(const struct frame *frame)
 {
     const bool is_this_version = frame->length > 0 && frame->payload[0] == PROTOCOL_VERSION;
-    reply_begin(frame->sequence, HELLO | REPLY_BIT);
+    reply_to(frame);
     reply_u8(PROTOCOL_VERSION);
     reply_u16((uint16_t)((can_sample ? CAPABILITY_SAMPLE : 0) | (simulated ? CAPABILITY_SIMULATED : 0)));
     reply_u32(PERIOD_US);
@@ -53,7 +55,7 @@ static void hello(const struct frame *frame)
 static void read_block(const struct frame *frame)
 {
     const uint16_t address = u16_at(frame->payload);
-    reply_begin(frame->sequence, READ_BLOCK | REPLY_BIT);
+    reply_to(frame);
     for (uint8_t i = 0; i < frame->payload[2]; ++i) {
         reply_u8(board_read_byte((uint16_t)(address + i)));
     }
@@ -62,7 +64,7 @@ static void read_block(const struct frame *frame)
 
 static void report_gains(const struct frame *frame)
 {
-    reply_begin(frame->sequence, REPORT_GAINS | REPLY_BIT);
+    reply_to(frame);
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
         for (uint8_t gain = 0; gain < GAINS; ++gain) {
             reply_u8(read_gain(joint, gain));
@@ -74,7 +76,7 @@ static void report_gains(const struct frame *frame)
 static void report_errors_positions_powers(const struct frame *frame)
 {
     const uint8_t mask = frame->payload[0];
-    reply_begin(frame->sequence, REPORT_ERRORS_POSITIONS_POWERS | REPLY_BIT);
+    reply_to(frame);
     reply_u8(mask);
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
         if (has_joint(mask, joint)) {
@@ -88,17 +90,17 @@ static void report_errors_positions_powers(const struct frame *frame)
 
 static void read_process(const struct frame *frame)
 {
-    reply_begin(frame->sequence, READ_PROCESS | REPLY_BIT);
+    reply_to(frame);
     reply_u8(read_inputs());
     reply_u8(read_outputs());
     reply_u8(read_gripper());
     reply_send();
 }
 
-static void read_status(const struct frame *frame, uint32_t now_us)
+static void read_status(const struct frame *frame)
 {
-    reply_begin(frame->sequence, READ_STATUS | REPLY_BIT);
-    reply_u32(period_tick(now_us));
+    reply_to(frame);
+    reply_u32(period_tick());
     reply_u8(status());
     reply_u16(session_boots());
     reply_u32(period_missed_set_points());
@@ -117,10 +119,10 @@ static void set_set_points(const struct frame *frame, const uint8_t *values)
             values += 2;
         }
     }
-    const uint32_t now_us = board_time_us();
-    period_set_points_written(now_us);
-    reply_begin(frame->sequence, WRITE_SET_POINTS | REPLY_BIT);
-    reply_u32(period_tick(now_us));
+    moments_read_clock();
+    period_set_points_written();
+    reply_to(frame);
+    reply_u32(period_tick());
     reply_u8(status());
     reply_send();
 }
@@ -133,7 +135,8 @@ static void write_block(const struct frame *frame, const uint8_t *values)
         board_write_byte((uint16_t)(address + i), values[2u + i]);
     }
     if (block_reaches_set_points(address, count)) {
-        period_set_points_written(board_time_us());
+        moments_read_clock();
+        period_set_points_written();
     }
 }
 
@@ -182,12 +185,11 @@ static void obey(const struct frame *frame)
     default: /* RELEASE is done */
         break;
     }
-    acknowledge(frame->sequence, frame->opcode);
+    acknowledge(frame);
 }
 
 static void carry_out(const struct frame *frame)
 {
-    const uint32_t now_us = board_time_us();
     switch (frame->opcode) {
     case HELLO:
         hello(frame);
@@ -202,16 +204,16 @@ static void carry_out(const struct frame *frame)
         report_errors_positions_powers(frame);
         break;
     case SAMPLE:
-        sampling_request(frame->sequence, u32_at(frame->payload), frame->payload[4], now_us);
+        sampling_request(frame->sequence, u32_at(frame->payload), frame->payload[4]);
         break;
     case STOP:
-        stop_request(frame->sequence, now_us);
+        stop_request(frame->sequence);
         break;
     case READ_PROCESS:
         read_process(frame);
         break;
     case READ_STATUS:
-        read_status(frame, now_us);
+        read_status(frame);
         break;
     default:
         obey(frame);
@@ -236,13 +238,15 @@ static void answer(const struct frame *frame)
 
 bool bridge_wants_byte(void)
 {
-    return !framing_is_sending() && !stop_is_reading() && !period_wants_memory(board_time_us());
+    moments_read_clock();
+    return !framing_is_sending() && !stop_is_reading() && !period_wants_memory();
 }
 
 void bridge_take_byte(uint8_t byte)
 {
     struct frame frame;
     if (!framing_is_sending() && !stop_is_reading() && framing_take_byte(byte, &frame)) {
+        moments_read_clock();
         answer(&frame);
     }
 }
@@ -254,13 +258,13 @@ int16_t bridge_next_byte(void)
 
 void bridge_work(void)
 {
-    const uint32_t now_us = board_time_us();
-    period_work(now_us);
+    moments_read_clock();
+    period_work();
     if (!framing_is_sending()) {
-        stop_work(now_us);
+        stop_work();
     }
     if (!framing_is_sending()) {
-        sampling_work(now_us);
+        sampling_work();
     }
 }
 
@@ -271,7 +275,8 @@ void bridge_hang_up(void)
 
 void bridge_period_ended(void)
 {
-    period_ended(board_time_us());
+    moments_read_clock();
+    period_ended();
 }
 
 bool bridge_is_frozen(void)

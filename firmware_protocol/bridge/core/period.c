@@ -7,32 +7,33 @@
 
 #include <string.h>
 
+#include "moments.h"
 #include "registers.h"
 #include "ring.h"
 #include "sampling.h"
 #include "session.h"
 #include "stop.h"
 
-/* From the beginning of a period, when the controller fetches set points, to its storing the results. Assumed: the
- * mock's computing delay. If it is wrong, set points may be reported with a tick that is one off. */
-#define STORED_AFTER_US 6000ul
+/* From the storing of a period's results to the next period, which begins with the fetch of set points. Assumed: the
+ * mock's computing delay of 6 ms. If it is wrong, set points may be reported with a tick that is one off. */
+#define FETCH_AFTER_STORED_US (PERIOD_US - 6000u)
 /* The memory is left alone for so long around the fetch: longer than the bridge's longest access, and than the fetch. */
-#define CLEAR_BEFORE_FETCH_US 600ul
-#define CLEAR_AFTER_FETCH_US 500ul
+#define CLEAR_BEFORE_FETCH_US 600u
+#define CLEAR_AFTER_FETCH_US 500u
 /* Longer than the controller takes to store all results of a period (assumed, as in PROTOCOL.md, section 5). */
-#define STORING_US 2000ul
+#define STORING_US 2000u
 /* Between the two readings of a snapshot, and between further ones while they disagree. */
-#define READ_AGAIN_US 100ul
+#define READ_AGAIN_US 100u
 /* A snapshot that has not become whole by then, after its results began to be stored, is missing. */
-#define GIVE_UP_US 8000ul
+#define GIVE_UP_US 8000u
 
 /* A look is a reading of all positions. While nothing is known, one a millisecond: each may cost the controller a
  * fetch. Around the due moment, more often. Where periods are not followed, only a loss of supply is looked for. */
-#define SEARCH_EVERY_US 1000ul
-#define EXPECT_EVERY_US 200ul
-#define SUPPLY_EVERY_US 40000ul
-#define EXPECT_EARLY_US 500ul
-#define EXPECT_LATE_US 1000ul
+#define SEARCH_EVERY_US 1000u
+#define EXPECT_EVERY_US 200u
+#define SUPPLY_EVERY_US 40000u
+#define EXPECT_EARLY_US 500u
+#define EXPECT_LATE_US 1000u
 /* After so many periods without any change the controller has stopped, or its board is not the one expected. */
 #define MOST_UNCHANGED_PERIODS 25u
 /* A result that comes late moves the expected moment by this part of the delay, so that clocks may differ by 1 %; one
@@ -78,24 +79,26 @@ bool period_is_followed(void)
     return source == PERIOD_TOLD || following != SEARCHING;
 }
 
-uint32_t period_tick(uint32_t now_us)
+/* Whether so much time has passed since the latest results began to be stored. */
+static bool has_passed(uint16_t us)
 {
-    const bool next_has_begun =
-        source == PERIOD_WATCHED && following != SEARCHING && now_us - stored_us >= PERIOD_US - STORED_AFTER_US;
-    return next_has_begun ? tick + 1u : tick;
+    return following != SEARCHING && us_since(&stored_us) >= us;
 }
 
-bool period_wants_memory(uint32_t now_us)
+uint32_t period_tick(void)
 {
-    const uint32_t since_us = now_us - stored_us;
-    return source == PERIOD_WATCHED && following != SEARCHING &&
-           since_us >= PERIOD_US - STORED_AFTER_US - CLEAR_BEFORE_FETCH_US &&
-           since_us < PERIOD_US - STORED_AFTER_US + CLEAR_AFTER_FETCH_US;
+    return has_passed(FETCH_AFTER_STORED_US) ? tick + 1u : tick;
 }
 
-void period_set_points_written(uint32_t now_us)
+bool period_wants_memory(void)
 {
-    written_tick = period_tick(now_us);
+    return has_passed(FETCH_AFTER_STORED_US - CLEAR_BEFORE_FETCH_US) &&
+           !has_passed(FETCH_AFTER_STORED_US + CLEAR_AFTER_FETCH_US);
+}
+
+void period_set_points_written(void)
+{
+    written_tick = period_tick();
 }
 
 uint32_t period_missed_set_points(void)
@@ -129,7 +132,7 @@ static bool all_zero(const uint8_t bytes[POSITION_BYTES])
 }
 
 /* Reads the positions. True when they differ from the last look, and the board had its supply at both. */
-static bool look(uint32_t now_us)
+static bool look(void)
 {
     uint8_t seen[POSITION_BYTES];
     read_positions(seen);
@@ -140,14 +143,14 @@ static bool look(uint32_t now_us)
     }
     has_supply = powered;
     has_looked = true;
-    looked_us = now_us;
+    looked_us = present_us();
     memcpy(positions, seen, POSITION_BYTES);
     return changed;
 }
 
-static bool look_is_due(uint32_t now_us, uint32_t every_us)
+static bool look_is_due(uint16_t every_us)
 {
-    return !has_looked || now_us - looked_us >= every_us;
+    return !has_looked || us_since(&looked_us) >= every_us;
 }
 
 /* ---- snapshots */
@@ -196,28 +199,34 @@ static void begin_settling(uint32_t began_us)
     is_read_once = false;
 }
 
-static void search(uint32_t now_us)
+static void search(void)
 {
-    if (tick > 0 && now_us - stored_us >= PERIOD_US) { /* once followed, ticks go on by the bridge's own clock */
+    if (tick > 0 && us_since(&stored_us) >= PERIOD_US) { /* once followed, ticks go on by the bridge's own clock */
         stored_us += PERIOD_US;
         ++tick;
     }
-    if (look_is_due(now_us, SEARCH_EVERY_US) && look(now_us)) {
+    if (look_is_due(SEARCH_EVERY_US) && look()) {
         unchanged_periods = 0;
-        begin_settling(now_us);
+        begin_settling(present_us());
     }
 }
 
-static void expect(uint32_t now_us)
+/* When results that are seen now began to be stored. */
+static uint32_t storing_began_us(uint16_t since_us)
 {
-    const uint32_t since_us = now_us - stored_us;
-    if (since_us < PERIOD_US - EXPECT_EARLY_US || !look_is_due(now_us, EXPECT_EVERY_US)) {
+    const uint16_t late_us = since_us < PERIOD_US ? 0 : (uint16_t)(since_us - PERIOD_US);
+    return present_us() - (uint16_t)(late_us - late_us / LATE_SHARE);
+}
+
+static void expect(void)
+{
+    const uint16_t since_us = us_since(&stored_us);
+    if (since_us < PERIOD_US - EXPECT_EARLY_US || !look_is_due(EXPECT_EVERY_US)) {
         return;
     }
-    if (look(now_us)) {
+    if (look()) {
         unchanged_periods = 0;
-        const uint32_t due_us = stored_us + PERIOD_US;
-        begin_settling(since_us < PERIOD_US ? now_us : due_us + (now_us - due_us) / LATE_SHARE);
+        begin_settling(storing_began_us(since_us));
     } else if (following == EXPECTING && since_us >= PERIOD_US + EXPECT_LATE_US) {
         if (++unchanged_periods > MOST_UNCHANGED_PERIODS) {
             following = SEARCHING;
@@ -228,10 +237,9 @@ static void expect(uint32_t now_us)
     }
 }
 
-static void settle(uint32_t now_us)
+static void settle(void)
 {
-    const uint32_t since_us = now_us - stored_us;
-    if (since_us < STORING_US || now_us - looked_us < READ_AGAIN_US) {
+    if (!has_passed(STORING_US) || !look_is_due(READ_AGAIN_US)) {
         return;
     }
     struct snapshot reading;
@@ -239,40 +247,39 @@ static void settle(uint32_t now_us)
     const bool agree = is_read_once && memcmp(&reading, &first_reading, sizeof reading) == 0;
     first_reading = reading;
     is_read_once = true;
-    looked_us = now_us;
-    if (!agree && since_us < GIVE_UP_US) {
+    looked_us = present_us();
+    if (!agree && !has_passed(GIVE_UP_US)) {
         return;
     }
     following = EXPECTING;
-    look(now_us); /* what the next results are compared with, and whether the board has its supply */
-    if (agree && has_supply && tick > 0) {
+    (void)look(); /* what the next results are compared with, and whether the board has its supply */
+    if (agree && following == EXPECTING) {
         keep_snapshot(&reading);
     }
 }
 
-void period_work(uint32_t now_us)
+void period_work(void)
 {
     if (source != PERIOD_WATCHED) {
-        if (look_is_due(now_us, has_supply ? SUPPLY_EVERY_US : SEARCH_EVERY_US)) {
-            look(now_us);
+        if (look_is_due(has_supply ? SUPPLY_EVERY_US : SEARCH_EVERY_US)) {
+            (void)look();
         }
     } else if (following == SEARCHING) {
-        search(now_us);
+        search();
     } else if (following == EXPECTING) {
-        expect(now_us);
+        expect();
     } else {
-        settle(now_us);
+        settle();
     }
 }
 
-void period_ended(uint32_t now_us)
+void period_ended(void)
 {
     if (source != PERIOD_TOLD) {
         return;
     }
     struct snapshot reading;
     ++tick;
-    stored_us = now_us;
     read_snapshot(&reading);
     keep_snapshot(&reading);
 }

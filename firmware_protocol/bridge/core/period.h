@@ -10,22 +10,22 @@
 void period_start(enum period_source source);
 
 /* Looks at the memory where that is due. */
-void period_work(uint32_t now_us);
+void period_work(void);
 
 /* The controller has stored a period's results. */
-void period_ended(uint32_t now_us);
+void period_ended(void);
 
 /* Whether periods are seen at present, so that the newest snapshot is of the latest complete period. */
 bool period_is_followed(void);
 
 /* Periods begun since the board's last reset; always 0 where periods are not seen. */
-uint32_t period_tick(uint32_t now_us);
+uint32_t period_tick(void);
 
 /* Whether the controller is about to fetch its set points: the bridge then leaves the memory alone. */
-bool period_wants_memory(uint32_t now_us);
+bool period_wants_memory(void);
 
 /* Set points have been written: the next period that begins is expected to take them. */
-void period_set_points_written(uint32_t now_us);
+void period_set_points_written(void);
 
 /* Periods in which the controller did not take the set points that were in the memory. */
 uint32_t period_missed_set_points(void);

@@ -3,7 +3,7 @@
 #define BRIDGE_PROTOCOL_H
 
 #define PROTOCOL_VERSION 2u
-#define PERIOD_US 20000ul /* control period (section 6.2 of the source) */
+#define PERIOD_US 20000u /* control period (section 6.2 of the source) */
 #define JOINTS 6u
 #define ALL_JOINTS 0x3Fu
 #define LARGEST_PAYLOAD 48u

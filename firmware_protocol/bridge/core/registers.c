@@ -41,8 +41,8 @@ static int16_t read_error(uint8_t joint)
 #else
     const uint16_t raw = read_at(error_low[joint]);
 #endif
-    const int32_t wrap = raw > (uint16_t)LARGEST_ERROR ? 1l << ERROR_BITS : 0;
-    return (int16_t)((int32_t)raw - wrap);
+    const uint16_t sign = (uint16_t)(1u << (ERROR_BITS - 1));
+    return (int16_t)(uint16_t)((raw ^ sign) - sign);
 }
 
 void read_joint(uint8_t joint, struct reading *reading)
@@ -132,16 +132,13 @@ bool block_reaches_set_points(uint16_t address, uint8_t count)
 
 uint16_t posture_of(uint16_t counts)
 {
-    const uint16_t posture = (uint16_t)((2000ul * counts + 4096u) >> 13);
+    const uint16_t posture = (uint16_t)((125ul * counts + 256u) >> 9); /* both over 16: (2000 counts + 4096) / 8192 */
     return posture < LARGEST_SET_POINT ? posture : LARGEST_SET_POINT;
 }
 
 uint16_t set_point_taken(const struct reading *reading)
 {
-    const int32_t target = (int32_t)reading->position + reading->error;
+    const uint16_t target = (uint16_t)(reading->position + (uint16_t)reading->error); /* far above, if below 0 */
     const bool error_is_limited = reading->error >= LARGEST_ERROR || reading->error <= -LARGEST_ERROR;
-    if (error_is_limited || target < 0 || target > (int32_t)MASK_OF(POSITION_BITS)) {
-        return reading->set_point;
-    }
-    return posture_of((uint16_t)target);
+    return error_is_limited || target > MASK_OF(POSITION_BITS) ? reading->set_point : posture_of(target);
 }

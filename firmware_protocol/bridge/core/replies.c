@@ -1,10 +1,13 @@
 #include "replies.h"
 
-#include "framing.h"
-
-void acknowledge(uint16_t sequence, uint8_t opcode)
+void reply_to(const struct frame *frame)
 {
-    reply_begin(sequence, (uint8_t)(opcode | REPLY_BIT));
+    reply_begin(frame->sequence, (uint8_t)(frame->opcode | REPLY_BIT));
+}
+
+void acknowledge(const struct frame *frame)
+{
+    reply_to(frame);
     reply_send();
 }
 

@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "framing.h"
+#include "moments.h"
 #include "numbers.h"
 #include "replies.h"
 #include "ring.h"
@@ -27,14 +28,14 @@ void sampling_board_was_reset(void)
     after = 0;
 }
 
-void sampling_request(uint16_t request_sequence, uint32_t after_tick, uint8_t joints, uint32_t now_us)
+void sampling_request(uint16_t request_sequence, uint32_t after_tick, uint8_t joints)
 {
     waiting = true;
     sequence = request_sequence;
     after = after_tick < ring_newest_tick() ? after_tick : ring_newest_tick();
     mask = joints;
-    since_us = now_us;
-    sampling_work(now_us);
+    since_us = present_us();
+    sampling_work();
 }
 
 static void answer(uint32_t tick, const struct snapshot *snapshot)
@@ -53,7 +54,7 @@ static void answer(uint32_t tick, const struct snapshot *snapshot)
     reply_send();
 }
 
-void sampling_work(uint32_t now_us)
+void sampling_work(void)
 {
     if (!waiting) {
         return;
@@ -63,7 +64,7 @@ void sampling_work(uint32_t now_us)
     if (snapshot != NULL) {
         waiting = false;
         answer(tick, snapshot);
-    } else if (now_us - since_us >= LONGEST_WAIT_US) {
+    } else if (present_us() - since_us >= LONGEST_WAIT_US) {
         waiting = false;
         refuse(sequence, SAMPLE, NOTHING_NEW);
     }

@@ -7,10 +7,10 @@
 void sampling_start(void);
 
 /* A host asks; a request that waits is forgotten. */
-void sampling_request(uint16_t sequence, uint32_t after, uint8_t mask, uint32_t now_us);
+void sampling_request(uint16_t sequence, uint32_t after, uint8_t mask);
 
 /* Answers the request that waits, if its moment has come. Only while no reply is being sent. */
-void sampling_work(uint32_t now_us);
+void sampling_work(void);
 
 /* A request that waits is answered from the board's new life. */
 void sampling_board_was_reset(void);

@@ -3,13 +3,14 @@
 #include <string.h>
 
 #include "framing.h"
+#include "moments.h"
 #include "period.h"
 #include "registers.h"
 #include "ring.h"
 #include "session.h"
 
 /* Between two readings of the positions: longer than the controller takes to store a period's results. */
-#define READ_AGAIN_US 2000ul
+#define READ_AGAIN_US 2000u
 
 static bool frozen;
 static bool reading_posture;
@@ -37,18 +38,29 @@ static void answer(void)
     reply_send();
 }
 
-/* Positions of the newest complete period become the set points. */
-static void hold_newest_posture(void)
+/* Set points become this posture, and the stop is answered. */
+static void freeze(const uint16_t counts[JOINTS])
 {
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        write_set_point(joint, posture_of(counts[joint]));
+    }
+    moments_read_clock();
+    period_set_points_written();
+}
+
+static void freeze_newest_posture(void)
+{
+    uint16_t counts[JOINTS];
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
         struct reading reading;
         unpack(ring_newest()->joints[joint], &reading);
-        write_set_point(joint, posture_of(reading.position));
+        counts[joint] = reading.position;
     }
+    freeze(counts);
 }
 
-/* The positions read twice become the set points; all zero, they are of a board without supply: nothing to write. */
-static void hold_posture_read(void)
+/* Of positions that are all zero nothing is written: the board has no supply. */
+static void freeze_posture_read(void)
 {
     uint16_t counts[JOINTS];
     uint16_t any = 0;
@@ -56,20 +68,18 @@ static void hold_posture_read(void)
         counts[joint] = position_in(positions, joint);
         any |= counts[joint];
     }
-    for (uint8_t joint = 0; joint < JOINTS && any != 0; ++joint) {
-        write_set_point(joint, posture_of(counts[joint]));
+    if (any != 0) {
+        freeze(counts);
     }
 }
 
-static void end_freezing(uint32_t now_us)
+static void answer_frozen(void)
 {
-    reading_posture = false;
-    frozen_tick = period_tick(now_us);
-    period_set_points_written(now_us);
+    frozen_tick = period_tick();
     answer();
 }
 
-void stop_request(uint16_t request_sequence, uint32_t now_us)
+void stop_request(uint16_t request_sequence)
 {
     number = fresh_number();
     sequence = request_sequence;
@@ -79,28 +89,29 @@ void stop_request(uint16_t request_sequence, uint32_t now_us)
     }
     frozen = true;
     if (period_is_followed() && ring_newest() != 0) {
-        hold_newest_posture();
-        end_freezing(now_us);
+        freeze_newest_posture();
+        answer_frozen();
     } else {
         reading_posture = true;
-        read_us = now_us;
+        read_us = present_us();
         read_positions(positions);
     }
 }
 
-void stop_work(uint32_t now_us)
+void stop_work(void)
 {
-    if (!reading_posture || now_us - read_us < READ_AGAIN_US) {
+    if (!reading_posture || us_since(&read_us) < READ_AGAIN_US) {
         return;
     }
     uint8_t again[POSITION_BYTES];
-    read_us = now_us;
+    read_us = present_us();
     read_positions(again);
-    if (memcmp(again, positions, POSITION_BYTES) == 0) {
-        hold_posture_read();
-        end_freezing(now_us);
-    } else {
-        memcpy(positions, again, POSITION_BYTES);
+    const bool agree = memcmp(again, positions, POSITION_BYTES) == 0;
+    memcpy(positions, again, POSITION_BYTES);
+    if (agree) {
+        reading_posture = false;
+        freeze_posture_read();
+        answer_frozen();
     }
 }
 

@@ -47,7 +47,7 @@ static void keep_state(void)
 /* Whether there is more to do for the line at once. */
 static bool serve_line(void)
 {
-    bool busy = !uart_can_send();
+    bool busy = false;
     if (uart_can_send()) {
         const int16_t reply = bridge_next_byte();
         if (reply >= 0) {

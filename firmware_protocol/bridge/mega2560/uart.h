@@ -10,6 +10,7 @@ void uart_start(void);
 /* The oldest byte that has come, or -1. */
 int16_t uart_next_byte(void);
 
+/* Whether a byte more can be kept for sending. */
 bool uart_can_send(void);
 void uart_send(uint8_t byte);
 
