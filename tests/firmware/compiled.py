@@ -30,3 +30,9 @@ def made(target: str, file: str, *settings: str) -> Path:
         fcntl.flock(lock, fcntl.LOCK_EX)
         subprocess.run(["make", "-s", "-C", SOURCES, f"BUILD={BUILD}", *settings, target], check=True)
     return BUILD / file
+
+
+def need_simavr() -> None:
+    """Skips the test where the simulator of the board is missing."""
+    if not Path("/usr/include/simavr/sim_avr.h").exists():
+        pytest.skip("no simavr: apt install libsimavr-dev libelf-dev")

@@ -63,6 +63,10 @@ class Core:
         """The controller has stored a period's results (PeriodSource.TOLD)."""
         self._library.bridge_period_ended()
 
+    def hang_up(self) -> None:
+        """The connection has ended."""
+        self._library.bridge_hang_up()
+
     @property
     def frozen(self) -> bool:
         """Whether set points are held."""

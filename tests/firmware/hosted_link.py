@@ -18,17 +18,14 @@ class HostedLink(BridgeLink):
 
     def __init__(self, device: Device, *, sees_period: bool) -> None:
         super().__init__(device)
-        library = made("hosted", "libbridge-32.so")
         source = PeriodSource.WATCHED if sees_period else PeriodSource.UNSEEN
-        self._core = Core(library, self._read, self._write, lambda: self.board.time_us & 0xFFFFFFFF, source)
+        library = made("hosted", "libbridge-32.so")
+        self._core = Core(library, self.read_memory, self.write_memory, self._clock_us, source)
         self._core.start(randbits(16) << 16)
         self._input = b""
 
-    def _read(self, address: int) -> int:
-        return self.board.read(address, 1)[0]
-
-    def _write(self, address: int, value: int) -> None:
-        self.board.write(address, bytes((value,)))
+    def _clock_us(self) -> int:
+        return self.board.time_us & 0xFFFFFFFF
 
     def receive(self, data: bytes) -> None:
         self._input += data
@@ -42,7 +39,7 @@ class HostedLink(BridgeLink):
             self.pass_board_time(min(self.board.time_us + STEP_US, time_us))
 
     def hang_up(self) -> None:
-        self._core._library.bridge_hang_up()
+        self._core.hang_up()
 
     def _serve(self) -> None:
         """As a board's main loop does it."""

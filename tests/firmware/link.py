@@ -22,9 +22,11 @@ class BridgeLink(ABC):
         self.counts = LinkCounts()
         self.board = device.board
         self.stops: StopRecord = device.bridge.stops
-        self.memory_map = device.board.memory.map
         self._timeline = Timeline(device.board, device.faults)
         self._output = bytearray()
+        self._set_point_addresses = frozenset(device.board.memory.map["set_point"].addresses)
+        self.set_points_written_us = 0
+        """When the last byte of a set point was written (µs of the board's time)."""
 
     @property
     def time_us(self) -> int:
@@ -46,6 +48,16 @@ class BridgeLink(ABC):
         self._timeline.run_until(time_us)
         if self.stops.unused:
             self.stops.look(self.board.snapshots)
+
+    def read_memory(self, address: int) -> int:
+        """One byte, as the bridge reads it."""
+        return self.board.read(address, 1)[0]
+
+    def write_memory(self, address: int, value: int) -> None:
+        """One byte, as the bridge writes it."""
+        self.board.write(address, bytes((value,)))
+        if address in self._set_point_addresses:
+            self.set_points_written_us = self.board.time_us
 
     @abstractmethod
     def receive(self, data: bytes) -> None:

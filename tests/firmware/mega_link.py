@@ -25,11 +25,11 @@ class MegaLink(BridgeLink):
 
     def _read(self, address: int, clock: int) -> int:
         self.pass_board_time(clock // CLOCKS_PER_US)
-        return self.board.read(address, 1)[0]
+        return self.read_memory(address)
 
     def _write(self, address: int, value: int, clock: int) -> None:
         self.pass_board_time(clock // CLOCKS_PER_US)
-        self.board.write(address, bytes((value,)))
+        self.write_memory(address, value)
 
     def receive(self, data: bytes) -> None:
         self.simulator.take(data)
