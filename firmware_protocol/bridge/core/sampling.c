@@ -6,6 +6,7 @@
 #include "framing.h"
 #include "moments.h"
 #include "numbers.h"
+#include "period.h"
 #include "replies.h"
 #include "ring.h"
 #include "session.h"
@@ -32,7 +33,7 @@ void sampling_request(uint16_t request_sequence, uint32_t after_tick, uint8_t jo
 {
     waiting = true;
     sequence = request_sequence;
-    after = after_tick < ring_newest_tick() ? after_tick : ring_newest_tick();
+    after = after_tick > period_tick() ? ring_newest_tick() : after_tick;
     mask = joints;
     since_us = present_us();
     sampling_work();
