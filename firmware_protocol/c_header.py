@@ -1,4 +1,4 @@
-"""A memory map as a C header, for the bridge's core: `python -m firmware_protocol.c_header [MAP.toml] > memory_map.h`."""
+"""A memory map as a header of the bridge's core: `python -m firmware_protocol.c_header [MAP.toml] > memory_map.h`."""
 
 from __future__ import annotations
 

@@ -35,7 +35,9 @@ class Server:
     Raises ValueError with one clear line for options that cannot be met.
     """
 
-    def __init__(self, options: Options, build: Callable[[Options, Callable[[float], None]], Device] = build_device) -> None:
+    def __init__(
+        self, options: Options, build: Callable[[Options, Callable[[float], None]], Device] = build_device
+    ) -> None:
         self._options = options
         self._back_at: float | None = None
         self._cut_wanted: float | None = None

@@ -7,7 +7,9 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-SECTION = re.compile(r"^ \.(text|data|rodata|bss|noinit|progmem)\S*(?:\n)?\s+0x[0-9a-f]+\s+0x([0-9a-f]+) (\S+)", re.MULTILINE)
+SECTION = re.compile(
+    r"^ \.(text|data|rodata|bss|noinit|progmem)\S*(?:\n)?\s+0x[0-9a-f]+\s+0x([0-9a-f]+) (\S+)", re.MULTILINE
+)
 IN_FLASH = ("text", "progmem", "data", "rodata")
 IN_RAM = ("data", "rodata", "bss", "noinit")
 

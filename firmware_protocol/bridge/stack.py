@@ -68,7 +68,10 @@ def deepest(name: str, found: dict[str, Function], above: tuple[str, ...] = ()) 
         raise ValueError(f"recursion: {' -> '.join((*above, name))}")
     function = found[name]
     best, path = 0, (name,)
-    for entered, extra in [*((call, RETURN_ADDRESS) for call in function.calls), *((jump, 0) for jump in function.jumps)]:
+    for entered, extra in [
+        *((call, RETURN_ADDRESS) for call in function.calls),
+        *((jump, 0) for jump in function.jumps),
+    ]:
         if entered in found:
             depth, further = deepest(entered, found, (*above, name))
             if depth + extra > best:

@@ -1,4 +1,4 @@
-"""A core in C on the board of the second bridge: a memory in which nothing happens by itself, and a hand-wound clock."""
+"""A core in C on the board of the second bridge: a memory in which nothing happens by itself, on a hand-wound clock."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ READING_US = 5_000
 
 
 class Bench:
-    """Bytes in, bytes out, as SecondBridge is; its board is one too, of which only the memory and the controller run."""
+    """Bytes in, bytes out. The board is a SecondBridge, of which only the memory and the controller run."""
 
     def __init__(self, source: PeriodSource = PeriodSource.TOLD, ring: int = 8) -> None:
-        library = made("hosted", f"libbridge-{ring}.so", f"RING={ring}")
+        library = made(f"libbridge-{ring}.so", f"RING={ring}")
         self.board = SecondBridge()
         self.now_us = 0
         self.source = source

@@ -23,12 +23,12 @@ def need(*programs: str) -> None:
             pytest.skip(f"no {program}: apt install {PACKAGES[program]}")
 
 
-def made(target: str, file: str, *settings: str) -> Path:
-    """The file that a target of the bridge's Makefile leaves in build/firmware."""
+def made(file: str, *settings: str) -> Path:
+    """A file in build/firmware that the bridge's Makefile makes, up to date."""
     BUILD.mkdir(parents=True, exist_ok=True)
     with (BUILD / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        subprocess.run(["make", "-s", "-C", SOURCES, f"BUILD={BUILD}", *settings, target], check=True)
+        subprocess.run(["make", "-s", "-C", SOURCES, f"BUILD={BUILD}", *settings, str(BUILD / file)], check=True)
     return BUILD / file
 
 

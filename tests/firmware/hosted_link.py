@@ -1,4 +1,4 @@
-"""The core in C on this computer, before the mock's board: time is the board's, and every byte of the memory costs it."""
+"""The core in C on this computer, before the mock's board. Time is the board's, and each byte of the memory costs some."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class HostedLink(BridgeLink):
     def __init__(self, device: Device, *, sees_period: bool) -> None:
         super().__init__(device)
         source = PeriodSource.WATCHED if sees_period else PeriodSource.UNSEEN
-        library = made("hosted", "libbridge-32.so")
+        library = made("libbridge-32.so")
         self._core = Core(library, self.read_memory, self.write_memory, self._clock_us, source)
         self._core.start(randbits(16) << 16)
         self._input = b""

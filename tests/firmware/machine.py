@@ -1,4 +1,4 @@
-"""A motor controller that stores its results byte by byte, for the bridge that watches it; all on a hand-wound clock."""
+"""A motor controller that stores its results byte by byte, for a bridge that watches it; on a hand-wound clock."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Machine:
         self._sequence = 0
         self._stamp = c.Stamp(0, 0)
         self.power_up()
-        library = made("hosted", f"libbridge-{ring}.so", f"RING={ring}")
+        library = made(f"libbridge-{ring}.so", f"RING={ring}")
         self.core = Core(library, self._read, self._write, lambda: self.now_us & 0xFFFFFFFF, source)
         self.core.start(0)
         self._waiting = b""

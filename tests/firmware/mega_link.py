@@ -20,7 +20,7 @@ class MegaLink(BridgeLink):
 
     def __init__(self, device: Device) -> None:
         super().__init__(device)
-        library, image = made("simulator", "libmega2560.so"), made("mega2560", "mega2560.elf")
+        library, image = made("libmega2560.so"), made("mega2560.elf")
         self.simulator = Simulator(library, image, self._read, self._write)
 
     def _read(self, address: int, clock: int) -> int:

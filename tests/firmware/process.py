@@ -19,10 +19,10 @@ def served(bridge: str, *options: str) -> Iterator[MockProcess]:
     if bridge == "mega2560":
         need("avr-gcc")
         need_simavr()
-        made("mega2560", "mega2560.elf")
-        made("simulator", "libmega2560.so")
+        made("mega2560.elf")
+        made("libmega2560.so")
     else:
-        made("hosted", "libbridge-32.so")
+        made("libbridge-32.so")
     command = [sys.executable, "-m", "tests.firmware.serve", bridge, "--pty", "--owned", *options]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert process.stdout is not None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from firmware_protocol import commands as c
@@ -37,7 +39,7 @@ def test_every_period_is_found_with_clocks_that_differ(drift: float) -> None:
     machine.run(3 * PERIOD_US)
     snapshots = sampled(machine, 60)
     ahead = snapshots[0].tick - 1 - machine.whole.index(readings(snapshots[0]))
-    for earlier, snapshot in zip(snapshots, snapshots[1:], strict=False):
+    for earlier, snapshot in pairwise(snapshots):
         assert snapshot.tick == earlier.tick + 1
         assert readings(snapshot) == machine.whole[snapshot.tick - 1 - ahead], "whole, and of its own period"
 

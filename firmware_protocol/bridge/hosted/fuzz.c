@@ -78,8 +78,8 @@ static void listen(void)
 
 static void say(uint8_t byte)
 {
-    for (unsigned patience = 0; !bridge_wants_byte() && patience < 200; ++patience) {
-        now_us += 100;
+    for (unsigned patience = 0; !bridge_wants_byte() && patience < 50; ++patience) {
+        now_us += 400;
         bridge_work();
         listen();
     }
@@ -141,7 +141,7 @@ static void step(uint8_t kind, const uint8_t *bytes, uint8_t count)
         }
     } else if (what < 25u) {
         const uint32_t step_us = count > 0 ? 1u + bytes[0] * 97u : 1000u;
-        for (unsigned i = 0; i < 40; ++i) {
+        for (unsigned i = 0; i < 12; ++i) {
             now_us += step_us;
             bridge_work();
             listen();
