@@ -1,4 +1,4 @@
-"""The core in C on this computer, before the mock's board. Time is the board's, and each byte of the memory costs some."""
+"""The core in C on this computer, before the mock's board. Time is the board's: each byte of the memory costs some."""
 
 from __future__ import annotations
 
