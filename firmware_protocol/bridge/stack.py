@@ -67,11 +67,10 @@ def deepest(name: str, found: dict[str, Function], above: tuple[str, ...] = ()) 
     if name in above:
         raise ValueError(f"recursion: {' -> '.join((*above, name))}")
     function = found[name]
-    best, path = 0, (name,)
-    for entered, extra in [
-        *((call, RETURN_ADDRESS) for call in function.calls),
-        *((jump, 0) for jump in function.jumps),
-    ]:
+    best = 0
+    path: tuple[str, ...] = (name,)
+    entries = [*((call, RETURN_ADDRESS) for call in function.calls), *((jump, 0) for jump in function.jumps)]
+    for entered, extra in entries:
         if entered in found:
             depth, further = deepest(entered, found, (*above, name))
             if depth + extra > best:

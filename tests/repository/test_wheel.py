@@ -7,7 +7,8 @@ from pathlib import Path
 
 from tests.repository.tracked import ROOT, tracked_files
 
-NOT_INSTALLED = ("server/dashboard/", "firmware_protocol/bridge/")
+PAGE = "server/dashboard/"
+NOT_INSTALLED = (PAGE, "firmware_protocol/bridge/")
 """What the page and the bridges on boards are built from."""
 PACKAGES = ("firmware_protocol", "daq", "mock_controller", "model", "server")
 
@@ -24,7 +25,7 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     assert any(name.endswith(".toml") for name in expected)
     assert expected - packed == set()
     assert not any(name.startswith("tests/") for name in packed)
-    page = {name.removeprefix(SOURCES_OF_THE_PAGE) for name in packed if name.startswith(NOT_INSTALLED)}
+    page = {name.removeprefix(PAGE) for name in packed if name.startswith(PAGE)}
     assert "dist/index.html" in page
     for form in (".js.gz", ".js.br"):
         assert any(name.startswith("dist/assets/") and name.endswith(form) for name in page)
