@@ -82,6 +82,10 @@ class Machine:
         for name, values in (("set_point", self._taken), ("position", self.positions(0))):
             self._store(name, values)
 
+    def shift(self, us: int) -> None:
+        """The controller's next period begins later, and so do all that follow."""
+        self._next_us += us
+
     def lose_supply(self) -> None:
         """The memory reads zero until the next power_up."""
         self.powered = False

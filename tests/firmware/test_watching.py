@@ -44,6 +44,18 @@ def test_every_period_is_found_with_clocks_that_differ(drift: float) -> None:
         assert readings(snapshot) == machine.whole[snapshot.tick - 1 - ahead], "whole, and of its own period"
 
 
+@pytest.mark.parametrize("shift_us", [3_000, 9_000, 15_000])
+def test_a_controller_that_changes_its_phase_is_never_read_torn_and_followed_again(shift_us: int) -> None:
+    machine = Machine(sweeping)
+    machine.periods(4)
+    machine.shift(shift_us)
+    snapshots = sampled(machine, 60)
+    assert all(readings(snapshot) in machine.whole for snapshot in snapshots)
+    ticks = [snapshot.tick for snapshot in snapshots[-10:]]
+    assert ticks == list(range(ticks[0], ticks[0] + 10))
+    assert machine.whole.index(readings(snapshots[-1])) >= len(machine.whole) - 2, "as fresh as before"
+
+
 def test_a_noisy_arm_at_rest_is_followed_and_no_set_point_is_called_missed() -> None:
     machine = Machine(noisy)
     machine.run(3 * PERIOD_US)

@@ -22,8 +22,13 @@
 #define CLEAR_AFTER_FETCH_US 500u
 /* Longer than the controller takes to store all results of a period (assumed, as in PROTOCOL.md, section 5). */
 #define STORING_US 2000u
-/* Between the two readings of a snapshot, and between further ones while they disagree. */
+/* Between the two readings of a snapshot, and between further ones while they disagree. After a change that was seen to
+ * happen, all is stored when the first begins. Without one, results may be stored at any moment: the second reading
+ * then begins when any change that the first has met is complete. */
 #define READ_AGAIN_US 100u
+#define READ_AGAIN_UNSURE_US STORING_US
+/* A change was seen to happen if the look before it was no longer ago than this. */
+#define JUST_NOW_US 1500u
 /* A snapshot that has not become whole by then, after its results began to be stored, is missing. */
 #define GIVE_UP_US 8000u
 
@@ -57,6 +62,7 @@ static uint8_t positions[POSITION_BYTES]; /* at the last look */
 static uint8_t unchanged_periods;
 static struct snapshot first_reading;
 static bool is_read_once;
+static uint16_t read_again_us;
 static uint32_t written_tick; /* period_tick() when set points were written last */
 static uint32_t missed;
 
@@ -191,9 +197,10 @@ static void keep_snapshot(struct snapshot *snapshot)
 
 /* ---- following */
 
-static void begin_settling(uint32_t began_us)
+static void begin_settling(uint32_t began_us, bool was_seen)
 {
     stored_us = began_us;
+    read_again_us = was_seen ? READ_AGAIN_US : READ_AGAIN_UNSURE_US;
     ++tick;
     following = SETTLING;
     is_read_once = false;
@@ -207,7 +214,7 @@ static void search(void)
     }
     if (look_is_due(SEARCH_EVERY_US) && look()) {
         unchanged_periods = 0;
-        begin_settling(present_us());
+        begin_settling(present_us(), true);
     }
 }
 
@@ -224,22 +231,23 @@ static void expect(void)
     if (since_us < PERIOD_US - EXPECT_EARLY_US || !look_is_due(EXPECT_EVERY_US)) {
         return;
     }
+    const bool looked_just_now = us_since(&looked_us) < JUST_NOW_US;
     if (look()) {
         unchanged_periods = 0;
-        begin_settling(storing_began_us(since_us));
+        begin_settling(storing_began_us(since_us), looked_just_now);
     } else if (following == EXPECTING && since_us >= PERIOD_US + EXPECT_LATE_US) {
         if (++unchanged_periods > MOST_UNCHANGED_PERIODS) {
             following = SEARCHING;
             ring_clear();
         } else {
-            begin_settling(stored_us + PERIOD_US);
+            begin_settling(stored_us + PERIOD_US, false);
         }
     }
 }
 
 static void settle(void)
 {
-    if (!has_passed(STORING_US) || !look_is_due(READ_AGAIN_US)) {
+    if (!has_passed(STORING_US) || !look_is_due(read_again_us)) {
         return;
     }
     struct snapshot reading;

@@ -1,5 +1,6 @@
 #include "stop.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "framing.h"
@@ -38,7 +39,7 @@ static void answer(void)
     reply_send();
 }
 
-/* Set points become this posture, and the stop is answered. */
+/* Set points become this posture. */
 static void freeze(const uint16_t counts[JOINTS])
 {
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
@@ -88,7 +89,7 @@ void stop_request(uint16_t request_sequence)
         return;
     }
     frozen = true;
-    if (period_is_followed() && ring_newest() != 0) {
+    if (period_is_followed() && ring_newest() != NULL) {
         freeze_newest_posture();
         answer_frozen();
     } else {
