@@ -80,7 +80,7 @@ class Host:
 
     def greet(self) -> None:
         """Begins a session."""
-        reply = self.ask(c.Hello(c.PROTOCOL_VERSION, 0x600D))
+        reply = self.ask(c.Hello(c.PROTOCOL_VERSION, 0x600D0000 | self._sequence))
         self._stamp = c.Stamp(reply.session, 0)
 
     def release(self) -> None:

@@ -69,6 +69,10 @@ class Simulator:
         if self._library.simulator_run(ctypes.c_uint64(clock)) != 0:
             raise ValueError("the firmware has crashed")
 
+    def reset(self) -> None:
+        """Presses the reset button: the EEPROM is kept."""
+        self._library.simulator_reset()
+
     def take(self, data: bytes) -> int:
         """Bytes for the UART; how many it took."""
         return int(self._library.simulator_take(data, len(data)))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import count
 from typing import Any
 
 import pytest
 
 from benchmarks.bridge_in_c import Host
 from firmware_protocol import commands as c
+from firmware_protocol.framing import Frame, FrameDecoder
 from mock_controller.device import build_device
 from mock_controller.options import Options
 from tests.firmware.compiled import need, need_simavr
 from tests.firmware.mega_link import MegaLink, board_on_the_bus
+from tests.protocol.dialogues import DIALOGUES
+from tests.protocol.play import play
 
 pytestmark = pytest.mark.slow
 PERIOD_US = 20_000
@@ -38,6 +42,60 @@ def test_a_new_board_starts_frozen_and_is_released(host: Host) -> None:
     assert status.stop > 0
     host.release()
     assert not host.ask(c.ReadStatus()).status & c.StatusFlag.FROZEN
+
+
+class Port:
+    """The image as the partner of a dialogue."""
+
+    def __init__(self, link: MegaLink) -> None:
+        self._link = link
+        self._decoder = FrameDecoder()
+        self._said: list[Frame] = []
+
+    def send(self, data: bytes) -> None:
+        self._link.receive(data)
+
+    def _pass_time(self, us: int) -> None:
+        self._link.run_until(self._link.time_us + us)
+        self._said += self._decoder.feed(self._link.take_output())
+
+    def reply(self, sequence: int) -> Frame:
+        for _ in range(100):
+            if self._said:
+                assert self._said[0].sequence == sequence
+                return self._said.pop(0)
+            self._pass_time(500)
+        raise AssertionError("no reply")
+
+    def happens(self, event: str) -> None:
+        if event == "bridge":
+            self._link.simulator.reset()
+        self._pass_time(PERIOD_US)
+
+    def rest(self) -> list[Frame]:
+        self._pass_time(PERIOD_US)
+        return self._said
+
+
+def test_the_dialogue_of_a_bridge_that_starts_again_goes_as_written(link: MegaLink) -> None:
+    (dialogue,) = [each for each in DIALOGUES if "RESTART" in each.needs]
+    nonces = count(0x5EED0000)
+    play(dialogue.steps, Port(link), lambda: next(nonces))
+
+
+def test_a_freeze_outlasts_the_loss_of_power(host: Host, link: MegaLink) -> None:
+    host.greet()
+    host.ask(c.Stop())
+    stop = host.ask(c.ReadStatus()).stop
+    host.run_until(link.time_us + PERIOD_US)
+    link.simulator.reset()
+    host.run_until(link.time_us + 5 * PERIOD_US)
+    status: Any = host.ask(c.ReadStatus())
+    assert status.status == c.StatusFlag.FROZEN | c.StatusFlag.RESTARTED
+    assert status.stop >> 16 == (stop >> 16) + 1, "a number that was never given before"
+    assert status.boots == 1
+    host.greet()
+    host.release()
 
 
 def test_it_follows_the_controller_without_costing_it_a_set_point(host: Host, link: MegaLink) -> None:

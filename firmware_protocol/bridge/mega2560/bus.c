@@ -17,7 +17,7 @@
  *   22-24   they are read
  *   24      1MHzE falls: the cycle ends
  *   26      NPGFC rises                                                        published: 30 ns after 24, here 125 ns
- *   27      R/W, address and data may change                                   published: 50 ns after 24, here 190 ns
+ *   27      R/W, address and data may change                                   published: 50 ns after 24, here 188 ns
  *
  * The published times are those of Acorn's Application Note 003, "1MHz Bus" (docs/hardware.md). */
 #include "bus.h"
@@ -52,8 +52,9 @@ void bus_start(void)
 
 /* One cycle of the bus with address, R/W and data as they stand; returns what the data lines carried at its end.
  *
- * The sled of 15 no-operations takes away what the timer says the code is early: the clock in which NPGFC is written
- * is always the ninth of the timer. `+ 14` there, and the 14 clocks after it, are counted from the table above. */
+ * The code may begin in any clock of the timer, and has to write NPGFC in its clock 9. If the timer reads t, 8 clocks
+ * go by up to the jump, and (t + 14) mod 16 says where it enters the 15 no-operations: so many are left out, and what is
+ * left always ends in clock 8. The 14 clocks after NPGFC are counted from the table above. */
 static uint8_t bus_cycle(uint8_t selected, uint8_t idle)
 {
     uint8_t data;

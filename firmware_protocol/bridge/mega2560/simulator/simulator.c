@@ -122,6 +122,13 @@ int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t, uint64_t),
     return 0;
 }
 
+void simulator_reset(void)
+{
+    to_uart.begin = to_uart.end;
+    uart_has_room = true;
+    avr_reset(avr);
+}
+
 int simulator_run(uint64_t clock)
 {
     feed_uart();

@@ -34,6 +34,9 @@ struct bus_report {
 int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t address, uint64_t clock),
                     void (*write_byte)(uint16_t address, uint8_t value, uint64_t clock));
 
+/* Presses the reset button: the EEPROM is kept. */
+void simulator_reset(void);
+
 /* Runs the processor up to a clock; returns 0, or -1 when it has crashed. */
 int simulator_run(uint64_t clock);
 uint64_t simulator_clock(void);
