@@ -4,9 +4,6 @@
 #include <avr/io.h>
 #include <util/atomic.h>
 
-#ifndef BAUD
-#define BAUD 115200ul
-#endif
 /* With double speed, rounded to the nearest: 117,647 baud at 115200, as every Mega has, its USB adapter too. */
 #define DIVISOR ((F_CPU + 4ul * BAUD) / (8ul * BAUD) - 1ul)
 
