@@ -20,7 +20,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 # Even with -j: `page` and the background part of `lint` both install the page's packages into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo page test test-all checks page-tests lint format types requirements bench golden clean distclean
+.PHONY: help serve demo page test test-all checks page-tests lint format types requirements bench golden firmware clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -75,6 +75,9 @@ bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchma
 
 golden: $(FOR_DEVELOPMENT) ## compare answers of every command with those recorded before, to the digit (20 minutes)
 	@$(BIN)/python -m benchmarks.golden
+
+firmware: ## build the bridge's programs for boards, from Debian's packages (docs/hardware.md)
+	@$(MAKE) --no-print-directory -C firmware_protocol/bridge BUILD=$(CURDIR)/build/firmware all
 
 clean: ## remove caches and what was built
 	@rm -rf build dist server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache

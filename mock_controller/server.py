@@ -9,11 +9,12 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 from mock_controller.control import Control
 from mock_controller.control_port import ControlPort
-from mock_controller.device import build_device
+from mock_controller.device import Device, build_device
 from mock_controller.lock_step import LockStepPace
 from mock_controller.options import Options
 from mock_controller.ports import Port, PortError, PtyPort, TcpPort, host_and_port
@@ -29,13 +30,18 @@ def _clock_us() -> int:
 
 
 class Server:
-    """One mock with its port and control port. Raises ValueError with one clear line for options that cannot be met."""
+    """One mock with its port and control port. `build` makes its parts; tests put another bridge before its board.
 
-    def __init__(self, options: Options) -> None:
+    Raises ValueError with one clear line for options that cannot be met.
+    """
+
+    def __init__(
+        self, options: Options, build: Callable[[Options, Callable[[float], None]], Device] = build_device
+    ) -> None:
         self._options = options
         self._back_at: float | None = None
         self._cut_wanted: float | None = None
-        self._device = build_device(options, self._cut_soon)
+        self._device = build(options, self._cut_soon)
         self._control: ControlPort | None = None
         if options.control != "none":
             self._control = ControlPort(options.control, Control(self._device, self).execute)

@@ -1,5 +1,6 @@
 """Controllers under contract: the mock in lock-step over TCP and in real time through a pseudo-terminal, each with
-and without SAMPLE, and with `--port URL` a real one.
+and without SAMPLE; before the mock's board, the bridge in C, on this computer and on a simulated Mega 2560; and with
+`--port URL` a real one.
 
     pytest tests/contract --port serial:///dev/ttyUSB0                     reads only
     pytest tests/contract --port serial:///dev/ttyUSB0 --allow-motion      moves joints 1-3 by a few posture units
@@ -15,6 +16,7 @@ import pytest
 from daq.driver import Controller
 from daq.transport import ByteChannel, MockPort, open_endpoint, parse_port_url
 from daq.transport.mock_process import start_mock
+from tests.firmware.process import served
 
 MOCKS = {
     "lock-step, tcp": "mock://?lock_step=1&seed=11",
@@ -22,6 +24,12 @@ MOCKS = {
     "real time, pty": "mock://?pty=1&seed=13",
     "real time, pty, no SAMPLE": "mock://?pty=1&seed=14&no_sample=1",
 }
+BRIDGES = {
+    "core in C, pty": ("hosted", "--seed", "15"),
+    "core in C, pty, no SAMPLE": ("hosted", "--seed", "16", "--no-sample"),
+    "Mega 2560, pty": ("mega2560", "--seed", "17"),
+}
+"""Arguments of tests.firmware.serve."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -52,12 +60,20 @@ class UnderContract:
 
 @pytest.fixture(
     scope="module",  # no longer: two of them run in real time, and take a seventh of a processor each
-    params=[*MOCKS, pytest.param("hardware", marks=pytest.mark.hardware)],
+    params=[
+        *MOCKS,
+        *(pytest.param(name, marks=pytest.mark.slow) for name in BRIDGES),
+        pytest.param("hardware", marks=pytest.mark.hardware),
+    ],
 )
 def under_contract(request: pytest.FixtureRequest) -> Iterator[UnderContract]:
     """One running controller of each kind."""
     if request.param == "hardware":
         yield UnderContract(request.config.getoption("--port"), request.config.getoption("--allow-motion", False))
+        return
+    if request.param in BRIDGES:
+        with served(*BRIDGES[request.param]) as bridge:
+            yield UnderContract(bridge.url, True, bridge.control)
         return
     port = parse_port_url(MOCKS[request.param])
     assert isinstance(port, MockPort)

@@ -15,7 +15,7 @@ from daq.driver import Controller
 from daq.transport import ByteChannel
 from firmware_protocol.commands import Capability
 from firmware_protocol.framing import Frame, FrameDecoder
-from tests.contract.conftest import MOCKS, UnderContract
+from tests.contract.conftest import BRIDGES, MOCKS, UnderContract
 from tests.control_port import told_by
 from tests.protocol.make_vectors import FILE
 from tests.protocol.play import play
@@ -88,12 +88,13 @@ def port(under_contract: UnderContract, abilities: set[str]) -> Iterator[Port]:
 
 def _cases() -> Iterator[Any]:
     """Each mock with the dialogues that it has the abilities for; a real controller with all: it skips visibly."""
-    for name, url in MOCKS.items():
-        lacks = {"CLOCK", "RESET"} if "lock_step" in url else set()
-        lacks |= {"SAMPLE"} if "no_sample" in url else set()
+    for name, options in {**MOCKS, **{name: " ".join(arguments) for name, arguments in BRIDGES.items()}}.items():
+        lacks = {"CLOCK", "RESET"} if "lock_step" in options else set()
+        lacks |= {"SAMPLE"} if "no_sample" in options or "no-sample" in options else set()
+        marks = [pytest.mark.slow] if name in BRIDGES else []
         for dialogue in PLAYED:
             if not lacks & set(dialogue["needs"]):
-                yield pytest.param(name, dialogue, id=f"{name}-{dialogue['rule']}")
+                yield pytest.param(name, dialogue, id=f"{name}-{dialogue['rule']}", marks=marks)
     for dialogue in PLAYED:
         yield pytest.param("hardware", dialogue, id=f"hardware-{dialogue['rule']}", marks=pytest.mark.hardware)
 

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from tests.repository.tracked import ROOT, tracked_files
 
-SOURCES_OF_THE_PAGE = "server/dashboard/"
+PAGE = "server/dashboard/"
+NOT_INSTALLED = (PAGE, "firmware_protocol/bridge/")
+"""What the page and the bridges on boards are built from."""
 PACKAGES = ("firmware_protocol", "daq", "mock_controller", "model", "server")
 
 
@@ -19,11 +21,11 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
         packed = set(archive.namelist())
     tracked = {str(path.relative_to(ROOT)) for path in tracked_files()}
     expected = {name for name in tracked if name.startswith(tuple(f"{package}/" for package in PACKAGES))}
-    expected -= {name for name in expected if name.startswith(SOURCES_OF_THE_PAGE)}
+    expected -= {name for name in expected if name.startswith(NOT_INSTALLED)}
     assert any(name.endswith(".toml") for name in expected)
     assert expected - packed == set()
     assert not any(name.startswith("tests/") for name in packed)
-    page = {name.removeprefix(SOURCES_OF_THE_PAGE) for name in packed if name.startswith(SOURCES_OF_THE_PAGE)}
+    page = {name.removeprefix(PAGE) for name in packed if name.startswith(PAGE)}
     assert "dist/index.html" in page
     for form in (".js.gz", ".js.br"):
         assert any(name.startswith("dist/assets/") and name.endswith(form) for name in page)

@@ -1,0 +1,70 @@
+/* The bridge's core: what stands between the host's line and the memory that the motor controller shares with it.
+ *
+ * This is the only header that a board includes. The board supplies three functions, hands over bytes of the line, and
+ * calls bridge_work() as often as it can. There is no heap, no floating point, no operating system, and one bridge.
+ */
+#ifndef BRIDGE_CORE_H
+#define BRIDGE_CORE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* ---- what the board supplies */
+
+/* One byte of the shared memory at an address of the memory map (FC00 to FC7F in the one that ships). */
+uint8_t board_read_byte(uint16_t address);
+void board_write_byte(uint16_t address, uint8_t value);
+
+/* Time in microseconds. It begins anywhere and wraps after 2^32 (71 minutes). */
+uint32_t board_time_us(void);
+
+/* ---- what the board says once */
+
+/* How the bridge learns that the controller has ended a period. */
+enum period_source {
+    PERIOD_UNSEEN,  /* not at all: no SAMPLE; the host reads every block twice */
+    PERIOD_WATCHED, /* by watching the positions change in the memory: needs no wire but the bus */
+    PERIOD_TOLD     /* by calls of bridge_period_ended(), for a board that has a signal for it */
+};
+
+struct bridge_settings {
+    enum period_source period_source;
+    bool simulated;        /* no arm behind it: the capability SIMULATED */
+    bool frozen;           /* begin with set points held, as after a stop */
+    uint32_t first_number; /* numbers of sessions and stops begin above it; PROTOCOL.md, section 3, "Fresh numbers" */
+};
+
+/* Starts the bridge, or starts it again. */
+void bridge_start(const struct bridge_settings *settings);
+
+/* ---- what the board does again and again */
+
+/* Does what time asks for. Call it as often as possible, at least every 250 microseconds. */
+void bridge_work(void);
+
+/* Whether the bridge can take a byte of the host's now. While it cannot, the board keeps the bytes. */
+bool bridge_wants_byte(void);
+
+/* Takes one byte of the host's. A byte that comes when none is wanted is lost. */
+void bridge_take_byte(uint8_t byte);
+
+/* The next byte for the host, or -1 when there is none. */
+int16_t bridge_next_byte(void);
+
+/* ---- what the board says when it happens */
+
+/* The connection has ended, where the board can see that: the session ends with it. */
+void bridge_hang_up(void);
+
+/* The controller has stored the results of a period (PERIOD_TOLD only). */
+void bridge_period_ended(void);
+
+/* ---- what the board keeps in non-volatile memory, if it has one */
+
+/* Whether set points are held: hand it to bridge_start() after a loss of power. */
+bool bridge_is_frozen(void);
+
+/* The newest number that was given to a session or a stop. */
+uint32_t bridge_newest_number(void);
+
+#endif

@@ -1,0 +1,144 @@
+#include "registers.h"
+
+#include "core.h"
+#include "memory_map.h"
+
+#define MASK_OF(bits) ((uint16_t)((1ul << (bits)) - 1u))
+#define LARGEST_ERROR ((int16_t)(MASK_OF(ERROR_BITS) >> 1))
+
+static const uint8_t set_point_low[JOINTS] = SET_POINT_LOW;
+static const uint8_t set_point_high[JOINTS] = SET_POINT_HIGH;
+static const uint8_t position_low[JOINTS] = POSITION_LOW;
+static const uint8_t position_high[JOINTS] = POSITION_HIGH;
+static const uint8_t error_low[JOINTS] = ERROR_LOW;
+#if ERROR_BITS > 8
+static const uint8_t error_high[JOINTS] = ERROR_HIGH;
+#endif
+static const uint8_t power_low[JOINTS] = POWER_LOW;
+static const uint8_t gain_low[GAINS][JOINTS] = {GAIN_P_LOW, GAIN_I_LOW, GAIN_D_LOW};
+
+/* Registers are given as distances from the beginning of the shared memory. */
+static uint8_t read_at(uint8_t distance)
+{
+    return board_read_byte((uint16_t)(MEMORY_BASE + distance));
+}
+
+static void write_at(uint8_t distance, uint8_t value)
+{
+    board_write_byte((uint16_t)(MEMORY_BASE + distance), value);
+}
+
+static uint16_t read_word(uint8_t low, uint8_t high)
+{
+    const uint8_t low_byte = read_at(low);
+    return (uint16_t)(low_byte | ((uint16_t)read_at(high) << 8));
+}
+
+static int16_t read_error(uint8_t joint)
+{
+#if ERROR_BITS > 8
+    const uint16_t raw = (uint16_t)(read_word(error_low[joint], error_high[joint]) & MASK_OF(ERROR_BITS));
+#else
+    const uint16_t raw = read_at(error_low[joint]);
+#endif
+    const uint16_t sign = (uint16_t)(1u << (ERROR_BITS - 1));
+    return (int16_t)(uint16_t)((raw ^ sign) - sign);
+}
+
+void read_joint(uint8_t joint, struct reading *reading)
+{
+    reading->set_point = read_set_point(joint);
+    reading->position = (uint16_t)(read_word(position_low[joint], position_high[joint]) & MASK_OF(POSITION_BITS));
+    reading->error = read_error(joint);
+    reading->power = (int8_t)read_at(power_low[joint]);
+}
+
+uint16_t read_set_point(uint8_t joint)
+{
+    return (uint16_t)(read_word(set_point_low[joint], set_point_high[joint]) & MASK_OF(10));
+}
+
+void write_set_point(uint8_t joint, uint16_t posture)
+{
+    write_at(set_point_low[joint], (uint8_t)posture);
+    write_at(set_point_high[joint], (uint8_t)(posture >> 8));
+}
+
+void read_positions(uint8_t bytes[POSITION_BYTES])
+{
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        bytes[joint] = read_at(position_low[joint]);
+        bytes[JOINTS + joint] = read_at(position_high[joint]);
+    }
+}
+
+uint16_t position_in(const uint8_t bytes[POSITION_BYTES], uint8_t joint)
+{
+    return (uint16_t)((bytes[joint] | ((uint16_t)bytes[JOINTS + joint] << 8)) & MASK_OF(POSITION_BITS));
+}
+
+uint8_t read_gain(uint8_t joint, uint8_t gain)
+{
+    return read_at(gain_low[gain][joint]);
+}
+
+void write_gain(uint8_t joint, uint8_t gain, uint8_t value)
+{
+    write_at(gain_low[gain][joint], value);
+}
+
+uint8_t read_inputs(void)
+{
+    return read_at(PROCESS_INPUTS_LOW);
+}
+
+uint8_t read_outputs(void)
+{
+    return read_at(PROCESS_OUTPUTS_LOW);
+}
+
+void write_outputs(uint8_t value)
+{
+    write_at(PROCESS_OUTPUTS_LOW, value);
+}
+
+uint8_t read_gripper(void)
+{
+    return (uint8_t)(read_at(GRIPPER_LOW) & 1u);
+}
+
+void write_gripper(uint8_t closed)
+{
+    write_at(GRIPPER_LOW, closed);
+}
+
+bool block_is_inside(uint16_t address, uint8_t count)
+{
+    return address >= MEMORY_BASE && address - MEMORY_BASE < MEMORY_SIZE &&
+           count <= MEMORY_SIZE - (address - MEMORY_BASE);
+}
+
+bool block_reaches_set_points(uint16_t address, uint8_t count)
+{
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        const uint16_t low = (uint16_t)(MEMORY_BASE + set_point_low[joint]);
+        const uint16_t high = (uint16_t)(MEMORY_BASE + set_point_high[joint]);
+        if ((uint16_t)(low - address) < count || (uint16_t)(high - address) < count) {
+            return true;
+        }
+    }
+    return false;
+}
+
+uint16_t posture_of(uint16_t counts)
+{
+    const uint16_t posture = (uint16_t)((125ul * counts + 256u) >> 9); /* both over 16: (2000 counts + 4096) / 8192 */
+    return posture < LARGEST_SET_POINT ? posture : LARGEST_SET_POINT;
+}
+
+uint16_t set_point_taken(const struct reading *reading)
+{
+    const uint16_t target = (uint16_t)(reading->position + (uint16_t)reading->error); /* far above, if below 0 */
+    const bool error_is_limited = reading->error >= LARGEST_ERROR || reading->error <= -LARGEST_ERROR;
+    return error_is_limited || target > MASK_OF(POSITION_BITS) ? reading->set_point : posture_of(target);
+}

@@ -1,0 +1,32 @@
+/* The last snapshots of the controller's periods, with consecutive ticks. */
+#ifndef BRIDGE_RING_H
+#define BRIDGE_RING_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "registers.h"
+
+#define PACKED_BYTES 6u /* 10 + 12 + 16 + 8 = 46 bits of a reading */
+
+struct snapshot {
+    uint8_t status; /* flags of this period: FROZEN, SET_POINT_MISSED */
+    uint8_t joints[JOINTS][PACKED_BYTES];
+};
+
+void pack(const struct reading *reading, uint8_t packed[PACKED_BYTES]);
+void unpack(const uint8_t packed[PACKED_BYTES], struct reading *reading);
+
+void ring_clear(void);
+
+/* Adds the snapshot of a period. A tick that does not follow the newest one empties the ring first. */
+void ring_add(uint32_t tick, const struct snapshot *snapshot);
+
+/* The newest tick, 0 when the ring is empty. */
+uint32_t ring_newest_tick(void);
+const struct snapshot *ring_newest(void);
+
+/* The oldest snapshot with a tick above `after`, which becomes its tick; NULL when there is none. */
+const struct snapshot *ring_oldest_after(uint32_t *after);
+
+#endif

@@ -1,0 +1,33 @@
+"""Sizes of a linked image by the folder of its sources, from the linker's map, for `make size`."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+
+SECTION = re.compile(
+    r"^ \.(text|data|rodata|bss|noinit|progmem)\S*(?:\n)?\s+0x[0-9a-f]+\s+0x([0-9a-f]+) (\S+)", re.MULTILINE
+)
+IN_FLASH = ("text", "progmem", "data", "rodata")
+IN_RAM = ("data", "rodata", "bss", "noinit")
+
+
+def sizes(text: str) -> tuple[Counter[str], Counter[str]]:
+    """Bytes in flash and in RAM by folder."""
+    flash: Counter[str] = Counter()
+    ram: Counter[str] = Counter()
+    for kind, size, source in SECTION.findall(text):
+        folder = next((own for own in ("core", "mega2560") if f"{own}+" in source), "libraries")
+        if "ring.c" in source and kind == "bss":
+            folder = "ring"
+        flash[folder] += int(size, 16) * (kind in IN_FLASH)
+        ram[folder] += int(size, 16) * (kind in IN_RAM)
+    return flash, ram
+
+
+if __name__ == "__main__":
+    in_flash, in_ram = sizes(Path(sys.argv[1]).read_text("utf-8").split("Linker script and memory map")[1])
+    for folder in sorted(in_flash | in_ram):
+        print(f"{folder:<12}{in_flash[folder]:>6} bytes of flash {in_ram[folder]:>6} bytes of RAM")

@@ -1,0 +1,160 @@
+"""The core in C finds the controller's periods by watching the memory, and never passes on what it read torn."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from firmware_protocol import commands as c
+from firmware_protocol.units import counts_to_posture
+from tests.firmware.compiled import need
+from tests.firmware.core import PeriodSource
+from tests.firmware.machine import PERIOD_US, Machine, noisy, still, sweeping
+
+ALL = 0x3F
+
+
+@pytest.fixture(autouse=True)
+def _compiler() -> None:
+    need("gcc", "make")
+
+
+def readings(snapshot: c.Snapshot) -> list[tuple[int, int, int]]:
+    """What a snapshot has of positions, errors and powers."""
+    return [(reading.position, reading.error, reading.power) for _, reading in snapshot.joints]
+
+
+def sampled(machine: Machine, count: int) -> list[c.Snapshot]:
+    """So many snapshots, one after the other."""
+    snapshots = [machine.ask(c.Sample(c.AFTER_NEWEST, ALL))]
+    while len(snapshots) < count:
+        snapshots.append(machine.ask(c.Sample(snapshots[-1].tick, ALL)))
+    return snapshots
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.008, -0.008], ids=["same clock", "controller slower", "controller faster"])
+def test_every_period_is_found_with_clocks_that_differ(drift: float) -> None:
+    machine = Machine(sweeping, drift=drift)
+    machine.run(3 * PERIOD_US)
+    snapshots = sampled(machine, 60)
+    ahead = snapshots[0].tick - 1 - machine.whole.index(readings(snapshots[0]))
+    for earlier, snapshot in pairwise(snapshots):
+        assert snapshot.tick == earlier.tick + 1
+        assert readings(snapshot) == machine.whole[snapshot.tick - 1 - ahead], "whole, and of its own period"
+
+
+@pytest.mark.parametrize("shift_us", [3_000, 9_000, 15_000])
+def test_a_controller_that_changes_its_phase_is_never_read_torn_and_followed_again(shift_us: int) -> None:
+    machine = Machine(sweeping)
+    machine.periods(4)
+    machine.shift(shift_us)
+    snapshots = sampled(machine, 60)
+    assert all(readings(snapshot) in machine.whole for snapshot in snapshots)
+    ticks = [snapshot.tick for snapshot in snapshots[-10:]]
+    assert ticks == list(range(ticks[0], ticks[0] + 10))
+    assert machine.whole.index(readings(snapshots[-1])) >= len(machine.whole) - 2, "as fresh as before"
+
+
+def test_a_noisy_arm_at_rest_is_followed_and_no_set_point_is_called_missed() -> None:
+    machine = Machine(noisy)
+    machine.run(3 * PERIOD_US)
+    ticks = [snapshot.tick for snapshot in sampled(machine, 80)]
+    assert ticks == list(range(ticks[0], ticks[0] + 80))
+    assert machine.ask(c.ReadStatus()).missed == 0
+
+
+def test_set_points_written_at_any_moment_are_taken_in_the_period_that_was_told() -> None:
+    machine = Machine(noisy)
+    machine.greet()
+    machine.periods(3)
+    for step in range(40):
+        machine.run(step * PERIOD_US // 40)
+        taken = machine.ask(c.WriteSetPoints(((1, 400 + step), (2, 600 - step))))
+        snapshot = machine.ask(c.Sample(taken.tick, 0b11))
+        assert snapshot.tick == taken.tick + 1
+        assert [reading.set_point for _, reading in snapshot.joints] == [400 + step, 600 - step]
+        assert not snapshot.status & c.StatusFlag.SET_POINT_MISSED
+    assert machine.ask(c.ReadStatus()).missed == 0
+
+
+def test_a_set_point_that_the_controller_missed_is_told() -> None:
+    machine = Machine(noisy)
+    machine.greet()
+    machine.periods(3)
+    machine.misses_fetches = True
+    taken = machine.ask(c.WriteSetPoints(((1, 510),)))
+    snapshot = machine.ask(c.Sample(taken.tick, 1))
+    assert snapshot.status & c.StatusFlag.SET_POINT_MISSED
+    assert snapshot.joints[0][1].set_point == 500, "what the controller went on with"
+    machine.misses_fetches = False
+    later = machine.ask(c.Sample(snapshot.tick + 1, 1))
+    assert not later.status & c.StatusFlag.SET_POINT_MISSED
+    assert later.joints[0][1].set_point == 510
+    assert machine.ask(c.ReadStatus()).missed >= 1
+
+
+def test_an_arm_without_noise_is_counted_on_for_25_periods_and_then_nothing_is_new() -> None:
+    machine = Machine(sweeping)
+    machine.periods(3)
+    before = sampled(machine, 2)[-1]
+    machine.positions = still
+    snapshots = sampled(machine, 20)
+    assert snapshots[-1].tick == snapshots[0].tick + 19
+    assert snapshots[0].tick > before.tick
+    machine.periods(30)
+    reply = machine.ask(c.Sample(c.AFTER_NEWEST, 1), 30 * PERIOD_US)
+    assert reply == c.Refused(c.Sample.OPCODE, c.Refusal.NOTHING_NEW)
+
+
+def test_a_host_that_was_away_gets_what_the_ring_holds_the_oldest_first() -> None:
+    machine = Machine(noisy)
+    machine.periods(3)
+    seen = sampled(machine, 1)[0].tick
+    machine.periods(45)
+    snapshot = machine.ask(c.Sample(seen, 1))
+    newest = machine.ask(c.ReadStatus()).tick
+    assert snapshot.tick > seen + 1, "what is lost shows as a gap"
+    assert newest - snapshot.tick in (31, 32)
+    assert machine.ask(c.Sample(snapshot.tick, 1)).tick == snapshot.tick + 1
+
+
+@pytest.mark.parametrize("source", [PeriodSource.WATCHED, PeriodSource.UNSEEN], ids=["SAMPLE", "no SAMPLE"])
+def test_a_stop_freezes_a_whole_posture_also_while_one_is_stored(source: PeriodSource) -> None:
+    machine = Machine(sweeping, source)
+    machine.greet()
+    machine.periods(3)
+    for moment in range(30):
+        machine.run(5_900 + 20 * moment)
+        stopped = machine.ask(c.Stop(), 12_000)
+        postures = [tuple(counts_to_posture(position) for position, _, _ in result) for result in machine.whole[-4:]]
+        assert stopped.postures in postures
+        machine.release()
+        machine.run(PERIOD_US - machine.now_us % PERIOD_US)
+
+
+def test_a_freeze_that_the_bridge_starts_with_holds_and_has_a_number() -> None:
+    machine = Machine(noisy)
+    machine.core.start(0x00050000, frozen=True)
+    machine.greet()
+    refused = machine.ask(c.WriteSetPoints(((1, 400),)))
+    assert refused == c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
+    assert machine.ask(c.ReadStatus()).stop > 0x00050000
+    machine.release()
+    assert isinstance(machine.ask(c.WriteSetPoints(((1, 400),))), c.SetPointsTaken)
+
+
+def test_a_board_that_lost_its_supply_is_told_and_counted_from_1() -> None:
+    machine = Machine(noisy)
+    machine.greet()
+    machine.periods(4)
+    boots = machine.ask(c.ReadStatus()).boots
+    machine.lose_supply()
+    machine.periods(5)
+    machine.power_up()
+    machine.run(1_500)
+    status = machine.ask(c.ReadStatus())
+    assert status.status == c.StatusFlag.RESTARTED
+    assert status.boots == boots + 1
+    assert machine.ask(c.WriteSetPoints(((1, 400),))) == c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.BAD_SESSION)
+    assert 1 <= machine.ask(c.Sample(0, 1)).tick <= 2
