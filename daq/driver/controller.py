@@ -18,6 +18,7 @@ from typing import Self
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import GainsNotTakenError, ProtocolVersionError
+from daq.driver.line_rate import LineRate, line_rate
 from daq.driver.sampling import Deliveries, MemorySampling, RingSampling, Sampling
 from daq.driver.set_point_watch import SetPointWatch
 from daq.driver.snapshot import BoardSnapshot
@@ -122,6 +123,13 @@ class Controller:
         """Everything counted since the link was opened."""
         return self.link.counters
 
+    def line_rate(self, joints: Sequence[int] = EVERY_JOINT, moving: Sequence[int] = ()) -> LineRate:
+        """Every how many periods the line has room for a sample of `joints`, with set points of the joints `moving`.
+
+        `next_snapshot(last.tick + every - 1)` then yields every so many periods one sample, evenly.
+        """
+        return line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving))
+
     def hello(self) -> Identity:
         """Greets the controller again, after a reconnection or a restart; `restarted` tells of the latter.
 
@@ -151,7 +159,7 @@ class Controller:
         """The oldest snapshot newer than tick `after`; None waits for the next to be made.
 
         Passing each snapshot's tick on as the next `after` yields every period once, in order; those that are gone
-        are counted in `missing_before`. `set_points` travel with the question, in the same write. Never a torn
+        are counted in `missing_before`. A tick still to come leaves the periods up to it out: the question waits here. `set_points` travel with the question, in the same write. Never a torn
         or stale reading. Raises ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were
         refused: the snapshot is still to be had.
         """

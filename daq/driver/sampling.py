@@ -8,6 +8,7 @@ from typing import Protocol
 from daq.driver.clock import Clock, LockStepClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import ControllerRestartedError, NoSampleError
+from daq.driver.line_rate import bytes_of_a_snapshot
 from daq.driver.set_point_watch import SentSetPoints, SetPointWatch
 from daq.driver.snapshot import BoardSnapshot, Consistency
 from daq.driver.tick_time import TickTime
@@ -29,6 +30,9 @@ from firmware_protocol.commands import (
 
 PHASE_STEP = 0.25
 """Periods by which the readings move away from the controller's own moment after they have met it."""
+ASKED_AFTER = 0.25
+"""Periods that pass between the end of period `after` and the arrival of a question for the one that follows it: the
+host's estimate of that end is no better, and a question that arrives too early gets an earlier period."""
 MOST_MISSING = 10
 """Periods in a row without a consistent reading after which the memory counts as unreadable."""
 
@@ -112,6 +116,8 @@ class RingSampling:
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
         self._tick_time = TickTime(deliveries.period_s)
+        self._complete = TickTime(deliveries.period_s)
+        self._newest: int | None = None
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
         """Set points without a sample."""
@@ -122,6 +128,7 @@ class RingSampling:
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
         """Set points and question travel in one write."""
         question = Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints)))
+        self._wait_for(after)
         if not postures:
             (answer,) = self._ask(question)
         else:
@@ -129,6 +136,14 @@ class RingSampling:
             confirmation, answer = self._ask(request, question)
             self._deliveries.taken(batch, request, confirmation, None)
         return self._received(expect(question, answer, Snapshot), after)
+
+    def _wait_for(self, after: int | None) -> None:
+        """Waits where periods are left out: `after` is then a period to come, and to a bridge a question that arrives
+        before its end is one for the very next snapshot. A host that is late by less than the ring gets the right one."""
+        if after is None or self._newest is None or after <= self._newest:
+            return
+        deliveries = self._deliveries
+        deliveries.clock.sleep_until(self._complete.time_of(after) + ASKED_AFTER * deliveries.period_s)
 
     def _ask(self, *requests: WriteSetPoints | Sample) -> tuple[Reply, ...]:
         link = self._deliveries.link
@@ -148,6 +163,9 @@ class RingSampling:
             deliveries.clock.tick_seen(reply.tick)
         now = deliveries.clock.now()
         times = (now, self._tick_time.arrived(reply.tick, now))
+        on_line = 0.0 if deliveries.link.lock_step else bytes_of_a_snapshot(len(reply.joints)) / deliveries.link.bytes_per_second
+        self._complete.arrived(reply.tick, now - on_line)
+        self._newest = reply.tick
         return deliveries.deliver(reply.tick, after, times, reply.joints, StatusFlag(reply.status), "sample")
 
 
