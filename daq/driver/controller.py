@@ -159,9 +159,10 @@ class Controller:
         """The oldest snapshot newer than tick `after`; None waits for the next to be made.
 
         Passing each snapshot's tick on as the next `after` yields every period once, in order; those that are gone
-        are counted in `missing_before`. A tick still to come leaves the periods up to it out: the question waits here. `set_points` travel with the question, in the same write. Never a torn
-        or stale reading. Raises ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were
-        refused: the snapshot is still to be had.
+        are counted in `missing_before`. A tick still to come leaves the periods up to it out: the question waits
+        here. `set_points` travel with the question, in the same write. Never a torn or stale reading. Raises
+        ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were refused: the snapshot is
+        still to be had.
         """
         return self._sampling.next(after, joints, set_points or {})
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from firmware_protocol.commands import STAMP_BYTES
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
+from firmware_protocol.stamp import STAMP_BYTES
 
 LARGEST_SHARE = 0.8
-"""Share of the line's capacity that sampling may take. The rest is for repeats, a stop, the bridge's own time (5 ms) and
-an adapter that holds bytes back."""
+"""Share of the line's capacity that sampling may take. The rest is for repeats, a stop, the bridge's own time (5 ms)
+and an adapter that holds bytes back."""
 STOP_ANSWER_S = 0.010
 """Time (s) within which a bridge has obeyed a stop that has arrived (section 3 of PROTOCOL.md)."""
 _MASK = 1
@@ -75,9 +75,18 @@ def line_rate(bytes_per_second: float, period_s: float, joints: int, moving: int
 
 
 def stop_latency_s(bytes_per_second: float) -> float:
-    """Longest time (s) from the writing of a stop until the bridge has frozen the set points: a frame of the largest size
-    that is already on its way, the stop itself, and the bridge's own time. No byte is lost."""
+    """Longest time (s) from the writing of a stop until the bridge has frozen the set points: a frame of the largest
+    size that is already on its way, the stop itself, and the bridge's own time. No byte is lost."""
     return (MAX_PAYLOAD + 2 * FRAME_OVERHEAD) / bytes_per_second + STOP_ANSWER_S
+
+
+TOLD = (1, 3, 6)
+"""Numbers of joints whose rates are told: one, the major axes, all."""
+
+
+def told_rates(bytes_per_second: float, period_s: float) -> tuple[LineRate, ...]:
+    """What a line can give, for people: samples of some joints with a set point for each of them."""
+    return tuple(line_rate(bytes_per_second, period_s, joints, joints) for joints in TOLD)
 
 
 def _counted(count: int, what: str) -> str:

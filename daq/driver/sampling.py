@@ -139,7 +139,8 @@ class RingSampling:
 
     def _wait_for(self, after: int | None) -> None:
         """Waits where periods are left out: `after` is then a period to come, and to a bridge a question that arrives
-        before its end is one for the very next snapshot. A host that is late by less than the ring gets the right one."""
+        before its end is one for the very next snapshot. A host that is late by less than the ring's depth gets the
+        right one."""
         if after is None or self._newest is None or after <= self._newest:
             return
         deliveries = self._deliveries
@@ -163,7 +164,11 @@ class RingSampling:
             deliveries.clock.tick_seen(reply.tick)
         now = deliveries.clock.now()
         times = (now, self._tick_time.arrived(reply.tick, now))
-        on_line = 0.0 if deliveries.link.lock_step else bytes_of_a_snapshot(len(reply.joints)) / deliveries.link.bytes_per_second
+        on_line = (
+            0.0
+            if deliveries.link.lock_step
+            else bytes_of_a_snapshot(len(reply.joints)) / deliveries.link.bytes_per_second
+        )
         self._complete.arrived(reply.tick, now - on_line)
         self._newest = reply.tick
         return deliveries.deliver(reply.tick, after, times, reply.joints, StatusFlag(reply.status), "sample")

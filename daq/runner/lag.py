@@ -19,8 +19,8 @@ LONGEST_BEHIND = 1.0
 class Lag:
     """Judges the age of each sample. Time is the board's.
 
-    `every`: control periods between two samples. On a slow line both limits grow with it: two samples of age, and ten for
-    which they may stay too old.
+    `every`: control periods between two samples. On a slow line both limits grow with it: two samples of age, and ten
+    for which they may stay too old.
     """
 
     period: float

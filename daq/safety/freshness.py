@@ -40,7 +40,9 @@ class Freshness:
         lost = row.tick - last - self.every
         line = f"{lost} control periods between ticks {last} and {row.tick} have no sample"
         if self.every > 1:
-            line = f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were asked for"
+            line = (
+                f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were asked for"
+            )
         gap = (row.tick - last) * self.watched.period
         longest = max(LONGEST_SILENCE, SILENT_SAMPLES * self.every * self.watched.period)
         trips = (f"{line}; allowed are gaps up to {longest:g} s",) if gap > longest + 1e-9 else ()

@@ -20,7 +20,7 @@ class MissedSetPoints:
 
     watched: Watched
     every: int = 1
-    """Control periods from one sample to the next: a run of samples lasts as long on a slow line, but is two at least."""
+    """Control periods from one sample to the next: on a slow line a run lasts as long, but is two samples at least."""
     missed: int = 0
     run: int = 0
 

@@ -252,6 +252,7 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
     """The state of the board, in the form of a service's status."""
     from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
     from daq.contracts.status import StatusReport
+    from daq.runner.line_status import with_rates
     from daq.runner.rows import RowMaker
     from firmware_protocol.commands import StatusFlag
 
@@ -259,6 +260,7 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
     joints = tuple(joint for joint, _ in snapshot.joints)
     row = RowMaker(machine, joints, controller.period_s).row(snapshot)
     identity, frozen = controller.identity, StatusFlag.FROZEN in snapshot.flags
+    link = LinkStatus(state=controller.status().link, counters=controller.counters.numbers(), age=0.0)
     return StatusReport(
         robot=call.settings.robot.name,
         machine=machine.name,
@@ -282,6 +284,6 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
             error=row.error,
             drive=row.drive,
         ),
-        link=LinkStatus(state=controller.status().link, counters=controller.counters.numbers(), age=0.0),
+        link=with_rates(link, controller.link.bytes_per_second, controller.period_s),
         utc=now,
     )

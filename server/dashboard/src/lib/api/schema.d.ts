@@ -3068,6 +3068,13 @@ export interface components {
             };
             /** Age */
             age?: number | null;
+            /**
+             * Rates
+             * @default []
+             */
+            rates?: components["schemas"]["SampleRate"][];
+            /** Stop Seconds */
+            stop_seconds?: number | null;
         };
         /**
          * LiveFrame
@@ -4447,6 +4454,21 @@ export interface components {
             lateness: number;
         };
         /**
+         * SampleRate
+         * @description What the line can give: samples of so many joints, with a set point for each of them, every so many control
+         *     periods.
+         */
+        SampleRate: {
+            /** Joints */
+            joints: number;
+            /** Every */
+            every: number;
+            /** Samples Per Second */
+            samples_per_second: number;
+            /** Share */
+            share: number;
+        };
+        /**
          * SampledPid
          * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
          *     an inner loop (cascade): the outer output is then a speed set point for it.
@@ -5127,6 +5149,11 @@ export interface components {
             } | null;
             /** Period */
             period?: number | null;
+            /**
+             * Every
+             * @default 1
+             */
+            every?: number;
             /** Drive Unit */
             drive_unit?: ("V" | "A" | "N·m" | "N") | null;
             /**
