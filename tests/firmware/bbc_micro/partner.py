@@ -25,14 +25,13 @@ class BbcPartner:
         self._run(STARTING)
 
     def send(self, data: bytes) -> None:
-        """Puts bytes on the line. A Sample of the next period is sent just after one has ended: a line on which a
-        frame takes half a period gives the next request no other chance to come while it waits."""
+        """Puts bytes on the line, where they still are when this returns. A Sample of the next period is sent just after
+        one has ended: where a frame takes a third of a period, the next request could not come while it waits."""
         if AFTER_NEWEST_PIECE in data:
             newest = self.bbc.variable("ring_newest", 4)
             while self.bbc.variable("ring_newest", 4) == newest:
                 self._run(STEP)
-        arrived = self.bbc.serial.host_sends(data)
-        self._run(arrived - self.bbc.cycle)
+        self.bbc.serial.host_sends(data)
 
     def reply(self, sequence: int) -> Frame:
         """The reply of this number; others wait until they are asked for."""
