@@ -128,7 +128,8 @@ class Controller:
 
         `next_snapshot(last.tick + every - 1)` then yields every so many periods one sample, evenly.
         """
-        return line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving))
+        compact = Capability.COMPACT in self.identity.capabilities
+        return line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving), can_be_compact=compact)
 
     def hello(self) -> Identity:
         """Greets the controller again, after a reconnection or a restart; `restarted` tells of the latter.
@@ -279,5 +280,5 @@ class Controller:
     def _make_sampling(self) -> Sampling:
         self._deliveries = deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
         if Capability.SAMPLE in self.identity.capabilities:
-            return RingSampling(deliveries)
+            return RingSampling(deliveries, self.line_rate)
         return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))

@@ -20,6 +20,7 @@ STOP_ANSWER_S = 0.010
 _MASK = 1
 _SAMPLE, _SNAPSHOT, _READING = 5, 6, 7
 _SET_POINT, _TAKEN = 2, 5
+_COMPACT_SNAPSHOT, _COMPACT_READING = 7, 4
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class LineRate:
     share: float
     period_s: float
     stop_s: float
+    compact: bool = False
+    """Whether a turn is one `MoveAndSample`."""
 
     @property
     def samples_per_second(self) -> float:
@@ -62,16 +65,32 @@ def bytes_of_a_turn(joints: int, moving: int) -> int:
     return sample + (written if moving else 0)
 
 
-def bytes_of_a_snapshot(joints: int) -> int:
+def bytes_of_a_compact_turn(joints: int, moving: int) -> int:
+    """The same with `MoveAndSample`."""
+    asked = FRAME_OVERHEAD + STAMP_BYTES + _SAMPLE + _MASK + _SET_POINT * moving
+    return asked + bytes_of_a_snapshot(joints, compact=True)
+
+
+def bytes_of_a_snapshot(joints: int, *, compact: bool) -> int:
     """Bytes of a sample on its way to the host."""
+    if compact:
+        return FRAME_OVERHEAD + _COMPACT_SNAPSHOT + _COMPACT_READING * joints
     return FRAME_OVERHEAD + _SNAPSHOT + _READING * joints
 
 
-def line_rate(bytes_per_second: float, period_s: float, joints: int, moving: int) -> LineRate:
-    """The best rate at which the line has room left."""
-    turn = bytes_of_a_turn(joints, moving) / bytes_per_second
+def line_rate(
+    bytes_per_second: float, period_s: float, joints: int, moving: int, *, can_be_compact: bool = False
+) -> LineRate:
+    """The best rate at which the line has room left. Compact turns are used only where the line is too slow for others:
+    they tell the set point only by position and error."""
+    size = bytes_of_a_turn(joints, moving)
+    compact = can_be_compact and moving > 0 and size / bytes_per_second > LARGEST_SHARE * period_s
+    if compact:
+        size = bytes_of_a_compact_turn(joints, moving)
+    turn = size / bytes_per_second
     every = max(1, math.ceil(turn / (LARGEST_SHARE * period_s) - 1e-9))
-    return LineRate(joints, moving, every, turn / (every * period_s), period_s, stop_latency_s(bytes_per_second))
+    stop_s = stop_latency_s(bytes_per_second)
+    return LineRate(joints, moving, every, turn / (every * period_s), period_s, stop_s, compact)
 
 
 def stop_latency_s(bytes_per_second: float) -> float:
@@ -84,9 +103,11 @@ TOLD = (1, 3, 6)
 """Numbers of joints whose rates are told: one, the major axes, all."""
 
 
-def told_rates(bytes_per_second: float, period_s: float) -> tuple[LineRate, ...]:
+def told_rates(bytes_per_second: float, period_s: float, *, can_be_compact: bool) -> tuple[LineRate, ...]:
     """What a line can give, for people: samples of some joints with a set point for each of them."""
-    return tuple(line_rate(bytes_per_second, period_s, joints, joints) for joints in TOLD)
+    return tuple(
+        line_rate(bytes_per_second, period_s, joints, joints, can_be_compact=can_be_compact) for joints in TOLD
+    )
 
 
 def _counted(count: int, what: str) -> str:

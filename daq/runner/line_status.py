@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from daq.contracts.service.robot import LinkStatus, SampleRate
+from daq.contracts.service.robot import LinkStatus, RobotIdentity, SampleRate
 from daq.driver.line_rate import LineRate, stop_latency_s, told_rates
 
 
-def with_rates(link: LinkStatus, bytes_per_second: float, period_s: float) -> LinkStatus:
+def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentity) -> LinkStatus:
     """The status of a link with what its line can give."""
-    rates = tuple(_wire(rate) for rate in told_rates(bytes_per_second, period_s))
+    rates = tuple(
+        _wire(rate) for rate in told_rates(bytes_per_second, identity.period, can_be_compact=identity.compact)
+    )
     return link.model_copy(update={"rates": rates, "stop_seconds": stop_latency_s(bytes_per_second)})
 
 

@@ -23,7 +23,7 @@ def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus
         link = LinkStatus(state=arm.link, counters=arm.counters, age=now - seen.at)
         if robot.identity is not None:
             port = parse_port_url(robot.place.url)
-            link = with_rates(link, port.baud / BITS_PER_BYTE, robot.identity.period)
+            link = with_rates(link, port.baud / BITS_PER_BYTE, robot.identity)
     return RobotStatus(
         robot=robot.name,
         machine=robot.machine.name,

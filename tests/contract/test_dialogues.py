@@ -73,6 +73,7 @@ def abilities(under_contract: UnderContract) -> set[str]:
     clock = Capability.LOCK_STEP not in capabilities
     return {
         *(["SAMPLE"] if Capability.SAMPLE in capabilities else []),
+        *(["COMPACT"] if Capability.COMPACT in capabilities else []),
         *(["CLOCK"] if clock else []),
         *(["RESET"] if clock and under_contract.control else []),
     }
@@ -90,7 +91,7 @@ def _cases() -> Iterator[Any]:
     """Each mock with the dialogues that it has the abilities for; a real controller with all: it skips visibly."""
     for name, url in MOCKS.items():
         lacks = {"CLOCK", "RESET"} if "lock_step" in url else set()
-        lacks |= {"SAMPLE"} if "no_sample" in url else set()
+        lacks |= {"SAMPLE", "COMPACT"} if "no_sample" in url else set()
         for dialogue in PLAYED:
             if not lacks & set(dialogue["needs"]):
                 yield pytest.param(name, dialogue, id=f"{name}-{dialogue['rule']}")

@@ -69,6 +69,8 @@ class RobotIdentity(Wire):
     period: float
     """Control period (s)."""
     boots: int
+    compact: bool = False
+    """Whether its bridge understands the compact turn for slow lines."""
 
 
 class RobotStatus(Wire):

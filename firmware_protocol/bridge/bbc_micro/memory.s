@@ -6,7 +6,7 @@
 .importzp count, scratch, pointer, mask, frozen, restarted, begun, written_tick, stop, boots, missed
 .import body, reply, put, put_long, fresh_reading, wait_until_clear, find_begun, send_reply
 
-.export read_all, read_block, write_block, write_set_points, report_gains, set_gains, report_all
+.export read_all, read_block, write_block, write_set_points, write_points, report_gains, set_gains, report_all
 .export read_process, write_outputs, set_gripper, read_status, put_status, put_readings
 
 STAMPED = body+12
@@ -95,10 +95,20 @@ is_frozen:
 write_set_points:
         lda frozen
         bne is_frozen
-        jsr wait_until_clear
         lda STAMPED
+        ldx #0
+        jsr write_points
+        jsr put_tick_and_status
+        lda #0
+        rts
+
+; Writes the set points of the joints in the mask in A, which stand at STAMPED+1+X. In `begun`: the last period that has
+; begun before they were written.
+write_points:
         sta mask
-        ldx #0                  ; of the values
+        stx count
+        jsr wait_until_clear
+        ldx count               ; of the values
         ldy #0                  ; of the joint
 point:  lsr mask
         bcc not_this
@@ -112,10 +122,6 @@ not_this:
         iny
         cpy #JOINTS
         bne point
-        jsr note_written
-        jsr put_tick_and_status
-        lda #0
-        rts
 
 note_written:
         jsr find_begun

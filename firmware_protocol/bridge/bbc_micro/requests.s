@@ -1,9 +1,10 @@
 ; Which request is refused, and for what reason first: opcode, ability, length, values, address, session, order, state.
 
 .include "protocol.inc"
-.importzp entry, count, mask
+.importzp entry, count, scratch
 .import body, refuse, reply_to_body, send_reply, judge_stamp
-.import hello, read_block, write_block, write_set_points, report_gains, set_gains, report_all, sample, stop_arm, release
+.import hello, read_block, write_block, write_set_points, report_gains, set_gains, report_all, sample, move_and_sample
+.import stop_arm, release
 .import read_process, write_outputs, set_gripper, read_status
 
 .export handle_request, count_joints
@@ -31,6 +32,7 @@ table:
         request SET_GAINS, COMMAND, 12, check_gains, set_gains
         request REPORT_ALL, READ, 1, check_mask, report_all
         request SAMPLE, READ, 5, check_sample, sample
+        request MOVE_AND_SAMPLE, COMMAND, OWN, check_turn, move_and_sample
         request STOP, READ, 0, check_nothing, stop_arm
         request RELEASE, COMMAND, 12, check_nothing, release
         request READ_PROCESS, READ, 0, check_nothing, read_process
@@ -181,13 +183,19 @@ check_set_points:
         jsr check_mask_in_a
         bne checked
         lda STAMPED
+        ldx #0
+
+; The set points of the joints in the mask in A, which stand from STAMPED+1+X to the end of the payload.
+check_values:
+        stx scratch
         jsr count_joints
         asl a
-        sta count
+        adc scratch
+        sta count               ; where X is after the last
         adc #9
         cmp body
         bne wrong_length
-        ldx #0
+        ldx scratch
 each:   lda STAMPED+2,x         ; 999 is 03E7
         cmp #3
         bcc low_enough
@@ -224,6 +232,32 @@ check_gripper:
         bcs wrong_value
         lda #0
         rts
+
+; A question (tick and mask), then set points as in WriteSetPoints, or a mask of 0 and none.
+check_turn:
+        lda body
+        cmp #14
+        bcs long_enough
+        jmp wrong_length
+long_enough:
+        lda STAMPED+4
+        jsr check_mask_in_a
+        bne told
+        lda STAMPED+5
+        beq no_points
+        jsr check_mask_in_a
+        bne told
+        lda STAMPED+5
+        ldx #5
+        jmp check_values
+no_points:
+        lda body
+        cmp #14
+        beq checked_turn
+        jmp wrong_length
+checked_turn:
+        lda #0
+told:   rts
 
 ; Number of joints in the mask in A, in A; carry is clear.
 count_joints:

@@ -4,10 +4,10 @@
 .include "long.inc"
 .importzp tick, ring_newest, ring_count, ring_pointer, sampling, sample_sequence, sample_after, sample_mask, sample_begun
 .importzp sample_mark, begun, oldest, product, scratch, frozen, restarted, missed, missed_one, written_tick, mask, now
-.importzp reply_bytes
-.import body, reply, fresh_reading, snapshots, put, put_long, put_readings, send_reply, to_posture, read_now
+.importzp reply_bytes, count, sample_opcode, taken
+.import body, reply, fresh_reading, snapshots, put, put_long, put_readings, send_reply, write_points, find_begun, to_posture, read_now
 
-.export keep_snapshot, ring_place, sample, sample_work
+.export keep_snapshot, ring_place, sample, move_and_sample, sample_work
 
 PATIENCE = 25                   ; periods after which a Sample has waited in vain
 
@@ -118,15 +118,39 @@ differs:
 not_missed:
         rts
 
-; A later Sample takes the place of one that waits.
-sample:
+; Set points, if there are any, and then a Sample with a compact answer.
+move_and_sample:
+        jsr find_begun
+        lda body+17
+        beq question
+        lda frozen
+        beq move
+        lda #IS_FROZEN
+        rts
+move:   lda body+17
+        ldx #5
+        jsr write_points
+question:
+        lda begun
+        sta taken
+        lda body+16
+        sta sample_mask
+        copy_long body+12, sample_after
+        lda #MOVE_AND_SAMPLE
+        bne begin_waiting
+
+sample: lda body+8
+        sta sample_mask
+        copy_long body+4, sample_after
+        lda #SAMPLE
+
+; A later question takes the place of one that waits.
+begin_waiting:
+        sta sample_opcode
         lda body+1
         sta sample_sequence
         lda body+2
         sta sample_sequence+1
-        copy_long body+4, sample_after
-        lda body+8
-        sta sample_mask
         lda #1
         sta sampling
         lda #PATIENCE
@@ -210,7 +234,7 @@ in_vain:
         jsr begin
         lda #REFUSED
         sta reply+3
-        lda #SAMPLE
+        lda sample_opcode
         jsr put
         lda #NOTHING_NEW
         jsr put
@@ -226,7 +250,8 @@ begin:  lda #0
         rts
 
 answer: jsr begin
-        lda #SAMPLE | $80
+        lda sample_opcode
+        ora #$80
         sta reply+3
         ldx #begun
         jsr put_long
@@ -235,6 +260,9 @@ answer: jsr begin
         lda (ring_pointer),y
         ora restarted
         jsr put
+        lda sample_opcode
+        cmp #MOVE_AND_SAMPLE
+        beq compact
         lda sample_mask
         sta mask
         jsr put
@@ -244,3 +272,74 @@ answer: jsr begin
         adc #1
         jsr put_readings
         jmp send_reply
+
+; Four bytes a joint: position and error in twelve bits each, then power.
+compact:
+        lda taken
+        jsr put
+        lda sample_mask
+        sta mask
+        jsr put
+        ldy #1
+reading:
+        lsr mask
+        bcc skip
+        iny
+        iny
+        lda (ring_pointer),y    ; position
+        jsr put
+        iny
+        lda (ring_pointer),y
+        sta scratch
+        iny
+        jsr twelve_bits         ; error, in `product`
+        lda product
+        asl a
+        asl a
+        asl a
+        asl a
+        ora scratch
+        jsr put
+        ldx #4
+shift:  lsr product+1
+        ror product
+        dex
+        bne shift
+        lda product
+        jsr put
+        iny
+        lda (ring_pointer),y    ; power
+        jsr put
+        iny
+        bne next
+skip:   tya
+        clc
+        adc #7
+        tay
+next:   cpy #1 + 7 * JOINTS
+        bne reading
+        jmp send_reply
+
+; The error at Y and Y+1 of the place, or the nearest that twelve bits hold. Leaves Y at its high byte.
+twelve_bits:
+        lda (ring_pointer),y
+        sta product
+        iny
+        lda (ring_pointer),y
+        sta product+1
+        bmi negative
+        cmp #$08
+        bcc fits
+        lda #$FF
+        sta product
+        lda #$07
+        sta product+1
+        rts
+negative:
+        cmp #$F8
+        bcs fits
+        lda #0
+        sta product
+        lda #$F8
+        sta product+1
+fits:   rts

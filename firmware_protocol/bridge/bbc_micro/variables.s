@@ -10,6 +10,7 @@
 .exportzp session, nonce, newest, stop, fresh, seeded, boots, restarted, frozen, missed, written_tick
 .exportzp ring_newest, ring_count, sampling, sample_sequence, sample_after, sample_mask, sample_begun
 .exportzp product, mask, joint, ring_pointer, begun, oldest, sample_mark, frozen_tick, missed_one
+.exportzp sample_opcode, taken
 
 ; the line
 rx_in:          .res 1          ; next free place; the interrupt moves it
@@ -65,6 +66,8 @@ sampling:       .res 1          ; a Sample waits
 sample_sequence: .res 2
 sample_after:   .res 4
 sample_mask:    .res 1
+sample_opcode:  .res 1          ; SAMPLE or MOVE_AND_SAMPLE
+taken:          .res 1          ; the last period that had begun before its set points were written
 sample_begun:   .res 1          ; periods that it may still wait
 sample_mark:    .res 2          ; when the present one of them began
 begun:          .res 4          ; the last period that has begun; a tick to be looked up

@@ -1,7 +1,8 @@
 """A BBC Micro with the MA2000's memory on its 1 MHz bus, as far as the bridge uses it: py65, cycle by cycle.
 
-The operating system is two lines: its interrupt entry, and OSWRCH. Chips and shared memory are at absolute addresses, and
-the bridge reaches them with absolute instructions only; so only those are looked at, and all else runs at py65's speed.
+The operating system is two lines: its interrupt entry, and OSWRCH. Chips and shared memory are at absolute addresses,
+and the bridge reaches them with absolute instructions only; so only those are looked at, and all else runs at py65's
+speed.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ class BbcPartner:
         self._run(STARTING)
 
     def send(self, data: bytes) -> None:
-        """Puts bytes on the line, where they still are when this returns. A Sample of the next period is sent just after
-        one has ended: where a frame takes a third of a period, the next request could not come while it waits."""
+        """Puts bytes on the line, where they still are when this returns. A Sample of the next period is sent just
+        after one has ended: where a frame takes a third of a period, the next request could not come while it waits."""
         if AFTER_NEWEST_PIECE in data:
             newest = self.bbc.variable("ring_newest", 4)
             while self.bbc.variable("ring_newest", 4) == newest:
@@ -45,7 +45,7 @@ class BbcPartner:
         raise AssertionError("no reply")
 
     def happens(self, event: str) -> None:
-        """A period ends, the board loses its supply for a moment, or somebody presses BREAK and starts the bridge anew."""
+        """A period ends, the board loses its supply for a moment, or somebody starts the bridge anew."""
         if event == "period":
             self._run(2 * 20_000)
         elif event == "reset":

@@ -4274,6 +4274,11 @@ export interface components {
             period: number;
             /** Boots */
             boots: number;
+            /**
+             * Compact
+             * @default false
+             */
+            compact?: boolean;
         };
         /**
          * RobotMessage
