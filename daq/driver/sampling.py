@@ -99,9 +99,11 @@ class Deliveries:
         joints: tuple[tuple[int, JointReading], ...],
         flags: StatusFlag,
         by: Consistency,
+        every: int = 1,
     ) -> BoardSnapshot:
-        """A snapshot, with everything counted that it shows. `times` are host time and tick time (s)."""
-        missing = 0 if after is None else tick - after - 1
+        """A snapshot, with everything counted that it shows. `times` are host time and tick time (s). It counts as late
+        after the time between two samples, `every` periods."""
+        missing = 0 if after is None else max(0, tick - after - 1)
         missed = self.watch.missed(tick, joints) or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
         snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed)
         tally = self.link.tally
@@ -109,7 +111,7 @@ class Deliveries:
             tally.count("missing_samples", missing)
         if missed:
             tally.count("missed_set_points")
-        if snapshot.jitter > self.period_s:
+        if snapshot.jitter > every * self.period_s:
             tally.count("late")
         return snapshot
 
@@ -180,15 +182,17 @@ class RingSampling:
     def _received(self, reply: Snapshot | CompactSnapshot, joints: JointReadings, after: int | None) -> BoardSnapshot:
         deliveries = self._deliveries
         deliveries.check_restart(reply.status)
-        if after is not None and reply.tick <= after:
-            raise NoSampleError(f"the controller sent tick {reply.tick}, asked for one after {after}")
+        known = after if self._newest is None or after is None else min(after, self._newest)
+        if known is not None and reply.tick <= known:
+            raise NoSampleError(f"the controller sent tick {reply.tick}, asked for one after {known}")
+        every = 1 if known is None or after is None else after - known + 1
         if isinstance(deliveries.clock, LockStepClock):
             deliveries.clock.tick_seen(reply.tick)
         now = deliveries.clock.now()
         times = (now, self._tick_time.arrived(reply.tick, now))
         self._complete.arrived(reply.tick, now - self._time_on_line(reply))
         self._newest = reply.tick
-        return deliveries.deliver(reply.tick, after, times, joints, StatusFlag(reply.status), "sample")
+        return deliveries.deliver(reply.tick, after, times, joints, StatusFlag(reply.status), "sample", every)
 
     def _time_on_line(self, reply: Snapshot | CompactSnapshot) -> float:
         """Time (s) that a reply has taken on the line; none in lock-step, where the clock is the board's."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
@@ -19,12 +18,6 @@ from tests.firmware.bbc_micro.machine import BbcMicro
 SOURCES = Path(__file__).parents[3] / "firmware_protocol" / "bridge" / "bbc_micro"
 ACCESS_US = 1
 """Time of one access of the BBC Micro to the shared memory: one cycle of the 1 MHz bus."""
-
-
-def missing() -> str:
-    """What building and running needs and this machine lacks; empty where nothing is missing."""
-    absent = [program for program in ("ca65", "ld65") if shutil.which(program) is None]
-    return f"needs {' and '.join(absent)} (Debian's package cc65)" if absent else ""
 
 
 @cache
