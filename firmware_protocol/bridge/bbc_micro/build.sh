@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds BRIDGE (19200 baud) and BRIDG96 (9600 baud) into the folder given (default: here), with ca65 and ld65 of Debian's
-# package cc65. Both are loaded to 1900 and started there.
+# Builds BRIDGE (19200 baud), BRIDG96 (9600 baud) and a disc image with both into the folder given (default: here), with
+# ca65 and ld65 of Debian's package cc65, and python3. Both are loaded to 1900 and started there.
 set -e
 here=$(cd "$(dirname "$0")" && pwd)
 out=${1:-$here}
@@ -17,3 +17,4 @@ build() { # name, option
 }
 build BRIDGE ""
 build BRIDG96 "-DULA_RATE=100"
+python3 "$here/disc_image.py" "$out"
