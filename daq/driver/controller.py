@@ -12,7 +12,7 @@ REPORTEPP  errors, positions, powers                       `errors_positions_pow
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 from daq.driver.clock import Clock, LockStepClock, RealClock
@@ -123,13 +123,19 @@ class Controller:
         """Everything counted since the link was opened."""
         return self.link.counters
 
-    def line_rate(self, joints: Sequence[int] = EVERY_JOINT, moving: Sequence[int] = ()) -> LineRate:
+    def line_rate(
+        self, joints: Sequence[int] = EVERY_JOINT, moving: Sequence[int] = (), *, together: bool = True
+    ) -> LineRate:
         """Every how many periods the line has room for a sample of `joints`, with set points of the joints `moving`.
 
-        `next_snapshot(last.tick + every - 1)` then yields every so many periods one sample, evenly.
+        `next_snapshot(last.tick + every - 1)` then yields every so many periods one sample, evenly. `together`: the
+        set points are given to `next_snapshot`, else to `set_points`. Without SAMPLE it is every period, or none: the
+        memory has to be read twice within one.
         """
-        compact = Capability.COMPACT in self.identity.capabilities
-        return line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving), can_be_compact=compact)
+        capabilities = self.identity.capabilities
+        compact = together and Capability.COMPACT in capabilities
+        rate = line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving), can_be_compact=compact)
+        return rate if Capability.SAMPLE in capabilities else replace(rate, every=1, share=rate.share * rate.every)
 
     def hello(self) -> Identity:
         """Greets the controller again, after a reconnection or a restart; `restarted` tells of the latter.

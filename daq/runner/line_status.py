@@ -7,7 +7,9 @@ from daq.driver.line_rate import LineRate, stop_latency_s, told_rates
 
 
 def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentity) -> LinkStatus:
-    """The status of a link with what its line can give."""
+    """The status of a link with what its line can give. Without SAMPLE no rate is promised."""
+    if not identity.samples:
+        return link.model_copy(update={"stop_seconds": stop_latency_s(bytes_per_second)})
     rates = tuple(
         _wire(rate) for rate in told_rates(bytes_per_second, identity.period, can_be_compact=identity.compact)
     )

@@ -58,7 +58,7 @@ class ControllerArm:
         self._every_period = every_period
         self._rows = RowMaker(machine, self.joints, controller.period_s)
         self._last: int | None = None
-        self.every = controller.line_rate(self.joints, self.joints).every
+        self.every = controller.line_rate(self.joints, self.joints, together=False).every
         """Control periods from one sample to the next, as the line allows."""
 
     @contextmanager

@@ -196,6 +196,7 @@ class Opened(FrozenRecord):
     protocol: int
     period: float
     boots: int
+    samples: bool = True
     compact: bool = False
 
 

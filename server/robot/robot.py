@@ -247,6 +247,7 @@ class Robot:
             protocol=report.protocol,
             period=report.period,
             boots=report.boots,
+            samples=report.samples,
             compact=report.compact,
         )
         port = parse_port_url(self.place.url)

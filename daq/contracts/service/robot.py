@@ -69,8 +69,10 @@ class RobotIdentity(Wire):
     period: float
     """Control period (s)."""
     boots: int
+    samples: bool = True
+    """Whether its bridge sees the control period (SAMPLE): only then is a rate promised."""
     compact: bool = False
-    """Whether its bridge understands the compact turn for slow lines."""
+    """Whether its bridge understands the compact turn for slow lines (COMPACT)."""
 
 
 class RobotStatus(Wire):

@@ -30,8 +30,8 @@ def disc_image(files: dict[str, bytes]) -> bytes:
         padded = data + bytes(-len(data) % SECTOR)
         body += padded
         sector += len(padded) // SECTOR
-    for name, entry in reversed(entries):
-        names += name
+    for named, entry in reversed(entries):
+        names += named
         about += entry
     return (names.ljust(SECTOR, b"\0") + about.ljust(SECTOR, b"\0") + body).ljust(SECTORS * SECTOR, b"\0")
 

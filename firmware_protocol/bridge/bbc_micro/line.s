@@ -16,7 +16,7 @@ line_interrupt:
         lda ACIA_STATUS
         sta irq_status
         and #1
-        beq send
+        beq none_received
         lda ACIA_DATA
         ldx rx_in
         sta rx_ring,x
@@ -24,6 +24,12 @@ line_interrupt:
         cpx rx_out
         beq send
         stx rx_in
+        jmp send
+none_received:
+        lda irq_status
+        and #4                  ; a lost carrier, which RS423 does not have: reading ends its interrupt
+        beq send
+        lda ACIA_DATA
 send:   lda irq_status
         and #2
         beq leave

@@ -4275,6 +4275,11 @@ export interface components {
             /** Boots */
             boots: number;
             /**
+             * Samples
+             * @default true
+             */
+            samples?: boolean;
+            /**
              * Compact
              * @default false
              */
