@@ -43,6 +43,8 @@ EventKind = Literal[
 ]
 
 
+SLOW_LINE = "slow line: "
+"""Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo=UTC)
 """Range of moments that fit into 64 bits of ns since 1970, as time stamps are written."""
 

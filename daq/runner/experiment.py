@@ -14,7 +14,7 @@ from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Outcome, TraceRecord
+from daq.contracts.trace import SLOW_LINE, Outcome, TraceRecord
 from daq.driver import EVERY_JOINT, Controller, GainsNotTakenError
 from daq.link import LinkError
 from daq.runner.arm_control import ArmControl, StoppedError
@@ -158,7 +158,7 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
         for change in changes:
             follower.tell("gains", change.message)
         if rate.every > 1:
-            follower.tell("note", f"slow line: {rate.in_words}")
+            follower.tell("note", f"{SLOW_LINE}{rate.in_words}")
         ending = follower.follow(prepared.motion, _progress(run.listener, prepared.motion))
         if ending.kind == "finished":
             ending = _finish(run, changes)
