@@ -16,6 +16,8 @@ class Capability(IntFlag):
     """Its time stands still until the host asks for more (`Advance`, or `Sample` of a tick not yet made)."""
     SIMULATED = 4
     """There is no arm behind the bridge."""
+    COMPACT = 8
+    """With SAMPLE: understands `MoveAndSample`, the turn for slow lines."""
 
 
 class StatusFlag(IntFlag):

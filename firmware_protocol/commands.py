@@ -13,13 +13,14 @@ from firmware_protocol.arrival import AdvanceOrder, Arrival, Session
 from firmware_protocol.codes import NO_SESSION, PROTOCOL_VERSION, Capability, Refusal, StatusFlag
 from firmware_protocol.errors import BlockAddressError, PayloadLengthError, ProtocolError, UnknownOpcodeError
 from firmware_protocol.framing import Frame
-from firmware_protocol.joints import ALL_JOINTS, JointReading, JointReadings, joints_of, mask_of
+from firmware_protocol.joints import ALL_JOINTS, CompactReading, JointReading, JointReadings, joints_of, mask_of
 from firmware_protocol.message import Message, Reply, Request
 from firmware_protocol.replies import (
     REPLIES,
     Advanced,
     Block,
     BlockWritten,
+    CompactSnapshot,
     ErrorsPositionsPowers,
     Gains,
     GainsSet,
@@ -41,6 +42,7 @@ from firmware_protocol.requests import (
     REQUESTS,
     Advance,
     Hello,
+    MoveAndSample,
     ReadBlock,
     ReadProcess,
     ReadStatus,
@@ -74,6 +76,8 @@ __all__ = [
     "Block",
     "BlockWritten",
     "Capability",
+    "CompactReading",
+    "CompactSnapshot",
     "ErrorsPositionsPowers",
     "Gains",
     "GainsSet",
@@ -83,6 +87,7 @@ __all__ = [
     "JointReading",
     "JointReadings",
     "Message",
+    "MoveAndSample",
     "OutputsWritten",
     "Process",
     "ReadBlock",

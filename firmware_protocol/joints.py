@@ -13,7 +13,7 @@ from typing import ClassVar
 from firmware_protocol.errors import PayloadLengthError, ProtocolError
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.message import check_range, unpack
-from firmware_protocol.units import ADC_COUNTS
+from firmware_protocol.units import ADC_COUNTS, counts_to_posture
 
 ALL_JOINTS = (1 << JOINTS) - 1
 """Mask of joints 1 to 6."""
@@ -88,6 +88,50 @@ class JointReading:
         check_range("power", self.power, -0x80, 0x7F)
 
 
+COMPACT_ERROR_MAX = 2047
+"""Largest error that twelve bits hold; one further out is told as this, or as -2048."""
+
+
+@dataclass(frozen=True)
+class CompactReading:
+    """Position and error (ADC counts, twelve bits each) and power of one joint: the set point that was taken is what
+    position and error come to. An error beyond twelve bits is told as the largest of its sign."""
+
+    position: int
+    error: int
+    power: int
+
+    def __post_init__(self) -> None:
+        check_range("position", self.position, 0, ADC_COUNTS - 1)
+        check_range("error", self.error, -COMPACT_ERROR_MAX - 1, COMPACT_ERROR_MAX)
+        check_range("power", self.power, -0x80, 0x7F)
+
+    @classmethod
+    def of(cls, reading: JointReading) -> CompactReading:
+        """What is left of a whole reading."""
+        error = min(max(reading.error, -COMPACT_ERROR_MAX - 1), COMPACT_ERROR_MAX)
+        return cls(reading.position, error, reading.power)
+
+    @property
+    def packed(self) -> int:
+        """32 bits: position, error, power, from the least significant bit on."""
+        return self.position | (self.error & 0xFFF) << 12 | (self.power & 0xFF) << 24
+
+    @classmethod
+    def unpacked(cls, bits: int) -> CompactReading:
+        """The reading in 32 bits, all of whose values are possible."""
+        error, power = bits >> 12 & 0xFFF, bits >> 24
+        return cls(bits & 0xFFF, (error ^ 0x800) - 0x800, (power ^ 0x80) - 0x80)
+
+    @property
+    def whole(self) -> JointReading:
+        """With the set point that the controller took."""
+        counts = min(max(self.position + self.error, 0), ADC_COUNTS - 1)
+        return JointReading(counts_to_posture(counts), self.position, self.error, self.power)
+
+
+CompactReadings = tuple[tuple[int, CompactReading], ...]
+"""(joint, reading), joints ascending."""
 JointReadings = tuple[tuple[int, JointReading], ...]
 """(joint, reading), joints ascending."""
 

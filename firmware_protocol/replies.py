@@ -9,13 +9,24 @@ from typing import Self
 from firmware_protocol.codes import NO_SESSION
 from firmware_protocol.errors import PayloadLengthError, ProtocolError
 from firmware_protocol.framing import MAX_PAYLOAD
-from firmware_protocol.joints import JointReadings, check_ascending, pack_readings, parse_readings
+from firmware_protocol.joints import (
+    CompactReading,
+    CompactReadings,
+    JointReadings,
+    check_ascending,
+    mask_of,
+    pack_readings,
+    parse_readings,
+    split_mask,
+)
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.message import Reply, check_range, unpack
 from firmware_protocol.units import POSTURE_UNITS
 
 _TICK_AND_STATUS = 5
 """Bytes of a snapshot before its joints."""
+_COMPACT_HEAD = 6
+"""The same of a compact snapshot."""
 _SHORT_HELLO = 10
 """Bytes of the reply to `Hello` in version 1, and where no session has begun."""
 
@@ -173,6 +184,48 @@ class Snapshot(Reply):
             raise PayloadLengthError(f"Snapshot: payload of {len(payload)} bytes, expected at least 13")
         tick, status = unpack("<IB", payload[:_TICK_AND_STATUS], cls.__name__)
         return cls(tick, status, parse_readings(cls.__name__, payload[_TICK_AND_STATUS:]))
+
+
+@dataclass(frozen=True)
+class CompactSnapshot(Reply):
+    """A snapshot in four bytes a joint: the answer to `MoveAndSample`.
+
+    taken: the lowest eight bits of what `SetPointsTaken.tick` would say of the request's set points
+    """
+
+    OPCODE = 0x91
+    tick: int
+    status: int
+    taken: int
+    joints: CompactReadings
+
+    def __post_init__(self) -> None:
+        check_range("CompactSnapshot: tick", self.tick, 0, 0xFFFFFFFF)
+        check_range("CompactSnapshot: status", self.status, 0, 0xFF)
+        check_range("CompactSnapshot: taken", self.taken, 0, 0xFF)
+        check_ascending("CompactSnapshot", tuple(joint for joint, _ in self.joints))
+
+    @property
+    def taken_tick(self) -> int:
+        """The tick that `taken` ends in: the one nearest to the snapshot's."""
+        return self.tick + ((self.taken - self.tick + 0x80) & 0xFF) - 0x80
+
+    def pack(self) -> bytes:
+        """Tick, status, taken, mask, four bytes per joint: 31 bytes for six joints."""
+        mask = mask_of(joint for joint, _ in self.joints)
+        readings = [reading.packed for _, reading in self.joints]
+        return struct.pack(f"<IBBB{len(readings)}I", self.tick, self.status, self.taken, mask, *readings)
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """Tick, status, taken, mask, four bytes per joint."""
+        if len(payload) < _COMPACT_HEAD:
+            raise PayloadLengthError(f"CompactSnapshot: payload of {len(payload)} bytes, expected at least 11")
+        tick, status, taken = unpack("<IBB", payload[:_COMPACT_HEAD], cls.__name__)
+        joints, rest = split_mask(cls.__name__, payload[_COMPACT_HEAD:])
+        values = unpack(f"<{len(joints)}I", rest, cls.__name__)
+        readings = tuple((joint, CompactReading.unpacked(bits)) for joint, bits in zip(joints, values, strict=True))
+        return cls(tick, status, taken, readings)
 
 
 @dataclass(frozen=True)

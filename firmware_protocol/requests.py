@@ -27,6 +27,10 @@ MAX_WRITE = MAX_PAYLOAD - STAMP_BYTES - 2
 """Most bytes that one `WriteBlock` carries."""
 
 
+_QUESTION = 5
+"""Bytes of a `MoveAndSample` before its set points."""
+
+
 def _check_block(what: str, address: int, count: int, most: int) -> None:
     check_range(f"{what}: address", address, 0, 0xFFFF)
     check_range(f"{what}: number of bytes", count, 1, most)
@@ -183,6 +187,43 @@ class Sample(Request):
     def __post_init__(self) -> None:
         check_range("Sample: after", self.after, 0, AFTER_NEWEST)
         check_mask("Sample", self.mask)
+
+
+@dataclass(frozen=True)
+class MoveAndSample(Request):
+    """`WriteSetPoints` and `Sample` in one frame, for slow lines: set points of the joints in `postures`, if there are
+    any, then the oldest snapshot newer than tick `after` of the joints in `sampled`, in its compact form."""
+
+    OPCODE = 0x11
+    IS_COMMAND = True
+    after: int
+    sampled: int
+    postures: tuple[tuple[int, int], ...] = ()
+    """(joint, posture units 0–999), joints ascending."""
+
+    def __post_init__(self) -> None:
+        check_range("MoveAndSample: after", self.after, 0, AFTER_NEWEST)
+        check_mask("MoveAndSample", self.sampled)
+        if self.postures:
+            WriteSetPoints(self.postures)
+
+    def pack(self) -> bytes:
+        """Tick and mask of the question, then the set points with theirs."""
+        postures = WriteSetPoints(self.postures).pack() if self.postures else b"\0"
+        return struct.pack("<IB", self.after, self.sampled) + postures
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """Raises ProtocolError for a set point outside 0–999 too."""
+        if len(payload) < _QUESTION + 1:
+            raise PayloadLengthError(f"MoveAndSample: payload of {len(payload)} bytes, expected at least 6")
+        after, sampled = unpack("<IB", payload[:_QUESTION], cls.__name__)
+        check_mask(cls.__name__, sampled)
+        if payload[_QUESTION]:
+            return cls(after, sampled, WriteSetPoints.parse(payload[_QUESTION:]).postures)
+        if len(payload) > _QUESTION + 1:
+            raise PayloadLengthError("MoveAndSample: set points of no joint")
+        return cls(after, sampled)
 
 
 @dataclass(frozen=True)

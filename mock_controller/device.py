@@ -61,6 +61,7 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
     bridge = Bridge(
         Timeline(board, faults),
         sees_period=options.sample,
+        compact=options.compact,
         lock_step=options.lock_step,
         first_number=_first_number(options),
     )

@@ -33,6 +33,7 @@ class Options(BaseModel):
     owned: bool = False
     lock_step: bool = False
     sample: bool = True
+    compact: bool = True
     baud: Annotated[int, Field(ge=300, le=4_000_000)] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     start: Annotated[tuple[Posture, ...], Field(min_length=JOINTS, max_length=JOINTS)] | None = None
@@ -146,6 +147,13 @@ def _parser() -> argparse.ArgumentParser:
         action="store_false",
         default=None,
         help="a bridge that does not see the controller's period: no consistent snapshots",
+    )
+    time.add_argument(
+        "--no-compact",
+        dest="compact",
+        action="store_false",
+        default=None,
+        help="a bridge that does not understand the compact turn for slow lines",
     )
 
     machine = parser.add_argument_group("the machine")

@@ -43,6 +43,8 @@ EventKind = Literal[
 ]
 
 
+SLOW_LINE = "slow line: "
+"""Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo=UTC)
 """Range of moments that fit into 64 bits of ns since 1970, as time stamps are written."""
 
@@ -87,6 +89,8 @@ class TraceRecord(FrozenRecord):
     gains: dict[int, Gain] | None = None
     period: float | None = None
     """Control period (s); None where the record was not made tick by tick."""
+    every: Annotated[int, Field(ge=1, exclude_if=lambda every: every == 1)] = 1
+    """Control periods from one sample to the next: more than one where the line to the controller was slow."""
     drive_unit: Literal["V", "A", "N·m", "N"] | None = None
     clock: dict[str, float] = {}
     """Offsets between the board's ticks, the host's monotonic clock and UTC, in s."""
@@ -107,7 +111,7 @@ class Trace:
     drive:     (n, j) motor volts after the amplifier, or A, N·m, N where `record.drive_unit` says so
     velocity:  (n, j) rad/s
     power_raw: (n, j) the controller's output before the amplifier, DAC counts
-    tick:      (n,)   number of the control period; a gap is a sample that is missing
+    tick:      (n,)   number of the control period; a step of more than `record.every` is a gap
     host_time: (n,)   s, the host's monotonic clock when the sample arrived
     status:    (n,)   the board's flags (`firmware_protocol.commands.StatusFlag`)
 
@@ -160,10 +164,10 @@ class Trace:
 
     @property
     def missing(self) -> int:
-        """Number of control periods without a sample between the first and the last."""
+        """Number of samples that are not there between the first and the last."""
         if self.tick is None or len(self) == 0:
             return 0
-        return int(self.tick[-1] - self.tick[0]) + 1 - len(self)
+        return max(0, int(self.tick[-1] - self.tick[0]) // self.record.every + 1 - len(self))
 
     def column(self, joint: int) -> int:
         """Column of joint `joint` (from 1). Raises TraceError when the trace has none."""

@@ -12,12 +12,13 @@ REPORTEPP  errors, positions, powers                       `errors_positions_pow
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import GainsNotTakenError, ProtocolVersionError
+from daq.driver.line_rate import LineRate, line_rate
 from daq.driver.sampling import Deliveries, MemorySampling, RingSampling, Sampling
 from daq.driver.set_point_watch import SetPointWatch
 from daq.driver.snapshot import BoardSnapshot
@@ -122,6 +123,20 @@ class Controller:
         """Everything counted since the link was opened."""
         return self.link.counters
 
+    def line_rate(
+        self, joints: Sequence[int] = EVERY_JOINT, moving: Sequence[int] = (), *, together: bool = True
+    ) -> LineRate:
+        """Every how many periods the line has room for a sample of `joints`, with set points of the joints `moving`.
+
+        `next_snapshot(last.tick + every - 1)` then yields every so many periods one sample, evenly. `together`: the
+        set points are given to `next_snapshot`, else to `set_points`. Without SAMPLE it is every period, or none: the
+        memory has to be read twice within one.
+        """
+        capabilities = self.identity.capabilities
+        compact = together and Capability.COMPACT in capabilities
+        rate = line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving), can_be_compact=compact)
+        return rate if Capability.SAMPLE in capabilities else replace(rate, every=1, share=rate.share * rate.every)
+
     def hello(self) -> Identity:
         """Greets the controller again, after a reconnection or a restart; `restarted` tells of the latter.
 
@@ -151,9 +166,10 @@ class Controller:
         """The oldest snapshot newer than tick `after`; None waits for the next to be made.
 
         Passing each snapshot's tick on as the next `after` yields every period once, in order; those that are gone
-        are counted in `missing_before`. `set_points` travel with the question, in the same write. Never a torn
-        or stale reading. Raises ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were
-        refused: the snapshot is still to be had.
+        are counted in `missing_before`. A tick still to come leaves the periods up to it out: the question waits
+        here. `set_points` travel with the question, in the same write. Never a torn or stale reading. Raises
+        ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were refused: the snapshot is
+        still to be had.
         """
         return self._sampling.next(after, joints, set_points or {})
 
@@ -270,5 +286,5 @@ class Controller:
     def _make_sampling(self) -> Sampling:
         self._deliveries = deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
         if Capability.SAMPLE in self.identity.capabilities:
-            return RingSampling(deliveries)
+            return RingSampling(deliveries, self.line_rate)
         return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))

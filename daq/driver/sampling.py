@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from daq.driver.clock import Clock, LockStepClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import ControllerRestartedError, NoSampleError
+from daq.driver.line_rate import LineRate, bytes_of_a_snapshot
 from daq.driver.set_point_watch import SentSetPoints, SetPointWatch
 from daq.driver.snapshot import BoardSnapshot, Consistency
 from daq.driver.tick_time import TickTime
 from daq.link import Link, LinkTimeoutError, RequestRefusedError, expect
 from firmware_protocol.commands import (
     AFTER_NEWEST,
+    CompactSnapshot,
     JointReading,
+    JointReadings,
+    MoveAndSample,
     ReadStatus,
     Refusal,
     Reply,
+    Request,
     Sample,
     SetPointsTaken,
     Snapshot,
@@ -29,6 +34,9 @@ from firmware_protocol.commands import (
 
 PHASE_STEP = 0.25
 """Periods by which the readings move away from the controller's own moment after they have met it."""
+ASKED_AFTER = 0.25
+"""Periods that pass between the end of period `after` and the arrival of a question for the one that follows it: the
+host's estimate of that end is no better, and a question that arrives too early gets an earlier period."""
 MOST_MISSING = 10
 """Periods in a row without a consistent reading after which the memory counts as unreadable."""
 
@@ -58,7 +66,7 @@ class Deliveries:
         """The request for a batch of set points, noted as sent."""
         return self.watch.sending(postures), WriteSetPoints(tuple(sorted(postures.items())))
 
-    def taken(self, batch: SentSetPoints, request: WriteSetPoints, reply: Reply, due: int | None) -> SetPointsTaken:
+    def taken(self, batch: SentSetPoints, request: Request, reply: Reply, due: int | None) -> SetPointsTaken:
         """The confirmation of a batch, which must show from period `due` on (None: as the confirmation says).
 
         Raises RequestRefusedError and ControllerRestartedError.
@@ -91,9 +99,11 @@ class Deliveries:
         joints: tuple[tuple[int, JointReading], ...],
         flags: StatusFlag,
         by: Consistency,
+        every: int = 1,
     ) -> BoardSnapshot:
-        """A snapshot, with everything counted that it shows. `times` are host time and tick time (s)."""
-        missing = 0 if after is None else tick - after - 1
+        """A snapshot, with everything counted that it shows. `times` are host time and tick time (s). It counts as late
+        after the time between two samples, `every` periods."""
+        missing = 0 if after is None else max(0, tick - after - 1)
         missed = self.watch.missed(tick, joints) or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
         snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed)
         tally = self.link.tally
@@ -101,7 +111,7 @@ class Deliveries:
             tally.count("missing_samples", missing)
         if missed:
             tally.count("missed_set_points")
-        if snapshot.jitter > self.period_s:
+        if snapshot.jitter > every * self.period_s:
             tally.count("late")
         return snapshot
 
@@ -109,9 +119,12 @@ class Deliveries:
 class RingSampling:
     """Through SAMPLE: the bridge keeps consistent snapshots with their ticks, and waits for the next one."""
 
-    def __init__(self, deliveries: Deliveries) -> None:
+    def __init__(self, deliveries: Deliveries, line_rate: Callable[[Sequence[int], Sequence[int]], LineRate]) -> None:
         self._deliveries = deliveries
+        self._line_rate = line_rate
         self._tick_time = TickTime(deliveries.period_s)
+        self._complete = TickTime(deliveries.period_s)
+        self._newest: int | None = None
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
         """Set points without a sample."""
@@ -121,6 +134,9 @@ class RingSampling:
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
         """Set points and question travel in one write."""
+        self._wait_for(after)
+        if postures and self._line_rate(joints, tuple(postures)).compact:
+            return self._compact(after, joints, postures)
         question = Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints)))
         if not postures:
             (answer,) = self._ask(question)
@@ -128,9 +144,33 @@ class RingSampling:
             batch, request = self._deliveries.send(postures)
             confirmation, answer = self._ask(request, question)
             self._deliveries.taken(batch, request, confirmation, None)
-        return self._received(expect(question, answer, Snapshot), after)
+        snapshot = expect(question, answer, Snapshot)
+        return self._received(snapshot, snapshot.joints, after)
 
-    def _ask(self, *requests: WriteSetPoints | Sample) -> tuple[Reply, ...]:
+    def _compact(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
+        """Set points and question in one frame."""
+        deliveries = self._deliveries
+        batch, written = deliveries.send(postures)
+        asked = AFTER_NEWEST if after is None else after
+        request = MoveAndSample(asked, mask_of(tuple(joints)), written.postures)
+        (answer,) = self._ask(request)
+        if isinstance(answer, CompactSnapshot):
+            deliveries.taken(batch, written, SetPointsTaken(max(answer.taken_tick, 0), answer.status), None)
+        else:
+            deliveries.taken(batch, request, answer, None)
+        snapshot = expect(request, answer, CompactSnapshot)
+        return self._received(snapshot, tuple((joint, one.whole) for joint, one in snapshot.joints), after)
+
+    def _wait_for(self, after: int | None) -> None:
+        """Waits where periods are left out: `after` is then a period to come, and to a bridge a question that arrives
+        before its end is one for the very next snapshot. A host that is late by less than the ring's depth gets the
+        right one."""
+        if after is None or self._newest is None or after <= self._newest:
+            return
+        deliveries = self._deliveries
+        deliveries.clock.sleep_until(self._complete.time_of(after) + ASKED_AFTER * deliveries.period_s)
+
+    def _ask(self, *requests: WriteSetPoints | Sample | MoveAndSample) -> tuple[Reply, ...]:
         link = self._deliveries.link
         try:
             return link.exchange(*requests)
@@ -139,16 +179,26 @@ class RingSampling:
             self._deliveries.check_restart(link.request(ReadStatus(), Status).status)
             raise
 
-    def _received(self, reply: Snapshot, after: int | None) -> BoardSnapshot:
+    def _received(self, reply: Snapshot | CompactSnapshot, joints: JointReadings, after: int | None) -> BoardSnapshot:
         deliveries = self._deliveries
         deliveries.check_restart(reply.status)
-        if after is not None and reply.tick <= after:
-            raise NoSampleError(f"the controller sent tick {reply.tick}, asked for one after {after}")
+        known = after if self._newest is None or after is None else min(after, self._newest)
+        if known is not None and reply.tick <= known:
+            raise NoSampleError(f"the controller sent tick {reply.tick}, asked for one after {known}")
+        every = 1 if known is None or after is None else after - known + 1
         if isinstance(deliveries.clock, LockStepClock):
             deliveries.clock.tick_seen(reply.tick)
         now = deliveries.clock.now()
         times = (now, self._tick_time.arrived(reply.tick, now))
-        return deliveries.deliver(reply.tick, after, times, reply.joints, StatusFlag(reply.status), "sample")
+        self._complete.arrived(reply.tick, now - self._time_on_line(reply))
+        self._newest = reply.tick
+        return deliveries.deliver(reply.tick, after, times, joints, StatusFlag(reply.status), "sample", every)
+
+    def _time_on_line(self, reply: Snapshot | CompactSnapshot) -> float:
+        """Time (s) that a reply has taken on the line; none in lock-step, where the clock is the board's."""
+        link = self._deliveries.link
+        size = bytes_of_a_snapshot(len(reply.joints), compact=isinstance(reply, CompactSnapshot))
+        return 0.0 if link.lock_step else size / link.bytes_per_second
 
 
 class MemorySampling:

@@ -29,4 +29,8 @@ class TickTime:
         self._lowest.append((tick, offset))
         while self._lowest[0][0] <= tick - WINDOW_TICKS:
             self._lowest.popleft()
+        return self.time_of(tick)
+
+    def time_of(self, tick: int) -> float:
+        """The estimated time (s) of a tick, also of one to come. At least one sample has arrived."""
         return self._lowest[0][1] + tick * self._period_s

@@ -10,7 +10,7 @@ from daq.link.errors import LinkLostError
 from daq.link.pending import PendingReplies, Transaction
 from daq.link.timing import LinkTiming, copies_of
 from daq.transport import ByteChannel, ChannelError
-from firmware_protocol.commands import Request, Sample
+from firmware_protocol.commands import MoveAndSample, Request, Sample
 from firmware_protocol.dialect import LinkDialect
 
 
@@ -146,5 +146,9 @@ class Connection:
 
     def _note_round_trip(self, transaction: Transaction) -> None:
         # With a repeated request it is unknown which copy was answered; a sample waits for its tick.
-        if self.timing.measured and transaction.written == 1 and not isinstance(transaction.request, Sample):
+        if (
+            self.timing.measured
+            and transaction.written == 1
+            and not isinstance(transaction.request, Sample | MoveAndSample)
+        ):
             self.tally.round_trip(transaction.answered_at - transaction.written_at)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from firmware_protocol.commands import REPLIES, Hello, Request, Sample, Stop
+from firmware_protocol.commands import REPLIES, Hello, MoveAndSample, Request, Sample, Stop
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
 
 REPLY_MARGIN_S = 0.025
@@ -47,7 +47,7 @@ class LinkTiming:
         line = (bytes_ahead + 2 * MAX_FRAME_BYTES) / self.bytes_per_second
         if isinstance(request, Stop):
             return line + STOP_MARGIN_S
-        waiting = self.period_s if isinstance(request, Sample) else 0.0
+        waiting = self.period_s if isinstance(request, Sample | MoveAndSample) else 0.0
         return line + REPLY_MARGIN_S + waiting
 
     def retries_of(self, request: Request) -> int:

@@ -14,7 +14,7 @@ from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Outcome, TraceRecord
+from daq.contracts.trace import SLOW_LINE, Outcome, TraceRecord
 from daq.driver import EVERY_JOINT, Controller, GainsNotTakenError
 from daq.link import LinkError
 from daq.runner.arm_control import ArmControl, StoppedError
@@ -122,6 +122,7 @@ def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
         ApproachObserver(run.listener),
         run.stop_requests.ended,
         every_period=False,
+        every=run.controller.line_rate(EVERY_JOINT, prepared.move.moving).every,
     )
     ending = approach.follow(prepared.move, lambda _index: None)
     if ending.kind == "finished":
@@ -132,7 +133,8 @@ def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
 
 
 def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
-    record = _trace_record(run)
+    rate = prepared.rate
+    record = _trace_record(run, rate.every)
     writer = TraceWriter(
         trace_path(run.folder, record),
         record,
@@ -140,14 +142,23 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
         attachments={"experiment.json": run.spec.model_dump_json().encode()},
         patience=PATIENCE_IN_LOCK_STEP if run.controller.link.lock_step else 0.0,
     )
-    recorder = Recorder(writer, prepared.joints, run.listener)
+    recorder = Recorder(writer, prepared.joints, run.listener, rate.every)
     follower = Follower(
-        run.controller, run.control, run.machine, run.limits, prepared.joints, recorder, run.stop_requests.ended
+        run.controller,
+        run.control,
+        run.machine,
+        run.limits,
+        prepared.joints,
+        recorder,
+        run.stop_requests.ended,
+        every=rate.every,
     )
     begun = run.controller.link.mark()
     with writer, run.control.frozen_on_error():
         for change in changes:
             follower.tell("gains", change.message)
+        if rate.every > 1:
+            follower.tell("note", f"{SLOW_LINE}{rate.in_words}")
         ending = follower.follow(prepared.motion, _progress(run.listener, prepared.motion))
         if ending.kind == "finished":
             ending = _finish(run, changes)
@@ -177,7 +188,7 @@ def _finish(run: RunSetup, changes: tuple[GainChange, ...]) -> Ending:
     return Ending("finished")
 
 
-def _trace_record(run: RunSetup) -> TraceRecord:
+def _trace_record(run: RunSetup, every: int) -> TraceRecord:
     controller, now = run.controller, datetime.now(UTC)
     return TraceRecord(
         trace_id=run.trace_id,
@@ -191,6 +202,7 @@ def _trace_record(run: RunSetup) -> TraceRecord:
         spec=run.spec,
         gains=controller.gains(),
         period=controller.period_s,
+        every=every,
         drive_unit="V",
         clock={"utc": now.timestamp(), "monotonic": time.monotonic(), "controller_clock": controller.clock.now()},
         notes=run.spec.notes,

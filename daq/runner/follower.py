@@ -47,7 +47,9 @@ class Follower:
 
     ended:        gives the reason of an external request to end; None while there is none
     every_period: True takes each period once, in order, as a record needs; False takes the newest, which is all that a
-                  move needs and what a slow line can do
+                  move needs
+    every:        control periods from one sample to the next, and from one set point to the next: more than one where
+                  the line is slow
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class Follower:
         ended: Callable[[], str | None],
         *,
         every_period: bool = True,
+        every: int = 1,
     ) -> None:
         self._controller = controller
         self._control = control
@@ -70,8 +73,9 @@ class Follower:
         self._observer = observer
         self._ended = ended
         self._every_period = every_period
+        self._every = every
         self._rows = RowMaker(machine, joints, controller.period_s)
-        self._lag = Lag(controller.period_s)
+        self._lag = Lag(controller.period_s, every)
         self._retries = controller.counters.retries
         self.last: SampleRow | None = None
 
@@ -80,7 +84,7 @@ class Follower:
         scale = {joint: abs(self._machine.calibration(joint).rad_per_count) for joint in joints}
         late: dict[int, float] = {}
         try:
-            for _ in range(periods):
+            for _ in range(self._samples_in(periods)):
                 outside = self._ended()
                 if outside is not None:
                     return self._stopped(outside)
@@ -99,7 +103,7 @@ class Follower:
     def observe(self, periods: int) -> None:
         """Records so many periods without sending anything, as far as the robot still answers."""
         try:
-            for _ in range(periods):
+            for _ in range(self._samples_in(periods)):
                 row, _ = self._next({})
                 self._observer.row(row)
         except ControllerRestartedError as error:
@@ -113,7 +117,7 @@ class Follower:
         Whatever the ending, the arm is frozen when this returns, unless the plan is finished: then it holds its last
         set point. Raises only what the observer raises.
         """
-        guards = RunningGuards(self._machine, self._limits, self._joints, plan.moving)
+        guards = RunningGuards(self._machine, self._limits, self._joints, plan.moving, self._every)
         try:
             return self._play(plan, guards, progress)
         except (LinkError, NoSampleError) as error:
@@ -128,42 +132,48 @@ class Follower:
 
     def _play(self, plan: Plan, guards: RunningGuards, progress: Callable[[int], None]) -> Ending:
         # The first set point is where the arm's set points are already: sending it again makes row and plan agree.
-        index, hold = -1, False
+        index, hold, last = -1, False, len(plan) - 1
         while True:
-            go_on = not hold and index + 1 < len(plan)
+            go_on = not hold and index < last
+            following = 0 if index < 0 else min(index + self._every, last)
             outside = self._ended()
             if outside is not None:
                 return self._stopped(outside)
             try:
-                row, snapshot = self._next(self._set_points(plan, index + 1) if go_on else {})
+                row, snapshot = self._next(self._set_points(plan, following) if go_on else {})
             except RequestRefusedError as error:
                 return self._stopped(self._ended() or str(error))
             self._observer.row(row)
             if go_on:
-                index += 1
-                for mark in plan.marks_at(index):
-                    self._observer.event(row.time, mark.kind, mark.message, row.tick, mark.joint)
+                for passed in range(index + 1, following + 1):
+                    for mark in plan.marks_at(passed):
+                        self._observer.event(row.time, mark.kind, mark.message, row.tick, mark.joint)
+                index = following
                 progress(index)
             expected = self._set_points(plan, index) if snapshot.set_points_missed else None
-            verdict = guards.check(row, self._set_points(plan, index + 1), expected)
+            verdict = guards.check(row, self._set_points(plan, index + self._every), expected)
             verdict |= self._lag.check(row.tick, snapshot.jitter)
             ending = self._judge(verdict, row)
             if ending is not None:
                 return ending
             hold = verdict.hold
-            if index + 1 >= len(plan) and not hold:
+            if index >= last and not hold:
                 return Ending("finished")
+
+    def _samples_in(self, periods: int) -> int:
+        """Number of samples in so many control periods."""
+        return -(-periods // self._every)
 
     def _set_points(self, plan: Plan, index: int) -> dict[int, int]:
         postures: list[int] = plan.postures[min(index, len(plan) - 1)].tolist()
         return {joint: postures[joint - 1] for joint in plan.moving}
 
     def _next(self, sending: dict[int, int]) -> tuple[SampleRow, BoardSnapshot]:
-        after = self.last.tick if self._every_period and self.last is not None else None
+        after = self.last.tick + self._every - 1 if self._every_period and self.last is not None else None
         snapshot = self._controller.next_snapshot(after, self._joints, sending)
         row = self._rows.row(snapshot)
         self.last = row
-        if row.tick % RETRIES_LOOKED_AT_EVERY == 0:
+        if row.tick // RETRIES_LOOKED_AT_EVERY != (row.tick - self._every) // RETRIES_LOOKED_AT_EVERY:
             self._tell_retries()
         return row, snapshot
 

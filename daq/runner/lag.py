@@ -17,14 +17,20 @@ LONGEST_BEHIND = 1.0
 
 @dataclass
 class Lag:
-    """Judges the age of each sample. Time is the board's."""
+    """Judges the age of each sample. Time is the board's.
+
+    `every`: control periods between two samples. On a slow line both limits grow with it: two samples of age, and ten
+    for which they may stay too old.
+    """
 
     period: float
+    every: int = 1
     since: int | None = None
 
     def check(self, tick: int, age: float) -> Verdict:
         """`age` (s): by how much a sample came later than the quickest ones after their ticks."""
-        if age <= OLDEST_TO_ACT_ON:
+        between = self.every * self.period
+        if age <= max(OLDEST_TO_ACT_ON, 2 * between):
             was, self.since = self.since, None
             if was is None:
                 return NOTHING
@@ -36,7 +42,7 @@ class Lag:
             self.since = tick
             findings = (Finding("pause", f"{line}, set points wait for fresh ones"),)
         behind = (tick - self.since) * self.period
-        if behind <= LONGEST_BEHIND:
+        if behind <= max(LONGEST_BEHIND, 10 * between):
             return Verdict(hold=True, findings=findings)
         trip = f"{line}, and all for {behind:.2f} s: is the line too slow, or this computer too busy?"
         return Verdict(hold=True, trips=(trip,), findings=findings)

@@ -12,7 +12,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.driver import EVERY_JOINT, Controller
+from daq.driver import EVERY_JOINT, Controller, LineRate
 from daq.runner.rows import RowMaker
 from daq.safety import Violation, check_move_to_start, check_plan
 from daq.traces.room import require_room
@@ -52,9 +52,11 @@ class MissingConsentError(SafetyError):
 
 @dataclass(frozen=True)
 class Prepared:
-    """A run that has passed every check: joints to record, the way to the start, the motion."""
+    """A run that has passed every check: joints to record, at what rate the line lets them be sampled, the way to the
+    start, the motion."""
 
     joints: tuple[int, ...]
+    rate: LineRate
     move: Plan
     motion: Plan
 
@@ -77,7 +79,7 @@ def prepare(
     _require_allowed("experiment", check_plan(motion, machine, limits))
     joints = recorded_joints(controller, spec)
     require_room(folder, len(motion), len(joints))
-    return Prepared(joints, move, motion)
+    return Prepared(joints, controller.line_rate(joints, motion.moving), move, motion)
 
 
 def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, ...]:

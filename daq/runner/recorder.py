@@ -33,6 +33,8 @@ class Recorder:
     writer: TraceWriter
     joints: tuple[int, ...]
     listener: RunListener
+    every: int = 1
+    """Control periods from one sample to the next."""
     first: int | None = None
     last: int = 0
     samples: int = 0
@@ -54,8 +56,8 @@ class Recorder:
 
     @property
     def missing(self) -> int:
-        """Number of periods without a sample between the first and the last."""
-        return 0 if self.first is None else self.last - self.first + 1 - self.samples
+        """Number of samples that are not there between the first and the last."""
+        return 0 if self.first is None else max(0, (self.last - self.first) // self.every + 1 - self.samples)
 
 
 @dataclass

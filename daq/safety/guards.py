@@ -20,13 +20,16 @@ class RunningGuards:
 
     sampled: joints in every sample, in its order
     moving:  joints that the plan moves; the other sampled ones must stay at their set points
+    every:   control periods between two samples; more than one on a slow line
     """
 
-    def __init__(self, machine: Machine, limits: Limits, sampled: tuple[int, ...], moving: tuple[int, ...]) -> None:
+    def __init__(
+        self, machine: Machine, limits: Limits, sampled: tuple[int, ...], moving: tuple[int, ...], every: int = 1
+    ) -> None:
         watched = Watched.of(machine, limits, sampled)
-        self.freshness = Freshness(watched)
+        self.freshness = Freshness(watched, every)
         self.following_error = FollowingError(watched)
-        self.missed_set_points = MissedSetPoints(watched)
+        self.missed_set_points = MissedSetPoints(watched, every)
         self.unexpected_motion = UnexpectedMotion(watched, frozenset(sampled) - frozenset(moving), from_set_point=True)
 
     def check(self, row: SampleRow, planned: Mapping[int, int], expected: Mapping[int, int] | None = None) -> Verdict:
@@ -40,9 +43,11 @@ class RunningGuards:
 class RestGuards:
     """Guards of an arm that nothing is sent to. `led` joints are moved by hand and may move."""
 
-    def __init__(self, machine: Machine, limits: Limits, sampled: tuple[int, ...], led: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self, machine: Machine, limits: Limits, sampled: tuple[int, ...], led: tuple[int, ...] = (), every: int = 1
+    ) -> None:
         watched = Watched.of(machine, limits, sampled)
-        self.freshness = Freshness(watched)
+        self.freshness = Freshness(watched, every)
         self.unexpected_motion = UnexpectedMotion(watched, frozenset(sampled) - frozenset(led), from_set_point=False)
 
     def check(self, row: SampleRow) -> Verdict:

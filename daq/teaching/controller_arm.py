@@ -58,6 +58,8 @@ class ControllerArm:
         self._every_period = every_period
         self._rows = RowMaker(machine, self.joints, controller.period_s)
         self._last: int | None = None
+        self.every = controller.line_rate(self.joints, self.joints, together=False).every
+        """Control periods from one sample to the next, as the line allows."""
 
     @contextmanager
     def driven(self) -> Iterator[None]:
@@ -74,7 +76,9 @@ class ControllerArm:
         """The next control period; none is left out, unless only the newest are wanted."""
         self._require_going_on()
         try:
-            snapshot = self._controller.next_snapshot(self._last if self._every_period else None, self.joints)
+            known = self._every_period and self._last is not None
+            after = (self._last or 0) + self.every - 1 if known else None
+            snapshot = self._controller.next_snapshot(after, self.joints)
         except (LinkError, NoSampleError) as error:
             raise halting.freeze_for_fault(self._control, str(error), Event.LINK_LOST) from error
         except ControllerRestartedError as error:

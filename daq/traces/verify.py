@@ -110,9 +110,9 @@ def _ticks(trace: Trace) -> Iterator[Finding]:
         row = int(np.argmax(steps <= 0)) + 1
         yield Finding(level="error", check="ticks", message=f"tick {trace.tick[row]} follows {trace.tick[row - 1]}")
         return
-    gaps = int((steps > 1).sum())
+    gaps = int((steps > trace.record.every).sum())
     if gaps:
-        first = float(trace.time[int(np.argmax(steps > 1))])
+        first = float(trace.time[int(np.argmax(steps > trace.record.every))])
         message = f"{trace.missing} samples are missing in {gaps} gaps, the first after {first:.3f} s"
         yield Finding(level="warning", check="gaps", message=message)
     counted = trace.record.counters.get(MISSING_COUNTER)

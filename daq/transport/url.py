@@ -71,7 +71,7 @@ PortUrl = SerialPort | TcpPort | MockPort
 
 _SERIAL_OPTIONS = ("baud",)
 _TCP_OPTIONS = ("baud", "lock_step")
-MOCK_FLAGS = ("lock_step", "no_sample", "pty")
+MOCK_FLAGS = ("lock_step", "no_sample", "no_compact", "pty")
 """Options of mock:// that are on (1) or off (0)."""
 MOCK_VALUES = ("baud", "seed", "start", "gains", "memory_map", "plant", "board", "modify", "secret", "fault")
 """Options of mock:// that are handed to the mock with their value."""
@@ -138,7 +138,7 @@ def _mock(text: str, options: list[tuple[str, str]]) -> MockPort:
     flags = {name: _flag(text, name, once.get(name)) for name in MOCK_FLAGS}
     if "seed" in once and not once["seed"].isdecimal():
         raise PortUrlError(f"port {text!r}: seed {once['seed']!r}: must be a whole number, 0 or more")
-    arguments = [f"--{name.replace('_', '-')}" for name in ("lock_step", "no_sample") if flags[name]]
+    arguments = [f"--{name.replace('_', '-')}" for name in ("lock_step", "no_sample", "no_compact") if flags[name]]
     for name, value in options:
         if name in MOCK_VALUES:
             if not value:

@@ -16,6 +16,8 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def status(context: typer.Context, json: JsonOption = False) -> None:
     """Posture, state and link of the robot, read once; --json has the same fields here and at a server."""
+    from daq.runner.line_status import rates_line
+
     found = robot_of(context).state()
     report = found.report
     if json:
@@ -26,6 +28,8 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
         for joint, *angles in zip(one.joints, one.position, one.set_point, one.error, strict=True):
             position, set_point, error = map(math.degrees, angles)
             print(f"  joint {joint}: {position:8.2f}°   set point {set_point:8.2f}°   error {error:6.2f}°")
+    if line := rates_line(report.link):
+        print(line)
     if (queue := report.queue) is not None:
         state = f"paused: {queue.reason}" if queue.paused else "open"
         runs = f"; {queue.running} runs" if queue.running else ""

@@ -252,21 +252,29 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
     """The state of the board, in the form of a service's status."""
     from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
     from daq.contracts.status import StatusReport
+    from daq.runner.line_status import with_rates
     from daq.runner.rows import RowMaker
-    from firmware_protocol.commands import StatusFlag
+    from firmware_protocol.commands import Capability, StatusFlag
 
     snapshot, now = controller.next_snapshot(), datetime.now(UTC)
     joints = tuple(joint for joint, _ in snapshot.joints)
     row = RowMaker(machine, joints, controller.period_s).row(snapshot)
     identity, frozen = controller.identity, StatusFlag.FROZEN in snapshot.flags
+    link = LinkStatus(state=controller.status().link, counters=controller.counters.numbers(), age=0.0)
+    told = RobotIdentity(
+        simulated=identity.simulated,
+        protocol=identity.version,
+        period=identity.period_s,
+        boots=identity.boots,
+        samples=Capability.SAMPLE in identity.capabilities,
+        compact=Capability.COMPACT in identity.capabilities,
+    )
     return StatusReport(
         robot=call.settings.robot.name,
         machine=machine.name,
         port=call.port,
         connection="connected",
-        identity=RobotIdentity(
-            simulated=identity.simulated, protocol=identity.version, period=identity.period_s, boots=identity.boots
-        ),
+        identity=told,
         arm="stopped" if frozen else "idle",
         activity="none",
         limp=tuple(limp),
@@ -282,6 +290,6 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
             error=row.error,
             drive=row.drive,
         ),
-        link=LinkStatus(state=controller.status().link, counters=controller.counters.numbers(), age=0.0),
+        link=with_rates(link, controller.link.bytes_per_second, told),
         utc=now,
     )

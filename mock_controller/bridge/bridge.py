@@ -18,9 +18,12 @@ from firmware_protocol.commands import (
     AdvanceOrder,
     Arrival,
     Capability,
+    CompactReading,
+    CompactSnapshot,
     Hello,
     HelloReply,
     JointReading,
+    MoveAndSample,
     ReadBlock,
     ReadProcess,
     ReadStatus,
@@ -75,6 +78,9 @@ class _WaitingSample:
     joints: tuple[int, ...]
     boots: int
     until_us: int
+    opcode: int = Sample.OPCODE
+    taken: int | None = None
+    """With a compact answer: the tick after which set points that came with the question are taken."""
 
 
 @dataclass
@@ -84,7 +90,8 @@ class _WaitingAdvance:
 
 
 class Bridge:
-    """Answers requests. `sees_period` offers `Sample`; `lock_step` offers `Advance`.
+    """Answers requests. `sees_period` offers `Sample`, with `compact` also `MoveAndSample`; `lock_step` offers
+    `Advance`.
 
     `first_number` is the first number of sessions and stops, which should differ at every start.
     """
@@ -93,12 +100,19 @@ class Bridge:
     """How the memory is accessed."""
 
     def __init__(
-        self, timeline: Timeline, *, sees_period: bool = True, lock_step: bool = False, first_number: int = 1
+        self,
+        timeline: Timeline,
+        *,
+        sees_period: bool = True,
+        compact: bool = True,
+        lock_step: bool = False,
+        first_number: int = 1,
     ) -> None:
         self._timeline = timeline
         self._board = timeline.board
         self._routines = self.routines(timeline, sees_period)
         self._sees_period = sees_period
+        self._compact = sees_period and compact
         self._lock_step = lock_step
         capable = {Sample.OPCODE: sees_period, Advance.OPCODE: lock_step}
         self._incapable = {opcode for opcode, can in capable.items() if not can}
@@ -171,8 +185,8 @@ class Bridge:
         if arrival in _REFUSED_ON_ARRIVAL:
             return [self._refuse(frame.sequence, frame.opcode, _REFUSED_ON_ARRIVAL[arrival])]
         self.answered[type(request).__name__] += 1
-        if isinstance(request, Sample):
-            return self._begin_sample(frame.sequence, request)
+        if isinstance(request, Sample | MoveAndSample):
+            return self._sample_now_or_later(frame.sequence, request)
         if isinstance(request, Advance):
             return self._begin_advance(frame.sequence, request, again=arrival is Arrival.AGAIN)
         reply = self._handlers[type(request)](request)
@@ -194,6 +208,8 @@ class Bridge:
         """The request in a frame, or the refusal for a fault of the frame itself, whatever the session."""
         if frame.opcode in self._incapable:
             return Refusal.NOT_CAPABLE
+        if frame.opcode == MoveAndSample.OPCODE and not self._compact:
+            return Refusal.UNKNOWN_OPCODE
         try:
             request = parse_request(frame)
         except ProtocolError as error:
@@ -237,6 +253,8 @@ class Bridge:
         capabilities = Capability.SIMULATED
         if self._sees_period:
             capabilities |= Capability.SAMPLE
+        if self._compact:
+            capabilities |= Capability.COMPACT
         if self._lock_step:
             capabilities |= Capability.LOCK_STEP
         depth = RING_DEPTH if self._sees_period else 0
@@ -282,15 +300,29 @@ class Bridge:
 
     # --- what waits
 
-    def _begin_sample(self, sequence: int, request: Sample) -> list[Frame]:
-        after = request.after
+    def _sample_now_or_later(self, sequence: int, request: Sample | MoveAndSample) -> list[Frame]:
+        if isinstance(request, Sample):
+            return self._begin_sample(sequence, request.after, request.mask)
+        if request.postures:
+            if self._board.frozen:
+                return [self._refuse(sequence, request.OPCODE, Refusal.FROZEN)]
+            self._routines.write_set_points(WriteSetPoints(request.postures))
+        return self._begin_sample(sequence, request.after, request.sampled, taken=self._board.tick)
+
+    def _begin_sample(self, sequence: int, after: int, mask: int, taken: int | None = None) -> list[Frame]:
         if after > self._board.tick:
             # AFTER_NEWEST, or a host that remembers ticks from before a restart of the board.
             newest = self._board.snapshots.newest()
             after = newest.tick if newest else 0
         patience_us = WAIT_LIMIT_PERIODS * self._board.parameters.timing.period
         self._sample = _WaitingSample(
-            sequence, after, joints_of(request.mask), self._board.counters.boots, self.time_us + patience_us
+            sequence,
+            after,
+            joints_of(mask),
+            self._board.counters.boots,
+            self.time_us + patience_us,
+            Sample.OPCODE if taken is None else MoveAndSample.OPCODE,
+            taken,
         )
         return self._try_sample(self._sample)
 
@@ -300,19 +332,20 @@ class Bridge:
         found = self._board.snapshots.oldest_after(waiting.after)
         if found is not None:
             self._sample = None
-            return [to_frame(waiting.sequence, self._snapshot(found, waiting.joints))]
+            return [to_frame(waiting.sequence, self._snapshot(found, waiting))]
         if self.time_us >= waiting.until_us:
             self._sample = None
-            return [self._refuse(waiting.sequence, Sample.OPCODE, Refusal.NOTHING_NEW)]
+            return [self._refuse(waiting.sequence, waiting.opcode, Refusal.NOTHING_NEW)]
         return []
 
-    def _snapshot(self, found: PeriodSnapshot, joints: tuple[int, ...]) -> Reply:
+    def _snapshot(self, found: PeriodSnapshot, waiting: _WaitingSample) -> Reply:
         registers = (found.set_points, found.positions, found.errors, found.powers)
-        return Snapshot(
-            found.tick,
-            self._flags(found.frozen, found.set_point_missed),
-            tuple((joint, JointReading(*(values[joint - 1] for values in registers))) for joint in joints),
-        )
+        flags = self._flags(found.frozen, found.set_point_missed)
+        joints = tuple((joint, JointReading(*(v[joint - 1] for v in registers))) for joint in waiting.joints)
+        if waiting.taken is None:
+            return Snapshot(found.tick, flags, joints)
+        compact = tuple((joint, CompactReading.of(reading)) for joint, reading in joints)
+        return CompactSnapshot(found.tick, flags, waiting.taken & 0xFF, compact)
 
     def _begin_advance(self, sequence: int, request: Advance, *, again: bool) -> list[Frame]:
         if again and self._advance is None:

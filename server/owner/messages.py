@@ -196,6 +196,8 @@ class Opened(FrozenRecord):
     protocol: int
     period: float
     boots: int
+    samples: bool = True
+    compact: bool = False
 
 
 class LiveSample(ControlPeriod):

@@ -68,7 +68,8 @@ def serve(robot: OwnedRobot) -> None:
 
 def _watch(robot: OwnedRobot, last: int | None) -> int:
     """Reads the next sample of an arm that nobody moves. Returns its tick."""
-    snapshot = robot.controller.next_snapshot(last)
+    every = robot.controller.line_rate().every
+    snapshot = robot.controller.next_snapshot(None if last is None else last + every - 1)
     if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
         robot.control.stop("on the board, by somebody else")
     return snapshot.tick

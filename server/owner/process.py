@@ -9,6 +9,7 @@ from daq.acquisition.speaker import Speaker
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import PortBusyError
+from firmware_protocol.commands import Capability
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 from server import logs
@@ -68,6 +69,8 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
                 protocol=identity.version,
                 period=identity.period_s,
                 boots=identity.boots,
+                samples=Capability.SAMPLE in identity.capabilities,
+                compact=Capability.COMPACT in identity.capabilities,
             )
         )
         with inbox.reading():

@@ -243,7 +243,12 @@ class Robot:
 
     def _set_opened(self, report: Opened) -> None:
         identity = RobotIdentity(
-            simulated=report.simulated, protocol=report.protocol, period=report.period, boots=report.boots
+            simulated=report.simulated,
+            protocol=report.protocol,
+            period=report.period,
+            boots=report.boots,
+            samples=report.samples,
+            compact=report.compact,
         )
         port = parse_port_url(self.place.url)
         with self._lock:

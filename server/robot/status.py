@@ -6,6 +6,9 @@ from datetime import UTC
 
 from daq.contracts.service.queue import Control, QueueStatus
 from daq.contracts.service.robot import LinkStatus, RobotStatus, Sample
+from daq.runner.line_status import with_rates
+from daq.transport import parse_port_url
+from daq.transport.endpoint import BITS_PER_BYTE
 from firmware_protocol.commands import StatusFlag
 from server.robot.robot import Robot, Seen
 
@@ -18,6 +21,9 @@ def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus
     link = LinkStatus(state="none")
     if arm is not None and seen is not None and connected:
         link = LinkStatus(state=arm.link, counters=arm.counters, age=now - seen.at)
+        if robot.identity is not None:
+            port = parse_port_url(robot.place.url)
+            link = with_rates(link, port.baud / BITS_PER_BYTE, robot.identity)
     return RobotStatus(
         robot=robot.name,
         machine=robot.machine.name,

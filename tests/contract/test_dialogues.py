@@ -73,6 +73,7 @@ def abilities(under_contract: UnderContract) -> set[str]:
     clock = Capability.LOCK_STEP not in capabilities
     return {
         *(["SAMPLE"] if Capability.SAMPLE in capabilities else []),
+        *(["COMPACT"] if Capability.COMPACT in capabilities else []),
         *(["CLOCK"] if clock else []),
         *(["RESET"] if clock and under_contract.control else []),
     }
@@ -90,7 +91,8 @@ def _cases() -> Iterator[Any]:
     """Each mock with the dialogues that it has the abilities for; a real controller with all: it skips visibly."""
     for name, options in {**MOCKS, **{name: " ".join(arguments) for name, arguments in BRIDGES.items()}}.items():
         lacks = {"CLOCK", "RESET"} if "lock_step" in options else set()
-        lacks |= {"SAMPLE"} if "no_sample" in options or "no-sample" in options else set()
+        lacks |= {"SAMPLE", "COMPACT"} if "no_sample" in options or "no-sample" in options else set()
+        lacks |= {"COMPACT"} if name in BRIDGES else set()  # the core in C, for lines of 115200 baud, goes without
         marks = [pytest.mark.slow] if name in BRIDGES else []
         for dialogue in PLAYED:
             if not lacks & set(dialogue["needs"]):

@@ -23,8 +23,8 @@ ABOUT = {"version": 2, "capabilities": "?", "period_us": "?", "ring_depth": "?",
 
 @dataclass(frozen=True)
 class Dialogue:
-    """`needs`: SAMPLE, a bridge with snapshots; CLOCK, one whose time is not the host's (no lock-step); RESET, RESTART:
-    somebody who can reset the board, start the bridge again."""
+    """`needs`: SAMPLE, a bridge with snapshots; COMPACT, one that takes the turn for slow lines; CLOCK, one whose time
+    is not the host's (no lock-step); RESET, RESTART: somebody who can reset the board, start the bridge again."""
 
     rule: str
     needs: tuple[str, ...]
@@ -124,6 +124,16 @@ def had_at_once(sequence: int, after: int | str, tick: int | str) -> tuple[Step,
 
 def waited_for(sequence: int, after: int | str, tick: int | str, flags: int | str = 0) -> tuple[Step, Step, Step]:
     return sample(sequence, after), board("period"), snapshot(sequence, tick, flags)
+
+
+def turn(sequence: int, session: str, number: int, after: int | str, postures: list[Any]) -> Step:
+    fields = {"session": session, "number": number, "after": after, "sampled": 1, "postures": postures}
+    return host("MoveAndSample", sequence, **fields)
+
+
+def compact(sequence: int, tick: int | str) -> Step:
+    joints = [[1, {"position": "?", "error": "?", "power": "?"}]]
+    return bridge("CompactSnapshot", sequence, tick=tick, status="?", taken="?", joints=joints)
 
 
 BAD_LENGTH, BAD_ADDRESS, BAD_VALUE, NOT_CAPABLE, FROZEN, STALE, BAD_SESSION, OTHER_STOP = 2, 3, 4, 5, 6, 8, 9, 10
@@ -339,6 +349,33 @@ DIALOGUES = (
             *had_at_once(9, "$t", "$t+1"),
             *had_at_once(10, "$t", "$t+1"),
             *had_at_once(11, "$t+1", "$t+2"),
+        ),
+    ),
+    Dialogue(
+        "the turn for slow lines writes set points and asks for a sample in one frame",
+        ("SAMPLE", "COMPACT"),
+        (
+            *greeting("$n", "$s", 1),
+            *freed(2, "$s", 1),
+            *waited_for(6, AFTER_NEWEST, "$t"),
+            turn(8, "$s", 2, "$t", [[1, "$p"]]),
+            board("period"),
+            compact(8, "$t+1"),
+            turn(8, "$s", 2, "$t", [[1, "$p"]]),
+            compact(8, "$t+1"),
+            turn(9, "$s", 1, "$t", [[1, "$p"]]),
+            refused(0x11, STALE, 9),
+            turn(10, "$s+1", 3, "$t", [[1, "$p"]]),
+            refused(0x11, BAD_SESSION, 10),
+            turn(11, "$s", 3, "$t", []),
+            compact(11, "$t+1"),
+            *stopped(12),
+            turn(13, "$s", 4, "$t", [[1, "$p"]]),
+            refused(0x11, FROZEN, 13),
+            turn(14, "$s", 5, "$t", []),
+            compact(14, "$t+1"),
+            *status(15, 1, "$k"),
+            *released(16, "$s", 6, "$k"),
         ),
     ),
     Dialogue(

@@ -12,7 +12,7 @@ from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import MAX_BODY, Frame, crc16, encode_frame, stuff
 from firmware_protocol.units import counts_to_posture, posture_to_counts
 from tests.protocol.dialogues import DIALOGUES
-from tests.protocol.play import as_json, play, second_bridge
+from tests.protocol.play import as_json, play, second_bridge_for
 
 FILE = Path(__file__).parents[2] / "firmware_protocol" / "vectors.json"
 
@@ -23,6 +23,15 @@ READINGS = (
     (4, c.JointReading(256, 1049, -128, -128)),
     (5, c.JointReading(255, 1044, 127, 127)),
     (6, c.JointReading(1, 256, -252, 0)),
+)
+
+COMPACT = (
+    (1, c.CompactReading(2041, 7, 14)),
+    (2, c.CompactReading(0, 0, 0)),
+    (3, c.CompactReading(4095, -3, -6)),
+    (4, c.CompactReading(1049, -2048, -128)),
+    (5, c.CompactReading(1044, 2047, 127)),
+    (6, c.CompactReading(256, -252, 0)),
 )
 
 MESSAGES: tuple[c.Message, ...] = (
@@ -67,6 +76,10 @@ MESSAGES: tuple[c.Message, ...] = (
     c.Advance(20_000),
     c.Advanced(1_420_000, 71),
     c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.STALE),
+    c.MoveAndSample(1234, 0b000111, ((1, 500), (2, 508), (3, 515))),
+    c.MoveAndSample(c.AFTER_NEWEST, 0b111111),
+    c.CompactSnapshot(1236, 0, 0xD2, COMPACT[:3]),
+    c.CompactSnapshot(0x01020304, int(c.StatusFlag.FROZEN), 0, COMPACT),
 )
 
 STAMP = bytes(8)
@@ -91,6 +104,11 @@ REFUSED: tuple[tuple[str, int, bytes, str], ...] = (
     ("request", 0x07, STAMP + b"\x01\x15\x00\x00", "gain 21"),
     ("request", 0x08, b"\x00", "mask without joints"),
     ("request", 0x10, b"\x00\x00\x00\x00\x80", "mask with joint 8"),
+    ("request", 0x11, b"\x01\x00\x00\x00\x01\x00", "no stamp"),
+    ("request", 0x11, STAMP + b"\x01\x00\x00\x00\x01", "no mask of set points"),
+    ("request", 0x11, STAMP + b"\x01\x00\x00\x00\x00\x00", "no joint to be sampled"),
+    ("request", 0x11, STAMP + b"\x01\x00\x00\x00\x01\x00\x00\x00", "a set point of no joint"),
+    ("request", 0x11, STAMP + b"\x01\x00\x00\x00\x01\x01\xe8\x03", "set point 1000"),
     ("request", 0x32, STAMP + b"\x02", "a gripper is 0 or 1"),
     ("reply", 0x01, b"", "a request's opcode in a reply"),
     ("reply", 0x82, b"", "an empty block"),
@@ -98,6 +116,8 @@ REFUSED: tuple[tuple[str, int, bytes, str], ...] = (
     ("reply", 0x90, bytes(4), "shorter than tick and status"),
     ("reply", 0x90, b"\x01\x00\x00\x00\x00\x01\x00\x00\x00\x10\x00\x00\x00", "position 4096"),
     ("reply", 0x90, b"\x01\x00\x00\x00\x00\x01\x00\x04\x00\x00\x00\x00\x00", "set point 1024"),
+    ("reply", 0x91, bytes(5), "shorter than tick, status and taken"),
+    ("reply", 0x91, b"\x01\x00\x00\x00\x00\x00\x01\x00\x00\x00", "three bytes of a joint"),
     ("reply", 0xA0, b"\x00\x00\x00\x00" + b"\xe8\x03" * 6, "frozen at 1000"),
 )
 
@@ -179,7 +199,7 @@ def _dialogues() -> list[dict[str, Any]]:
     vectors = []
     for dialogue in DIALOGUES:
         nonces = count(0x5EED0000)
-        lines = play(dialogue.steps, second_bridge(), lambda numbers=nonces: next(numbers))  # type: ignore[misc]
+        lines = play(dialogue.steps, second_bridge_for(dialogue.needs), lambda numbers=nonces: next(numbers))  # type: ignore[misc]
         steps = [
             step if line is None else {**step, "frame": line.hex()}
             for step, line in zip(dialogue.steps, lines, strict=True)

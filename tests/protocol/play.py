@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from firmware_protocol import commands as c
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
 from firmware_protocol.message import Message
-from tests.protocol.second_bridge import SecondBridge
+from tests.protocol.second_bridge import CompactSecondBridge, SecondBridge
 
 NAME = re.compile(r"\$(\w+?)([+-]\d+)?")
 KINDS: dict[str, type[Message]] = {kind.__name__: kind for kind in (*c.REQUESTS.values(), *c.REPLIES.values())}
@@ -18,7 +18,7 @@ KINDS: dict[str, type[Message]] = {kind.__name__: kind for kind in (*c.REQUESTS.
 
 def as_json(value: Any) -> Any:
     """A message's fields as JSON: bytes in hex, tuples as arrays, readings as objects."""
-    if isinstance(value, Message | c.JointReading):
+    if isinstance(value, Message | c.JointReading | c.CompactReading):
         return {name: as_json(field) for name, field in vars(value).items()}
     if isinstance(value, bytes):
         return value.hex()
@@ -75,6 +75,11 @@ def second_bridge(kind: type[SecondBridge] = SecondBridge) -> PurePartner:
     """The second implementation, on its own board."""
     bridge = kind()
     return PurePartner(bridge.receive, {"period": bridge.period, "reset": bridge.reset, "bridge": bridge.start_again})
+
+
+def second_bridge_for(needs: Sequence[str]) -> PurePartner:
+    """The second implementation with what a dialogue needs of it."""
+    return second_bridge(CompactSecondBridge if "COMPACT" in needs else SecondBridge)
 
 
 def play(steps: Sequence[Mapping[str, Any]], partner: Partner, choose: Callable[[], int]) -> list[bytes | None]:

@@ -276,3 +276,57 @@ class SecondBridge:
                 chosen = b"".join(readings[7 * joint : 7 * joint + 7] for joint in range(6) if mask >> joint & 1)
                 return frame_of(sequence, 0x90, tick.to_bytes(4, "little") + bytes((self._status(), mask)) + chosen)
         return b""
+
+
+class CompactSecondBridge(SecondBridge):
+    """The same with COMPACT: set points and the question for a sample in one frame, and four bytes a joint back."""
+
+    def __init__(self, first_number: int = 0x00010000) -> None:
+        super().__init__(first_number)
+        self.taken: int | None = None
+        """For a compact question that waits: the tick after which its set points are taken."""
+
+    def _answer(self, sequence: int, opcode: int, payload: bytes) -> bytes:
+        if opcode == 0x10:
+            self.taken = None
+        if opcode != 0x11:
+            return super()._answer(sequence, opcode, payload)
+        reason = self._wrong_turn(payload) or self._not_now(opcode, payload)
+        if reason == 0 and payload[13] and self.frozen:
+            reason = FROZEN
+        if reason:
+            return frame_of(sequence, 0xFF, bytes((opcode, reason)))
+        if payload[13]:
+            self._change(0x04, payload[13:])
+        self.taken = self.tick
+        self.waiting = (sequence, number(payload[8:12]), payload[12], False)
+        return self._answer_sample()
+
+    def _wrong_turn(self, payload: bytes) -> int:
+        if len(payload) < 14:
+            return LENGTH
+        if mask_is_wrong(payload[12]):
+            return VALUE
+        if payload[13] == 0:
+            return LENGTH if len(payload) > 14 else 0
+        return self._wrong_set_points(payload[13:])
+
+    def _hello(self, payload: bytes) -> bytes:
+        said = super()._hello(payload)
+        return said[:1] + bytes((said[1] | 8,)) + said[2:]
+
+    def _answer_sample(self) -> bytes:
+        said = super()._answer_sample()
+        frame = read_frame(said.strip(b"\0")) if said and self.taken is not None else None
+        if frame is None:
+            return said
+        sequence, _, payload = frame
+        compact = payload[:5] + bytes((self.taken % 256,)) + payload[5:6]
+        for at in range(6, len(payload), 7):
+            _, position, error, power = (
+                number(payload[at + i : at + i + w]) for i, w in ((0, 2), (2, 2), (4, 2), (6, 1))
+            )
+            error = min(max(error - 65536 * (error >> 15), -2048), 2047)
+            compact += (position + ((error & 0xFFF) << 12) + (power << 24)).to_bytes(4, "little")
+        self.taken = None
+        return frame_of(sequence, 0x91, compact)

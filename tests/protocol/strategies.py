@@ -18,6 +18,13 @@ readings = st.builds(
     power=st.integers(-0x80, 0x7F),
 )
 
+compact_readings = st.builds(
+    c.CompactReading,
+    position=st.integers(0, 4095),
+    error=st.integers(-2048, 2047),
+    power=st.integers(-0x80, 0x7F),
+)
+
 
 def of_joints(values: st.SearchStrategy[T]) -> st.SearchStrategy[tuple[tuple[int, T], ...]]:
     """(joint, value) for some joints, ascending."""
@@ -36,6 +43,7 @@ REQUESTS: dict[type[c.Request], st.SearchStrategy[c.Request]] = {
     c.SetGains: st.builds(c.SetGains, st.integers(1, 6), gain, gain, gain),
     c.ReportErrorsPositionsPowers: st.builds(c.ReportErrorsPositionsPowers, masks),
     c.Sample: st.builds(c.Sample, u32, masks),
+    c.MoveAndSample: st.builds(c.MoveAndSample, u32, masks, st.one_of(st.just(()), of_joints(postures))),
     c.Stop: st.builds(c.Stop),
     c.Release: st.builds(c.Release, u32),
     c.ReadProcess: st.builds(c.ReadProcess),
@@ -53,6 +61,7 @@ REPLIES: dict[type[c.Reply], st.SearchStrategy[c.Reply]] = {
     c.GainsSet: st.builds(c.GainsSet),
     c.ErrorsPositionsPowers: st.builds(c.ErrorsPositionsPowers, of_joints(readings)),
     c.Snapshot: st.builds(c.Snapshot, u32, u8, of_joints(readings)),
+    c.CompactSnapshot: st.builds(c.CompactSnapshot, u32, u8, u8, of_joints(compact_readings)),
     c.Stopped: st.builds(c.Stopped, u32, st.tuples(*[postures] * 6)),
     c.Released: st.builds(c.Released),
     c.Process: st.builds(c.Process, u8, u8, u8),

@@ -125,6 +125,14 @@ def flat(message: Message) -> dict[str, list[int]]:
                 values[name] = [getattr(reading, name) for _, reading in message.joints]
             if isinstance(message, c.Snapshot):
                 values |= {"tick": [message.tick], "status": [message.status]}
+        case c.MoveAndSample():
+            mask = c.mask_of(joint for joint, _ in message.postures)
+            values = {"after": [message.after], "sampled": [message.sampled], "mask": [mask]}
+            values |= {"set_point": [posture for _, posture in message.postures]} if message.postures else {}
+        case c.CompactSnapshot():
+            values = {name: [getattr(message, name)] for name in ("tick", "status", "taken")}
+            values |= {"mask": [c.mask_of(joint for joint, _ in message.joints)]}
+            values |= {"packed": [reading.packed for _, reading in message.joints]}
         case c.Gains():
             values = {name: [gains[i] for gains in message.gains] for i, name in enumerate("pid")}
         case c.Stopped():
@@ -272,6 +280,13 @@ def commanded(joints: int) -> int:
     return on_the_line(c.WriteSetPoints(tuple((i + 1, 1) for i in range(joints))), c.SetPointsTaken(1, 0))
 
 
+def compact(joints: int) -> int:
+    moved = tuple((i + 1, 1) for i in range(joints))
+    reading = c.CompactReading(1, 1, 1)
+    reply = c.CompactSnapshot(1, 0, 1, tuple((i + 1, reading) for i in range(joints)))
+    return on_the_line(c.MoveAndSample(1, 1, moved), reply)
+
+
 def most_joints(capacity: float, bytes_of: Any) -> str:
     fitting = [joints for joints in range(1, 7) if bytes_of(joints) <= capacity]
     return str(fitting[-1]) if fitting else "none"
@@ -314,6 +329,10 @@ def test_the_documents_figures_about_line_rates_are_right() -> None:
     for joints in range(1, 7):
         assert sampled(joints) == 29 + 7 * joints
         assert commanded(joints) + sampled(joints) == 61 + 9 * joints
+    for joints in range(1, 7):
+        assert compact(joints) == 39 + 6 * joints
+    assert "39 + 2m + 4n bytes on the line" in section("The turn for slow lines")
+    assert f"{compact(3)} bytes instead of 88 for three joints, {compact(6)} instead of 115 for six" in text
     assert "61 + 9n bytes for n joints, 88 for three, 115 for six; Sample alone is 29 + 7n" in text
     assert f"Sample and its reply alone take {sampled(3) / 230.4 * 100:.0f} %" in text
     assert f"one joint in every period and send no set points meanwhile: {sampled(1)} of the 38 bytes" in text

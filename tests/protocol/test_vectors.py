@@ -15,7 +15,7 @@ from mock_controller.timeline import Timeline
 from tests.mock.host import make_device
 from tests.protocol import second_implementation as second
 from tests.protocol.make_vectors import FILE, as_json, rendered
-from tests.protocol.play import PurePartner, play, second_bridge
+from tests.protocol.play import PurePartner, play, second_bridge_for
 
 VECTORS: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
 
@@ -79,7 +79,7 @@ def test_payloads_that_must_be_refused_are_refused(vector: dict[str, Any]) -> No
 @pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])
 def test_the_second_implementation_passes_the_dialogues(dialogue: dict[str, Any]) -> None:
     """To the byte: the file says what its bridge said."""
-    bridge, steps = second_bridge(), dialogue["steps"]
+    bridge, steps = second_bridge_for(dialogue["needs"]), dialogue["steps"]
     for number, step in enumerate(steps):
         if "board" in step:
             bridge.happens(step["board"])

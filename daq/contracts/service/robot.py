@@ -37,6 +37,17 @@ class Sample(ControlPeriod):
     frozen: bool
 
 
+class SampleRate(Wire):
+    """What the line can give: samples of so many joints, with a set point for each of them, every so many control
+    periods."""
+
+    joints: int
+    every: int
+    samples_per_second: float
+    share: float
+    """Share of the line's capacity that this takes, both directions added."""
+
+
 class LinkStatus(Wire):
     """The link to the controller. Counters since the link was opened (docs/traces.md names them)."""
 
@@ -44,6 +55,10 @@ class LinkStatus(Wire):
     counters: dict[str, float] = Field(default_factory=dict)
     age: float | None = None
     """Time (s) since they were read."""
+    rates: tuple[SampleRate, ...] = ()
+    """What the line can give, by its baud rate; empty without a connection."""
+    stop_seconds: float | None = None
+    """Longest time (s) that a stop takes on this line where no byte is lost."""
 
 
 class RobotIdentity(Wire):
@@ -54,6 +69,10 @@ class RobotIdentity(Wire):
     period: float
     """Control period (s)."""
     boots: int
+    samples: bool = True
+    """Whether its bridge sees the control period (SAMPLE): only then is a rate promised."""
+    compact: bool = False
+    """Whether its bridge understands the compact turn for slow lines (COMPACT)."""
 
 
 class RobotStatus(Wire):

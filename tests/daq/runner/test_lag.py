@@ -36,3 +36,15 @@ def test_samples_that_stay_old_for_more_than_a_second_end_the_run() -> None:
     trips = [lag.check(tick, 0.1).trips for tick in range(1, last + 2)]
     assert trips[:-1] == [()] * last
     assert "line too slow" in trips[-1][0]
+
+
+def test_on_a_slow_line_a_sample_may_be_two_samples_old() -> None:
+    lag = Lag(PERIOD, every=5)
+    assert not lag.check(1, 0.2).hold
+    assert lag.check(6, 0.21).hold
+
+
+def test_on_a_slow_line_ten_samples_may_come_too_late() -> None:
+    lag = Lag(PERIOD, every=8)
+    trips = [bool(lag.check(tick, 1.0).trips) for tick in range(0, 96, 8)]
+    assert trips == [False] * 11 + [True]

@@ -293,3 +293,24 @@ def test_rest_is_a_posture_up_to_rounding() -> None:
     """The tests above count from the rest posture, which lies on a posture for joints 1 and 3."""
     assert MA2000.calibration(1).posture_to_rad(500) == pytest.approx(math.pi)
     assert np.isfinite(REST).all()
+
+
+def test_on_a_slow_line_every_nth_period_is_what_was_asked_for() -> None:
+    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=3)
+    assert guards.check(row(10), {}) == guards.check(row(13), {}) == Verdict()
+    (finding,) = guards.check(row(19), {}).findings
+    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were asked for"
+
+
+@pytest.mark.parametrize(("every", "gap", "trips"), [(1, 10, False), (1, 11, True), (5, 15, False), (5, 16, True)])
+def test_silence_is_ten_periods_or_three_samples_on_a_slow_line(every: int, gap: int, trips: bool) -> None:
+    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every)
+    guards.check(row(1), {})
+    assert bool(guards.check(row(1 + gap), {}).trips) is trips
+
+
+def test_on_a_slow_line_fewer_samples_make_a_run_of_missed_set_points() -> None:
+    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=5)
+    missed = StatusFlag.SET_POINT_MISSED.value
+    trips = [bool(guards.check(row(tick, status=missed), {}).trips) for tick in range(0, 20, 5)]
+    assert trips == [False, False, True, True]

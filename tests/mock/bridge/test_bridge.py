@@ -67,7 +67,7 @@ def refusal(reply: object) -> Refusal:
 
 
 def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
-    everything = Capability.SAMPLE | Capability.LOCK_STEP | Capability.SIMULATED
+    everything = Capability.SAMPLE | Capability.COMPACT | Capability.LOCK_STEP | Capability.SIMULATED
     reply = host.ask(Hello(2, 77))
     assert isinstance(reply, HelloReply)
     assert reply == HelloReply(2, everything, 20_000, 64, 1, 77, reply.session)
@@ -78,7 +78,7 @@ def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
 
 
 def test_a_host_of_another_version_is_told_in_words_that_version_1_understands(host: LockStepHost) -> None:
-    everything = Capability.SAMPLE | Capability.LOCK_STEP | Capability.SIMULATED
+    everything = Capability.SAMPLE | Capability.COMPACT | Capability.LOCK_STEP | Capability.SIMULATED
     for payload in (b"", b"\x01", b"\x03" + bytes(20)):
         (answer,) = host.device.bridge.receive(Frame(7, Hello.OPCODE, payload))
         assert struct.unpack("<BHIBH", answer.payload) == (2, everything, 20_000, 64, 1)

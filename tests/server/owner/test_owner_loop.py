@@ -36,6 +36,9 @@ class SilentForAWhile:
             raise SILENT
         return SimpleNamespace(tick=next(self.ticks), flags=StatusFlag(0))
 
+    def line_rate(self) -> SimpleNamespace:
+        return SimpleNamespace(every=1)
+
     def hello(self) -> None:
         """The greeting."""
 

@@ -3068,6 +3068,13 @@ export interface components {
             };
             /** Age */
             age?: number | null;
+            /**
+             * Rates
+             * @default []
+             */
+            rates?: components["schemas"]["SampleRate"][];
+            /** Stop Seconds */
+            stop_seconds?: number | null;
         };
         /**
          * LiveFrame
@@ -4267,6 +4274,16 @@ export interface components {
             period: number;
             /** Boots */
             boots: number;
+            /**
+             * Samples
+             * @default true
+             */
+            samples?: boolean;
+            /**
+             * Compact
+             * @default false
+             */
+            compact?: boolean;
         };
         /**
          * RobotMessage
@@ -4445,6 +4462,21 @@ export interface components {
             frozen: boolean;
             /** Lateness */
             lateness: number;
+        };
+        /**
+         * SampleRate
+         * @description What the line can give: samples of so many joints, with a set point for each of them, every so many control
+         *     periods.
+         */
+        SampleRate: {
+            /** Joints */
+            joints: number;
+            /** Every */
+            every: number;
+            /** Samples Per Second */
+            samples_per_second: number;
+            /** Share */
+            share: number;
         };
         /**
          * SampledPid
@@ -5127,6 +5159,11 @@ export interface components {
             } | null;
             /** Period */
             period?: number | null;
+            /**
+             * Every
+             * @default 1
+             */
+            every?: number;
             /** Drive Unit */
             drive_unit?: ("V" | "A" | "N·m" | "N") | null;
             /**

@@ -1,0 +1,35 @@
+"""What the line to a controller can give, in the form of a service's status, and in one line for people."""
+
+from __future__ import annotations
+
+from daq.contracts.service.robot import LinkStatus, RobotIdentity, SampleRate
+from daq.driver.line_rate import LineRate, stop_latency_s, told_rates
+
+
+def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentity) -> LinkStatus:
+    """The status of a link with what its line can give. Without SAMPLE no rate is promised."""
+    if not identity.samples:
+        return link.model_copy(update={"stop_seconds": stop_latency_s(bytes_per_second)})
+    rates = tuple(
+        _wire(rate) for rate in told_rates(bytes_per_second, identity.period, can_be_compact=identity.compact)
+    )
+    return link.model_copy(update={"rates": rates, "stop_seconds": stop_latency_s(bytes_per_second)})
+
+
+def rates_line(link: LinkStatus) -> str:
+    """One line for people; empty where nothing is known."""
+    if not link.rates or link.stop_seconds is None:
+        return ""
+    told = ", ".join(
+        f"{rate.joints} joint{'s' * (rate.joints > 1)} {rate.samples_per_second:.3g}" for rate in link.rates
+    )
+    return f"the line gives samples a second: {told}; a stop takes up to {link.stop_seconds * 1e3:.0f} ms"
+
+
+def _wire(rate: LineRate) -> SampleRate:
+    return SampleRate(
+        joints=rate.joints,
+        every=rate.every,
+        samples_per_second=round(rate.samples_per_second, 3),
+        share=round(rate.share, 3),
+    )

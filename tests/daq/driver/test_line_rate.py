@@ -1,0 +1,74 @@
+"""What a line carries: bytes of a turn as the frames have them, the rate that leaves room, and what is told."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.driver.line_rate import (
+    LARGEST_SHARE,
+    bytes_of_a_compact_turn,
+    bytes_of_a_snapshot,
+    bytes_of_a_turn,
+    line_rate,
+    stop_latency_s,
+)
+from firmware_protocol import commands as c
+from firmware_protocol.framing import encode_frame
+
+PERIOD = 0.020
+
+
+def on_the_line(*messages: c.Message) -> int:
+    return sum(len(encode_frame(c.to_frame(0, message))) for message in messages)
+
+
+@pytest.mark.parametrize("joints", range(1, 7))
+@pytest.mark.parametrize("moving", range(7))
+def test_bytes_are_those_of_the_frames(joints: int, moving: int) -> None:
+    postures = tuple((joint, 500) for joint in range(1, moving + 1))
+    mask = (1 << joints) - 1
+    snapshot = c.Snapshot(1, 0, tuple((joint, c.JointReading(1, 1, 1, 1)) for joint in range(1, joints + 1)))
+    compact = c.CompactSnapshot(1, 0, 0, tuple((joint, c.CompactReading(1, 1, 1)) for joint in range(1, joints + 1)))
+    written = on_the_line(c.WriteSetPoints(postures), c.SetPointsTaken(1, 0)) if moving else 0
+    assert bytes_of_a_turn(joints, moving) == on_the_line(c.Sample(1, mask), snapshot) + written
+    assert bytes_of_a_compact_turn(joints, moving) == on_the_line(c.MoveAndSample(1, mask, postures), compact)
+    assert bytes_of_a_snapshot(joints, compact=False) == on_the_line(snapshot)
+    assert bytes_of_a_snapshot(joints, compact=True) == on_the_line(compact)
+
+
+@pytest.mark.parametrize(
+    ("baud", "joints", "plain", "compact"),
+    [(9600, 3, 6, 4), (9600, 6, 8, 5), (19200, 3, 3, 2), (19200, 6, 4, 3), (38400, 3, 2, 1), (57600, 6, 2, 1)],
+)
+def test_every_so_many_periods_there_is_a_sample(baud: int, joints: int, plain: int, compact: int) -> None:
+    assert line_rate(baud / 10, PERIOD, joints, joints).every == plain
+    assert line_rate(baud / 10, PERIOD, joints, joints, can_be_compact=True).every == compact
+
+
+@pytest.mark.parametrize("baud", [1200, 9600, 19200, 38400, 57600, 115200])
+@pytest.mark.parametrize("joints", range(1, 7))
+@pytest.mark.parametrize("compact", [False, True])
+def test_no_rate_takes_more_of_the_line_than_may_be_taken_and_none_faster_would_fit(
+    baud: int, joints: int, compact: bool
+) -> None:
+    rate = line_rate(baud / 10, PERIOD, joints, joints, can_be_compact=compact)
+    assert rate.share <= LARGEST_SHARE + 1e-9
+    assert rate.every == 1 or rate.share * rate.every / (rate.every - 1) > LARGEST_SHARE
+
+
+def test_a_fast_line_is_used_as_before() -> None:
+    rate = line_rate(11520, PERIOD, 6, 6, can_be_compact=True)
+    assert (rate.every, rate.compact) == (1, False)
+
+
+def test_a_rate_is_told_with_its_joints_share_and_stop() -> None:
+    words = line_rate(1920, PERIOD, 3, 3, can_be_compact=True).in_words
+    assert words == (
+        "25 samples a second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 44 ms"
+    )
+    assert line_rate(11520, PERIOD, 1, 1).in_words.startswith("50 samples a second of 1 joint, every control period")
+
+
+def test_a_stop_waits_for_a_frame_of_the_largest_size() -> None:
+    longest = on_the_line(c.WriteBlock(0xFC00, bytes(c.MAX_WRITE)), c.Stop())
+    assert stop_latency_s(1920) == pytest.approx(longest / 1920 + 0.010)

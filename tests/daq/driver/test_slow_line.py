@@ -1,0 +1,51 @@
+"""Samples over a slow line, in lock-step: every n-th period, evenly, with set points that are taken."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from daq.driver import Controller
+
+JOINTS = (1, 2, 3)
+
+
+@pytest.mark.parametrize(("options", "compact"), [("", True), ("&no_compact=1", False)], ids=["compact", "plain"])
+def test_every_nth_period_comes_evenly_with_its_set_points(options: str, compact: bool) -> None:
+    with Controller.connect(f"mock://?lock_step=1&seed=3&baud=19200{options}") as controller:
+        rate = controller.line_rate(JOINTS, JOINTS)
+        assert (rate.every, rate.compact) == ((2, True) if compact else (3, False))
+        snapshot = controller.next_snapshot(joints=JOINTS)
+        here, ticks = snapshot.set_points, [snapshot.tick]
+        for step in range(30):
+            towards = {joint: posture + step for joint, posture in here.items()}
+            snapshot = controller.next_snapshot(snapshot.tick + rate.every - 1, JOINTS, towards)
+            ticks.append(snapshot.tick)
+            assert not snapshot.set_points_missed
+        assert {later - earlier for earlier, later in pairwise(ticks)} == {rate.every}
+        counters = controller.counters
+        assert (counters.missing_samples, counters.missed_set_points, counters.retries) == (0, 0, 0)
+        last = controller.next_snapshot(joints=JOINTS)
+        assert last.set_points == towards
+
+
+def test_a_question_waits_until_the_periods_before_are_over() -> None:
+    with Controller.connect("mock://?lock_step=1&seed=3") as controller:
+        first = controller.next_snapshot()
+        assert controller.next_snapshot(first.tick + 6).tick == first.tick + 7
+
+
+def test_what_a_compact_sample_says_is_what_a_whole_one_says() -> None:
+    with Controller.connect("mock://?lock_step=1&seed=3&baud=19200") as controller:
+        here = controller.next_snapshot(joints=JOINTS).set_points
+        compact = controller.next_snapshot(None, JOINTS, here)
+        whole = controller.next_snapshot(compact.tick - 1, JOINTS)
+        assert whole.tick == compact.tick
+        assert whole.joints == compact.joints
+
+
+def test_a_line_that_carries_every_period_is_asked_for_every_period() -> None:
+    with Controller.connect("mock://?lock_step=1&seed=3") as controller:
+        assert controller.line_rate().every == 1
+        assert controller.line_rate(range(1, 7), range(1, 7)).every == 1
