@@ -9,6 +9,7 @@ from types import MappingProxyType
 from model import layout as at
 from model.effects.effect import Tone
 from model.effects.library import effect, library
+from model.machine_model.effect_parameters import suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -87,6 +88,8 @@ def hypotheses(
             continue
         places = ((),) if effect(name).whole_machine else tuple((j,) for j in joints or model.machine.modelled_joints)
         for place in places:
+            if place and not suits_drive(model.machine, name, place[0]):
+                continue
             found.extend(_variants(_Place(model, name, place, name)))
     return tuple(found)
 

@@ -98,7 +98,7 @@ def test_what_a_tolerance_can_explain_costs_no_more_than_its_prior(name: str, fr
 @pytest.mark.parametrize(
     ("name", "values", "deviations"),
     [
-        ("back_emf_error", {"joint": 3, "factor": 1.2}, 0.2 / 0.05),
+        ("weakened_magnet", {"joint": 3, "loss": 0.2}, math.sqrt(2) * 0.2 / 0.05),
         ("load_dependent_friction", {"joint": 3, "arm": 0.3}, 0.3 / 0.128486 * 3),
         ("payload", {"mass": 0.5}, 0.5 / 0.1250307),
     ],

@@ -49,7 +49,7 @@ def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pyt
     arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
     given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     before = judge(converge(given, 4))
-    (found,) = probe(before.point, hypotheses(before.point.model, ("back_emf_error",), (2,)))
+    (found,) = probe(before.point, hypotheses(before.point.model, ("viscous_friction",), (2,)))
     counted = counting(monkeypatch)
     assert refit(before, found) is not None
     with_time, counted[:] = len(counted), []

@@ -41,9 +41,10 @@ EXPERIMENTS = {e.name: e for e in offered_experiments()}
 FRICTION = ("coulomb_friction", "stribeck_friction")
 SPEED_LAWS = {
     "viscous_friction": "joint2.viscous_friction.coefficient",
-    "back_emf_error": "joint2.motor.back_emf_constant",
+    "weakened_magnet": "joint2.motor.back_emf_constant",
 }
-"""Effects, and the parameters that stand for them; the size of a torque in proportion to speed."""
+"""Names of two rivals, and the parameter that each frees. Either is a torque in proportion to speed, so no motion tells
+them apart (which a weakened magnet itself is not: it takes K_T with it)."""
 
 
 def plan(spec: ExperimentSpec) -> NDArray[np.float64]:
@@ -131,14 +132,14 @@ def test_candidates_that_no_experiment_separates_are_named_in_a_note() -> None:
     rivals = [speed_law(trace, point, effect) for effect in SPEED_LAWS]
     moved = [r.fit.point.value(SPEED_LAWS[r.hypothesis.name]) for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
-    assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["back_emf_error"]).value
+    assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["weakened_magnet"]).value
     asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), plan))
     assert asked.experiment is None
     assert asked.note is not None
     words = note_words(asked.note)
     assert "no experiment" in words
     assert "viscous friction on joint 2" in words
-    assert "back-EMF error on joint 2" in words
+    assert "weakened magnet on joint 2" in words
 
 
 def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_step: Trace) -> None:

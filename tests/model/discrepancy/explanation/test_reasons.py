@@ -40,7 +40,7 @@ SIZES: dict[str, dict[str, float]] = {
     "stribeck_friction": {"torque": 4.0, "speed": 0.05},
     "stiction": {"breakaway": 4.0},
     "direction_dependent_friction": {"difference": 4.0},
-    "back_emf_error": {"relative": 0.3},
+    "weakened_magnet": {"loss": 0.3},
     "resistance_drift": {"heating": 0.05, "time_constant": 60.0},
     "motor_inductance": {"inductance": 0.03},
     "dead_zone": {"width": 1.0},
