@@ -1922,6 +1922,11 @@ export interface components {
             reason_data?: components["schemas"]["Reason"] | null;
             proof?: components["schemas"]["ControllerProof"] | null;
             refusal?: components["schemas"]["Refusal"] | null;
+            /**
+             * Slight Joints
+             * @default []
+             */
+            slight_joints?: number[];
             /** Called */
             called: string;
             /** Chance */
