@@ -278,7 +278,11 @@ def _place(where: Where) -> str:
         )
     if worst.whole_record or worst.floor is None:
         times = plain(worst.ratio)
-        return f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times} times its noise"
+        seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times} times its noise"
+        largest = where.largest
+        if largest is None or largest.rms is None:
+            return seen
+        return f"{seen}; more is left of joint {largest.joint}, {plain(largest.rms, 3)} {largest.unit} rms"
     return f"joint {worst.joint}, {phase}: {worst.rms:.2g} {worst.unit} rms against a floor of {worst.floor:.2g}"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
+from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
@@ -263,6 +264,7 @@ def _ripple(place: _Place) -> Iterator[Start]:
 def _disturbance(place: _Place) -> Iterator[Start]:
     longest = max(float(np.ptp(r.time)) for r in place.records)
     grid = _scanned(max(0.05, 2 / longest), 0.8 * place.records[0].cutoff, 0.4 / longest)
+    grid = grid[~own_frequencies(grid, [r.speed for r in place.records], place.records[0].period)]
     for rate in _peaks(2 * np.pi * grid, [r.time[r.rows] for r in place.records], place):
         yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi)}
 

@@ -49,9 +49,9 @@ class OutsideArm:
     """Numbers of one arm, in SI units.
 
     Args:
-        load: kg at the end, which the machine file does not know. load_share: share of the gravity torque that rubs.
-        dead_zone: V. stiffness: N·m/rad of a spring to the posture 0. resolution, limit: of the controller's output, V.
-        flux: share that the magnets still have. factor: of the controller's gains. lost: share of the set points that it
+        load: kg at the end, unknown to the machine file. load_share: share of the gravity torque that rubs.
+        dead_zone: V. stiffness: N·m/rad of a spring to posture 0. resolution, limit: of the controller's output, V.
+        flux: share that magnets still have. factor: of the controller's gains. lost: share of its set points that it
         does not get.
     """
 

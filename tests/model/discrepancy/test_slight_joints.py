@@ -64,7 +64,12 @@ def test_a_later_step_of_the_same_effect_may_be_slight_as_a_whole(answer: Diagno
     def one(joint: int, evidence: float) -> Step:
         name = f"joint{joint}.coulomb_friction.torque"
         return whole.model_copy(
-            update={"joints": (joint,), "parameters": {name: whole.parameters[name]}, "evidence": evidence}
+            update={
+                "joints": (joint,),
+                "parameters": {name: whole.parameters[name]},
+                "evidence": evidence,
+                "slight_joints": (),
+            }
         )
 
     steps = with_slight_joints((one(2, 1554.0), one(1, 60.0)), GIVEN, both.model_after)
