@@ -9,8 +9,8 @@ import numpy as np
 from model.arrays import Floats, Mask
 
 LINE = 0.5
-"""Share of a joint's motion, by the variance of its speed, from which a single frequency is the motion's own: a sine has
-all of it in one, a triangle four fifths."""
+"""Share of a joint's motion, by the variance of its speed, from which a single frequency is the motion's own. A sine
+has all of it in one, a triangle four fifths."""
 PERIODS = 4
 """Least number of periods in a record: what a short motion repeats less often is no frequency."""
 
