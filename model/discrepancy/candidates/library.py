@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -94,9 +95,16 @@ def hypotheses(
     return tuple(found)
 
 
-def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Hypothesis | None:
-    """A hypothesis with a frequency that a spectrum has proposed. values: by the part of the effect."""
-    return _hypothesis(_Place(model, name, (joint,), name), (dict(values),))
+def tone(model: Model, name: str, joint: int, values: Mapping[str, float], slowest: float) -> Hypothesis | None:
+    """A hypothesis with a rate that a spectrum has proposed. values: by the part of the effect.
+
+    slowest: the least rate that was looked at. A fit may not go below it: part of a slow wave repeats nothing, and is
+    as good as a spring.
+    """
+    over = effect(name).tone
+    assert over is not None
+    bounds = {over.value: (slowest, math.inf)}
+    return _hypothesis(_Place(model, name, (joint,), name), (dict(values),), bounds=bounds)
 
 
 def law_on(model: Model, name: str, joints: Sequence[int]) -> Hypothesis | None:

@@ -269,7 +269,8 @@ def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: in
     if best is None:
         return None
     gain, in_sine, in_cosine, rate = best
-    found = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, over: rate})
+    sizes = {"sine": in_sine, "cosine": in_cosine, over.value: rate}
+    found = tone(point.model, name, joint, sizes, float(rates[0]))
     return None if found is None else Probe(found, gain, found.trials[0], clear.moves(shown), shown)
 
 
