@@ -270,7 +270,7 @@ def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: in
         return None
     gain, in_sine, in_cosine, rate = best
     sizes = {"sine": in_sine, "cosine": in_cosine, over.value: rate}
-    found = tone(point.model, name, joint, sizes, float(rates[0]))
+    found = tone(point.model, name, joint, sizes, float(rates[0]), observation.scales)
     return None if found is None else Probe(found, gain, found.trials[0], clear.moves(shown), shown)
 
 

@@ -114,7 +114,7 @@ def test_what_probes_of_a_closed_loop_promise_is_the_same_in_every_unit(name: st
         observation, given = observe(known, [recorded(trace, factor)])
         point = point_at(observation, given)
         kinds = ("dead_zone", "coulomb_friction", "resistance_drift", "spring_torque")
-        promised.append([p.gain for p in probe(point, hypotheses(known, kinds))])
+        promised.append([p.gain for p in probe(point, hypotheses(known, kinds, scales=observation.scales))])
     for other in promised[1:]:
         assert np.array(other) == pytest.approx(np.array(promised[0]), rel=1e-3, abs=1e-3)
     assert max(promised[0]) > 10

@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
 from daq_cli.trial.experiments import trial_experiment
-from model.discrepancy.candidates.candidate_fit import CandidateFit, judge
+from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, refit
 from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
@@ -140,6 +140,36 @@ def test_candidates_that_no_experiment_separates_are_named_in_a_note() -> None:
     assert "no experiment" in words
     assert "viscous friction on joint 2" in words
     assert "weakened magnet on joint 2" in words
+
+
+PAIRS = {
+    "pseudo-random": ("motor_inductance", 1, {"inductance": 0.03}, "input_delay"),
+    "sweep": ("potentiometer_nonlinearity", 3, {"bend_1": 0.03}, "potentiometer_offset"),
+}
+"""Presets, and the effect, joint, size and rival that each is made for."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_preset_separates_the_pair_that_it_is_made_for(name: str) -> None:
+    effect, joint, size, rival = PAIRS[name]
+    trace = record(imagined.arm().with_effect(effect, (joint,), size), trial_experiment("ramp"), 3)
+    point = known(trace)
+    options = DiagnosisOptions(effects=(effect, rival), joints=(joint,))
+    found = rank(build_case(point.model, point, point, [trace], options=options), judge(point), silent, Never())
+    fitted = {f.hypothesis.name: f for f in found.fitted}
+    for probed in found.probed:
+        tried = None if probed.hypothesis.name in fitted else refit(judge(point), probed)
+        if tried is not None:
+            fitted[probed.hypothesis.name] = tried
+    rivals = converge_rivals([fitted[effect], fitted[rival]])
+    predicted = {}
+    for offered in (name, "diagnostic-b", "diagnostic-d", "diagnostic-e"):
+        asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS[offered],), plan))
+        predicted[offered] = 0.0 if asked.experiment is None else asked.experiment.predicted_separation
+    best = predicted.pop(name)
+    assert best > 8
+    assert best > 2 * max(predicted.values())
 
 
 def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_step: Trace) -> None:
