@@ -91,21 +91,21 @@ def test_an_answer_is_the_same_in_every_unit_of_the_drive(name: str, factor: flo
     assert_same(usual, answered(RIGS[name], tmp_path, factor, None), factor, 1e-3)
 
 
-@pytest.mark.parametrize("name", ["bench", "slide"])
+@pytest.mark.parametrize("name", ["bench", pytest.param("slide", marks=pytest.mark.slow)])
 def test_a_short_search_is_the_same_in_every_unit_of_the_drive(name: str, tmp_path: Path) -> None:
     make = {"bench": (rigs.bench_machine, rigs.bench_trace), "slide": (rigs.slide_machine, rigs.slide_trace)}[name]
-    few = DiagnosisOptions(effects=("coulomb_friction", "dead_zone", "viscous_friction", "torque_ripple"), most_steps=2)
+    few = DiagnosisOptions(effects=("coulomb_friction", "dead_zone"), most_steps=1)
 
     def rig(_folder: Path) -> tuple[Machine, Sequence[Trace]]:
-        return make[0](), [make[1](s, {"coulomb": 0.02 if name == "bench" else 6.0}, duration=8.0) for s in (1, 2)]
+        return make[0](), [make[1](s, {"coulomb": 0.02 if name == "bench" else 6.0}, duration=5.0) for s in (1, 2)]
 
     usual = answered(rig, tmp_path, 1.0, few)
     assert any(s.adopted for s in usual.steps)
-    for factor in (1e-2, *FACTORS):
+    for factor in FACTORS[:1]:
         assert_same(usual, answered(rig, tmp_path, factor, few), factor, 1e-3)
 
 
-@pytest.mark.parametrize("name", ["single_axis", "outside"])
+@pytest.mark.parametrize("name", ["single_axis", pytest.param("outside", marks=pytest.mark.slow)])
 def test_what_probes_of_a_closed_loop_promise_is_the_same_in_every_unit(name: str, tmp_path: Path) -> None:
     machine, (trace, *_) = RIGS[name](tmp_path)
     promised = []
