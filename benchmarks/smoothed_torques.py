@@ -69,8 +69,9 @@ def torques_along(model: Model, trace: Trace, window: float) -> TorquesAlongTrac
     motor = None
     if trace.drive is not None:
         volts = np.clip(trace.drive[:, columns], -joints[:, at.SUPPLY], joints[:, at.SUPPLY])
-        back_emf = joints[:, at.BACK_EMF] * (1 + joints[:, at.BACK_EMF_ERROR]) * gear * velocity
-        motor = gear * joints[:, at.TORQUE_CONSTANT] * (volts - back_emf) / joints[:, at.RESISTANCE]
+        flux = 1 - joints[:, at.FLUX_LOSS]
+        back_emf = flux * joints[:, at.BACK_EMF] * gear * velocity
+        motor = flux * gear * joints[:, at.TORQUE_CONSTANT] * (volts - back_emf) / joints[:, at.RESISTANCE]
     return TorquesAlongTrace(trace.time, position, velocity, acceleration, required, friction, motor)
 
 

@@ -189,7 +189,7 @@ def _terms(
         for name, values in (
             ("link_mass", {"added": 0.1}),
             ("centre_of_mass", {"shift": 0.01}),
-            ("back_emf_error", {"relative": 0.05}),
+            ("weakened_magnet", {"loss": 0.05}),
             ("input_delay", {"time": 0.005}),
         ):
             yield (name, joint), _moved(model.with_effect(name, (joint,), values), trace, target)

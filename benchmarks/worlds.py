@@ -73,7 +73,7 @@ def score(truth: Json, answer: Json | None) -> Score:
         return Score(alarm=verdict != "nothing-significant")
     if case == "open":
         return Score(honest=verdict in ("unknown-effect", "ambiguous"))
-    known = [{hidden["name"], *hidden["also_known_as"]} for hidden in truth["hidden"]]
+    known = [{hidden["name"]} for hidden in truth["hidden"]]
     if case == "pair":
         single = [names for names in steps if len(names) == 1]
         found = [any(names & right for names in single) for right in known]
@@ -98,7 +98,7 @@ def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) 
     if not rivals or any(rival["name"] == "none" and rival["d_prime"] < TOLD_APART for rival in rivals):
         return None
     untold = {rival["name"] for rival in rivals if rival["d_prime"] < TOLD_APART}
-    right = {truth["hidden"][0]["name"], *truth["hidden"][0]["also_known_as"]}
+    right = {truth["hidden"][0]["name"]}
     if not untold - right:
         return strict
     return strict or (answered and all(names <= untold | right for names in steps))

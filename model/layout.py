@@ -42,7 +42,7 @@ SHARED = 10
     INDUCTANCE,  # H
     TORQUE_CONSTANT,  # N·m/A
     BACK_EMF,  # V·s/rad
-    BACK_EMF_ERROR,  # relative
+    FLUX_LOSS,  # share of the magnet's flux: of torque and back-EMF constant
     ROTOR_INERTIA,  # kg·m², motor side
     GEAR,  # motor turns per joint turn
     VOLTS_PER_COUNT,  # V at the motor for a DAC count

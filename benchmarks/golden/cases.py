@@ -14,7 +14,7 @@ SINGLES = (
     "stribeck_friction:joint=3,torque=2.5",
     "stiction:joint=3,breakaway=3",
     "direction_dependent_friction:joint=1,torque=2",
-    "back_emf_error:joint=2,factor=0.7",
+    "weakened_magnet:joint=2,loss=0.3",
     "resistance_drift:joint=2,thermal_resistance=40",
     "motor_inductance:joint=1,inductance=0.02",
     "dead_zone:joint=2,width=1.5",
@@ -43,7 +43,7 @@ SECOND_SINGLES = (
     "dead_zone:joint=1,width=2.5",
     "backlash:joint=3,play=0.01",
     "torque_ripple:joint=2,amplitude=2,periods=20",
-    "back_emf_error:joint=1,factor=1.3",
+    "weakened_magnet:joint=1,loss=0.2",
     "payload:mass=-0.4",
     "input_delay:joint=1,delay=0.012",
 )
@@ -75,7 +75,7 @@ FITS = (
     ("single-coulomb_friction-1", ("--effects", "viscous,load_dependent,coulomb:1")),
     ("single-payload-15", ("--open-loop",)),
     ("secret-310", ("--method", "nelder_mead", "--parameters", "load.mass,link2.mass")),
-    ("single-back_emf_error-6", ("--starts", "3", "--seed", "5")),
+    ("single-weakened_magnet-6", ("--starts", "3", "--seed", "5")),
     ("secret-410", ("--torques",)),
 )
 """Arms, and how a model is fitted to their traces."""

@@ -10,6 +10,12 @@ from importlib import resources
 UNKNOWN_EFFECT = "unknown_effect"
 """Name of every effect that is not in the shared list."""
 
+FORMER_EFFECTS = {
+    "back_emf_error": "it changed K_b alone, and K_T and K_b belong to one magnet; fit or diagnose again, with "
+    "weakened_magnet or with the motor's back_emf_constant",
+}
+"""Names that saved models and answers may still have, and what to say of models that do."""
+
 
 @dataclass(frozen=True)
 class EffectName:

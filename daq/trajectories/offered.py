@@ -8,13 +8,15 @@ from daq.contracts.experiment import Cubic, ExperimentSpec, OfferedExperiment, P
 from daq.trajectories.presets import PRESETS
 
 GENERAL = "diagnostic"
-SINGLE = ("ramp", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e")
+PARTS = tuple(f"diagnostic-{letter}" for letter in "abcde")
+SINGLE = ("ramp", *PARTS, "pseudo-random", "sweep")
 ELSEWHERE = (40.0, 35.0, -50.0)
 """Second posture of the diagnostic set, in degrees from the rest posture."""
 
 
 def offered_experiments() -> tuple[OfferedExperiment, ...]:
-    """The diagnostic set, its parts, the source's ramp, and slow reversals at a second posture."""
+    """The diagnostic set, its parts, the source's ramp, pseudo-random steps, a sweep, and slow reversals at a second
+    posture."""
     named = [
         OfferedExperiment(name, PRESETS[name].description, PRESETS[name].spec, name == GENERAL)
         for name in (GENERAL, *SINGLE)

@@ -105,6 +105,45 @@ def _second_posture() -> list[Segment]:
     ]
 
 
+def _pseudo_random() -> list[Segment]:
+    """A maximum-length sequence of 255 signs, each held for 80 ms, that all joints follow 85 signs apart: their set
+    points jump between ±3° and have next to no correlation with each other."""
+    signs = _maximum_length()
+    third = len(signs) // len(MAJOR)
+    segments: list[Segment] = []
+    now: tuple[float, ...] = (0.0, 0.0, 0.0)
+    for k in range(len(signs) + 1):
+        wanted = tuple(3.0 * signs[(k + third * n) % len(signs)] if k < len(signs) else 0.0 for n in range(len(MAJOR)))
+        jumps = {j: math.radians(b - a) for j, a, b in zip(MAJOR, now, wanted, strict=True) if a != b}
+        if jumps:
+            segments.append(_segment(Step(amplitude=jumps), *jumps))
+        segments.append(_segment(Pause(duration=0.06 if jumps else 0.08)))
+        now = wanted
+    return segments
+
+
+def _maximum_length() -> list[int]:
+    """±1 from a register of 8 bits with feedback from bits 8, 6, 5 and 4: every state but 0 once (Golomb 1967)."""
+    register, signs = 0b01011010, []
+    for _ in range(255):
+        signs.append(1 if register & 1 else -1)
+        bit = (register ^ (register >> 2) ^ (register >> 3) ^ (register >> 4)) & 1
+        register = (register >> 1) | (bit << 7)
+    return signs
+
+
+def _sweep() -> list[Segment]:
+    """Through most of the range of each joint, in smooth moves of 4 s; joints turn back at different moments."""
+    postures = ((120.0, 90.0, -120.0), (0.0, 150.0, 0.0), (-120.0, 60.0, 120.0), (0.0, -60.0, 110.0), (0.0, 0.0, 0.0))
+    segments: list[Segment] = []
+    now: tuple[float, ...] = (0.0, 0.0, 0.0)
+    for posture in postures:
+        move = _by_joint(*(b - a for a, b in zip(now, posture, strict=True)))
+        segments.append(_segment(Cubic(amplitude=move, duration=4.0)))
+        now = posture
+    return segments
+
+
 def _held_out() -> list[Segment]:
     """Like the diagnostic set, but with other sizes and speeds and at a third posture."""
     there = (-25.0, 20.0, 30.0)
@@ -144,6 +183,14 @@ PRESETS: dict[str, Preset] = {
         f"diagnostic-{letter}": Preset(description, _sequence(f"diagnostic-{letter}", segments))
         for letter, (description, segments) in PARTS.items()
     },
+    "pseudo-random": Preset(
+        "pseudo-random steps between ±3° for 20 s: what differs only in fast motion, as inductance and a delay",
+        _sequence("pseudo-random", _pseudo_random()),
+    ),
+    "sweep": Preset(
+        "21 s through most of each joint's range: what differs only over position, as a bent or shifted potentiometer",
+        _sequence("sweep", _sweep()),
+    ),
     "held-out": Preset(
         "17 s that no fit has seen, to judge a model by: tones, ramps, slow reversals, steps at a third posture",
         _sequence("held-out", _held_out()),

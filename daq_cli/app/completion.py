@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 
-PRESETS = ("ramp", "diagnostic", *(f"diagnostic-{letter}" for letter in "abcde"), "held-out")
+PRESETS = ("ramp", "diagnostic", *(f"diagnostic-{letter}" for letter in "abcde"), "pseudo-random", "sweep", "held-out")
 """Names of `daq.trajectories.presets`, which would load numpy; a test keeps the two alike."""
 JOINTS = ("1-3", "1", "2", "3", "4", "5", "6", "1-2", "2-3", "1-6")
 SUFFIXES = (".mcap", ".csv")

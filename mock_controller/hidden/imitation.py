@@ -8,7 +8,7 @@ from mock_controller.hidden.tolerances import tolerances
 from mock_controller.modification import Modification
 from mock_controller.modifications.friction import LoadDependentFriction, ViscousFriction
 from mock_controller.modifications.load import LinkMass, Payload
-from mock_controller.modifications.motor import BackEmfError
+from mock_controller.modifications.motor import WeakenedMagnet
 from mock_controller.modifications.sensor import PotentiometerGain
 from mock_controller.plant import PlantParameters
 
@@ -36,8 +36,8 @@ def _of_one(  # noqa: PLR0911  (a table with one line per effect)
             return {f"coulomb_arm_{effect.joint}": effect.arm / parameters.friction.effective_arm}
         case ViscousFriction():
             return _damping(parameters, effect.joint, effect.coefficient)
-        case BackEmfError():
-            return _damping(parameters, effect.joint, (effect.factor - 1.0) * _dampings(parameters, effect.joint)[0])
+        case WeakenedMagnet():
+            return {f"{constant}_{effect.joint}": -effect.loss for constant in ("torque_constant", "back_emf_constant")}
         case PotentiometerGain():
             return _faster(parameters, effect.joint, 1.0 / (1.0 + effect.error) - 1.0)
         case _:

@@ -69,7 +69,7 @@ SHARED_SIZES: tuple[SizeRange, ...] = (
     SizeRange("stribeck_friction", "torque", ((0.4, 5), (0.6, 10), (0.15, 2.5)), also={"speed": (0.05, 0.3)}),
     SizeRange("stiction", "breakaway", ((0.8, 12), (0.8, 16), (0.5, 6)), also={"speed": (0.01, 0.04)}),
     SizeRange("direction_dependent_friction", "torque", ((0.12, 3), (0.6, 12), (0.15, 3)), signed=True),
-    SizeRange("back_emf_error", "factor", ((0.2, 1.2), (0.2, 0.8), (0.2, 1.2)), signed=True, negative=0.35),
+    SizeRange("weakened_magnet", "loss", _alike(0.1, 0.5)),
     SizeRange(
         "resistance_drift",
         "thermal_resistance",

@@ -15,20 +15,25 @@ _COPPER_PER_KELVIN = 0.0039
 
 
 @dataclass
-class BackEmfError:
-    """The back-EMF constant of `joint`'s motor is `factor` times its nominal value; the torque constant is
-    unchanged."""
+class WeakenedMagnet:
+    """The magnet of `joint`'s motor has lost a share of its flux: an ampere gives less torque, and a turn less
+    back-EMF."""
 
-    name: ClassVar[str] = "back_emf_error"
+    name: ClassVar[str] = "weakened_magnet"
     shared: ClassVar[bool] = True
-    line: ClassVar[str] = "K_b → f K_b"
-    source: ClassVar[str] = "table 7.5: K_b2 fitted to more than twice its data sheet"
+    line: ClassVar[str] = "Φ → (1 − f) Φ: K_T and K_b are both in proportion to Φ"
+    source: ClassVar[str] = "demagnetisation by heat or by a stalled motor's current; data sheets of DC motors"
     joint: int = joint_parameter()
-    factor: float = parameter(0.0, 5.0, null=1.0)
+    loss: float = parameter(0.0, 0.9, null=0.0)
 
     def change_plant(self, parameters: PlantParameters) -> PlantParameters:
-        constant = parameters.joints[self.joint - 1].back_emf_constant
-        return change_joint(parameters, self.joint, back_emf_constant=self.factor * constant)
+        motor, flux = parameters.joints[self.joint - 1], 1.0 - self.loss
+        return change_joint(
+            parameters,
+            self.joint,
+            torque_constant=flux * motor.torque_constant,
+            back_emf_constant=flux * motor.back_emf_constant,
+        )
 
 
 @dataclass
@@ -88,4 +93,4 @@ class ResistanceDrift:
         return -self._torque_per_ampere * cold_current * (1.0 - self._cold / resistance)
 
 
-SHARED: tuple[type[Any], ...] = (BackEmfError, ResistanceDrift, MotorInductance)
+SHARED: tuple[type[Any], ...] = (WeakenedMagnet, ResistanceDrift, MotorInductance)

@@ -158,7 +158,8 @@ class WorstPlace(FrozenRecord):
 class Where(FrozenRecord):
     """Where simulation and measurement disagree, for a step before it: a one-line summary, and the numbers behind it.
 
-    `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells.
+    `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells. Most is
+    by the noise of each joint; in torques, `largest` is the joint with the largest residual, where it is another.
     """
 
     joint: int | None
@@ -168,6 +169,7 @@ class Where(FrozenRecord):
     dependences: tuple[Dependence, ...]
     moving: tuple[MovingParameter, ...] = ()
     worst: WorstPlace | None = None
+    largest: WorstPlace | None = None
 
 
 class RemainingShape(FrozenRecord):
@@ -220,6 +222,13 @@ class Step(FrozenRecord):
     proof: ControllerProof | None = None
     """Where the controller's own recorded numbers prove the effect: nothing was fitted for it."""
     refusal: Refusal | None = None
+    slight_joints: tuple[int, ...] = ()
+    """Of `joints`, those on which the effect is so slight that it may be what its law leaves of the others."""
+
+    @property
+    def main_joints(self) -> tuple[int, ...]:
+        """The joints of the effect, without those on which it is slight."""
+        return tuple(j for j in self.joints if j not in self.slight_joints)
 
 
 class DifferencePlace(FrozenRecord):

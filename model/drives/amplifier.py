@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
+from model.drives.magnet import back_emf_constant
 from model.drives.piecewise import clamped, outside
 from model.dynamics.compilation import internal
 
@@ -29,7 +30,7 @@ def warmed(
     rise is `hot` meanwhile. The mean of i² is the square of its mean and the variance of a current that changes evenly.
     """
     resistance = joint[at.RESISTANCE] * (1.0 + hot)
-    back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR]) * joint[at.GEAR]
+    back_emf = back_emf_constant(joint) * joint[at.GEAR]
     current = (volts - back_emf * mean) / resistance
     change = back_emf * (ended - begun) / resistance
     kept = np.exp(-duration / joint[at.COOLING_TIME])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from daq.contracts.effects import effect_names
+from daq.contracts.effects import FORMER_EFFECTS, effect_names
 from daq.contracts.errors import SpecError
 from model.effects.controller import CONTROL
 from model.effects.effect import Effect, EffectFile
@@ -51,6 +51,8 @@ def remove_own(name: str) -> None:
 def effect(name: str) -> Effect:
     """The effect of that name. Raises SpecError with the names there are."""
     found = _shipped().get(name) or _own.get(name)
+    if found is None and name in FORMER_EFFECTS:
+        raise SpecError(f"effect {name}: no longer in the library: {FORMER_EFFECTS[name]}")
     if found is None:
         raise SpecError(f"effect {name!r}: not in the library; it has {', '.join(library())}")
     return found

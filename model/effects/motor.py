@@ -7,10 +7,10 @@ from model.effects.effect import Effect, EffectParameter
 
 MOTOR = (
     Effect(
-        "back_emf_error",
-        physics="K_b → K_b (1 + ε)",
-        source="tables 7.1 and 7.9: the data sheet's K_T and the fitted K_b differ",
-        parameters=(EffectParameter("relative", at.BACK_EMF_ERROR, "1", low=-0.95, high=5.0, deviation=0.2),),
+        "weakened_magnet",
+        physics="K_T → K_T (1 − ε), K_b → K_b (1 − ε)",
+        source="permanent magnets lose flux by heat and by large currents; K_T and K_b are of one flux",
+        parameters=(EffectParameter("loss", at.FLUX_LOSS, "1", low=0.0, high=0.95, deviation=0.2),),
     ),
     Effect(
         "resistance_drift",

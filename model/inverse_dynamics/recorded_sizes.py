@@ -14,6 +14,7 @@ import numpy as np
 
 from daq.contracts.machine import PlainGain
 from model import layout as at
+from model.arrays import Floats
 from model.effects.effect import JointScale
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.recorded_motion import RecordedMotion
@@ -56,10 +57,14 @@ def with_recorded_sizes(unknowns: Sequence[Unknown], sizes: Mapping[str, Paramet
 
 def _scale(model: Model, column: int, motions: Sequence[RecordedMotion]) -> JointScale:
     """Natural sizes of a joint whose drive is a plain gain."""
+    drive = np.concatenate([m.drive[m.rows, column] for m in motions])
+    return as_driven(model, column, drive, max(float(np.abs(m.speed[m.rows, column]).max()) for m in motions))
+
+
+def as_driven(model: Model, column: int, drive: Floats, speed: float) -> JointScale:
+    """The same, from its recorded drive (k,) and a speed that it reaches, rad/s (m/s)."""
     joint = model.machine.modelled_joints[column]
     gain = abs(float(model.vector[at.slot(column + 1, at.TORQUE_CONSTANT)]))
-    drive = np.concatenate([m.drive[m.rows, column] for m in motions])
-    speed = max(float(np.abs(m.speed[m.rows, column]).max()) for m in motions)
     volts = STRONGEST * float(np.sqrt(np.mean(drive**2)))
     if not gain * volts > 0 or not speed > 0:
         return joint_scale(model.machine, joint)

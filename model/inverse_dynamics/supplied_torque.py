@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from model import layout as at
 from model.drives.amplifier import motor_volts, warmed
+from model.drives.magnet import torque_constant
 from model.dynamics import recursive
 from model.dynamics.compilation import compiled, internal
 from model.kinematics.chain import ChainArrays
@@ -124,4 +125,4 @@ def _motor_torque(joint: NDArray[Any], flags: int, state: NDArray[Any], volts: f
         excess = state[CURRENT] - current
         state[CURRENT] = current + excess * (1.0 - turns * share)
         current += excess * share
-    return joint[at.GEAR] * joint[at.TORQUE_CONSTANT] * current
+    return joint[at.GEAR] * torque_constant(joint) * current

@@ -232,8 +232,9 @@ def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
     width = joints[:, at.DEAD_ZONE]
     if not width.any():
         return np.zeros_like(asked)
-    gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
-    back_emf = joints[:, at.GEAR] * joints[:, at.BACK_EMF] * (1 + joints[:, at.BACK_EMF_ERROR])
+    geared = joints[:, at.GEAR] * (1 - joints[:, at.FLUX_LOSS])
+    gain = geared * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
+    back_emf = geared * joints[:, at.BACK_EMF]
     volts = asked / gain + back_emf * speed
     soft = CONTACT_SHARE * np.sqrt(np.mean(volts**2, axis=0)) + 1e-12
     return np.asarray(gain * width * np.tanh(volts / soft))

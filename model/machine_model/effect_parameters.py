@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from daq.contracts.machine import Friction, Machine
+from daq.contracts.machine import DcMotor, Friction, Machine
 from daq.contracts.quantity import Quantity
 from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale, evaluate_size
@@ -50,6 +50,14 @@ def effect_parameters(
             slots = tuple(at.slot(j, p.column + beyond) for j in group)
             found.append(replace(own, unit=unit, slots=slots, joints=group))
     return tuple(found)
+
+
+def suits_drive(machine: Machine, name: str, joint: int) -> bool:
+    """Whether the file describes what the effect changes: a winding and a magnet are those of a DC motor driven by
+    volts."""
+    kind = effect(name)
+    of_motor = kind.file is None and kind.shared_name.family == "motor"
+    return not of_motor or isinstance(machine.joint(joint).drive, DcMotor)
 
 
 def _parameter(kind: Effect, p: EffectParameter, scale: JointScale, place: str) -> Parameter:

@@ -14,6 +14,7 @@ import numpy as np
 
 from model import layout as at
 from model.arrays import Array
+from model.drives.magnet import back_emf_constant, torque_constant
 from model.drives.piecewise import clamped, magnitude, outside
 from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
@@ -51,22 +52,20 @@ def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
 @inlined
 def motor_gain(joint: Array, rise: Any) -> Any:
     """Joint torque a volt (N·m/V), n K_T / R, for a winding warmed by `rise`."""
-    return joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / (joint[at.RESISTANCE] * (1.0 + rise))
+    return joint[at.GEAR] * torque_constant(joint) / (joint[at.RESISTANCE] * (1.0 + rise))
 
 
 @inlined
 def motor_damping(joint: Array, rise: Any) -> Any:
     """Joint torque a rad/s (N·m·s/rad): back-EMF through the winding, and viscous friction (7.30)."""
-    back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR])
-    electrical = joint[at.TORQUE_CONSTANT] * back_emf / (joint[at.RESISTANCE] * (1.0 + rise))
+    electrical = torque_constant(joint) * back_emf_constant(joint) / (joint[at.RESISTANCE] * (1.0 + rise))
     return joint[at.GEAR] * joint[at.GEAR] * (electrical + joint[at.VISCOUS])
 
 
 @inlined
 def steady_current(joint: Array, rise: Any, volts: Any, speed: Any) -> Any:
     """Current once it has settled, A; `speed` is the joint's, on the motor's side of the transmission."""
-    back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR])
-    return (volts - back_emf * joint[at.GEAR] * speed) / (joint[at.RESISTANCE] * (1.0 + rise))
+    return (volts - back_emf_constant(joint) * joint[at.GEAR] * speed) / (joint[at.RESISTANCE] * (1.0 + rise))
 
 
 @inlined
@@ -163,7 +162,7 @@ def special_torque(
     current = steady
     if flags & at.HAS_INDUCTANCE:
         current = stage_current(joint, state[RISE], state[CURRENT], volts, begun, rotor_speed, stage, h)
-    to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
+    to_torque = joint[at.GEAR] * torque_constant(joint)
     torque = to_torque * (current - steady)
     through = to_torque * current - joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * rotor_speed
     return torque + extra_torque(joint, flags, time, q, speed, z, state[STUCK], through)

@@ -57,7 +57,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "load_dependent_friction": _load_dependent,
     "stribeck_friction": _same(torque="torque", speed="speed"),
     "direction_dependent_friction": _same(difference="torque"),
-    "back_emf_error": _factor,
+    "weakened_magnet": _same(loss="loss"),
     "motor_inductance": _same(inductance="inductance"),
     "dead_zone": _same(width="width"),
     "supply_limit": _supply,

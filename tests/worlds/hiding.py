@@ -17,8 +17,6 @@ from tests.worlds.rig import Hidden, Rig
 
 WEAKENED_MAGNET = "weakened_magnet"
 """K_T and K_b are of one magnet, and change together."""
-ALSO_KNOWN_AS = {WEAKENED_MAGNET: ("back_emf_error",)}
-"""Names under which a library may know an effect as well."""
 WHOLE_MACHINE = ("payload", "base_tilt")
 BEFORE_THE_DRIVE = ("wrong_gain", "lost_set_points")
 """Effects that show only against a controller that is known."""
@@ -97,7 +95,7 @@ def joints_of(rig: Rig, name: str) -> tuple[int | None, ...]:
 
 def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float]) -> Rig:
     """The rig with an effect in it; sizes are fields of `parameters.JOINT`, or of the bodies."""
-    hidden = Hidden(name, joint, law, size, name not in OPEN, ALSO_KNOWN_AS.get(name, ()))
+    hidden = Hidden(name, joint, law, size, name not in OPEN)
     changed, bodies = rig.joints.copy(), rig.bodies
     if joint is None:
         bodies = _changed_bodies(bodies, name, 0, size)

@@ -44,7 +44,6 @@ class Hidden:
     law: int
     sizes: dict[str, float]
     in_library: bool = True
-    also_known_as: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -153,7 +153,7 @@ def answered(verdict: str, *steps: tuple[str, list[int], list[str]]) -> dict[str
 
 
 def truth(case: str, *hidden: tuple[str, int], sharp: dict[str, float] | None = None) -> dict[str, object]:
-    made = [{"name": n, "joint": j, "also_known_as": []} for n, j in hidden]
+    made = [{"name": n, "joint": j} for n, j in hidden]
     rivals = [{"name": n, "d_prime": d} for n, d in (sharp or {}).items()]
     return {"case": case, "hidden": made, **({"sharpness": rivals} if sharp else {})}
 

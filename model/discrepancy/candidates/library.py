@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from model import layout as at
-from model.effects.effect import Tone
+from model.effects.effect import JointScale, Tone
 from model.effects.library import effect, library
+from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -32,6 +34,8 @@ SMALL = 0.002
 """The one trial size, in expected deviations, of all other effects: a proportional response gives the size by itself.
 It is small because an effect that acts like a tolerance parameter differs from it only by the cost of that parameter's
 prior, which a curved response would hide."""
+NO_SCALES: Mapping[int, JointScale] = MappingProxyType({})
+"""Every joint's natural sizes are those of the machine file."""
 STICTION_SPEED = 0.045
 """Speed that separates stiction from Stribeck friction, rad/s: friction that falls below it counts as stiction. At 20
 ms and 12 bits the joint moves there by less than a count per sample, so that no reading shows the fall."""
@@ -71,14 +75,18 @@ class Hypothesis:
 
 
 def hypotheses(
-    model: Model, effects: Sequence[str] | None = None, joints: Sequence[int] | None = None
+    model: Model,
+    effects: Sequence[str] | None = None,
+    joints: Sequence[int] | None = None,
+    scales: Mapping[int, JointScale] = NO_SCALES,
 ) -> tuple[Hypothesis, ...]:
     """Every effect that the model could take, except those that a spectrum finds.
 
     Raises SpecError for unknown names, and for joints that are not modelled.
 
     Args:
-        effects: names; None for the whole library. joints: only on these; None for all.
+        effects: names; None for the whole library. joints: only on these; None for all. scales: natural sizes of joints
+            (from 1) that the records tell better than the machine file.
     """
     names = tuple(library()) if effects is None else tuple(effect(name).name for name in effects)
     found: list[Hypothesis] = []
@@ -87,18 +95,36 @@ def hypotheses(
             continue
         places = ((),) if effect(name).whole_machine else tuple((j,) for j in joints or model.machine.modelled_joints)
         for place in places:
-            found.extend(_variants(_Place(model, name, place, name)))
+            if place and not suits_drive(model.machine, name, place[0]):
+                continue
+            found.extend(_variants(_Place(model, name, place, name, scales)))
     return tuple(found)
 
 
-def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Hypothesis | None:
-    """A hypothesis with a frequency that a spectrum has proposed. values: by the part of the effect."""
-    return _hypothesis(_Place(model, name, (joint,), name), (dict(values),))
+def tone(
+    model: Model,
+    name: str,
+    joint: int,
+    values: Mapping[str, float],
+    slowest: float,
+    scales: Mapping[int, JointScale] = NO_SCALES,
+) -> Hypothesis | None:
+    """A hypothesis with a rate that a spectrum has proposed. values: by the part of the effect.
+
+    slowest: the least rate that was looked at. A fit may not go below it: part of a slow wave repeats nothing, and is
+    as good as a spring.
+    """
+    over = effect(name).tone
+    assert over is not None
+    bounds = {over.value: (slowest, math.inf)}
+    return _hypothesis(_Place(model, name, (joint,), name, scales), (dict(values),), bounds=bounds)
 
 
-def law_on(model: Model, name: str, joints: Sequence[int]) -> Hypothesis | None:
+def law_on(
+    model: Model, name: str, joints: Sequence[int], scales: Mapping[int, JointScale] = NO_SCALES
+) -> Hypothesis | None:
     """A hypothesis without trials, for a fit that begins elsewhere; None where the model has no room for it."""
-    return _hypothesis(_Place(model, name, tuple(joints), name), ())
+    return _hypothesis(_Place(model, name, tuple(joints), name, scales), ())
 
 
 def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, float]) -> Hypothesis | None:
@@ -109,17 +135,33 @@ def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, fl
     bounds = {name: own for c in alike for name, own in c.bounds.items()}
     place = _Place(model, first.name, joints, first.free[0].effect or first.name)
     found = _hypothesis(place, (dict(values),), bounds=bounds)
-    return found if found is not None and {j for p in found.free for j in p.joints} >= set(joints) else None
+    if found is None or not {j for p in found.free for j in p.joints} >= set(joints):
+        return None
+    own = {p.name: p for c in alike for p in c.free}
+    return replace(found, free=tuple(own.get(p.name, p) for p in found.free))
 
 
 @dataclass(frozen=True)
 class _Place:
-    """An effect on joints of a model. law: the effect whose law is simulated, because a name may stand for two."""
+    """An effect on joints of a model. law: the effect whose law is simulated, because a name may stand for two. scales:
+    natural sizes of joints that are known better than from the machine file."""
 
     model: Model
     name: str
     joints: tuple[int, ...]
     law: str
+    scales: Mapping[int, JointScale] = field(default_factory=dict)
+
+    def sized(self, free: Sequence[Parameter]) -> tuple[Parameter, ...]:
+        """Parameters of the law, with bounds and deviations that suit those sizes."""
+        if not set(self.joints) & set(self.scales):
+            return tuple(free)
+        own = effect_parameters(self.model.machine, self.law, self.joints, shared=False, scales=self.scales)
+        known = {p.name: p for p in own}
+        return tuple(
+            replace(p, low=q.low, high=q.high, deviation=q.deviation) if (q := known.get(p.name)) is not None else p
+            for p in free
+        )
 
     def has_law(self, effect: str | None, joints: Sequence[int]) -> bool:
         """Whether an effect on joints is this law, here."""
@@ -197,6 +239,7 @@ def _hypothesis(
         free = tuple(p for p in wider.parameters if p.name not in place.model.by_name)
     if place.law == "potentiometer_nonlinearity":
         free = tuple(p for p in free if p.part in FREED_BENDS)
+    free = place.sized(free)
     full = tuple(_full(free, trial) for trial in trials)
     return Hypothesis(place.name, place.joints, wider, free, full, proportional, _full_bounds(free, bounds))
 

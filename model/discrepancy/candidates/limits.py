@@ -61,7 +61,7 @@ def _as_other_law(current: Fit, found: CandidateFit) -> CandidateFit | None:
     """The law that a fit is at its limit, fitted from where that has ended; None where it cannot be."""
     limit, point = LIMITS[found.hypothesis.name], found.fit.point
     joints, before = found.hypothesis.joints, current.point
-    hypothesis = law_on(before.model, limit.other, joints)
+    hypothesis = law_on(before.model, limit.other, joints, before.observation.scales)
     if hypothesis is None:
         return None
     parts = dict(limit.parts)

@@ -143,8 +143,21 @@ def _best_trial(point: Point, clear: Projection, reference: Sequence[Floats], hy
         start, stretch = _stretched(point, hypothesis, trial, stretch)
         gain = float(2 * stretch * products[k] - stretch**2 * squares[k])
         if best is None or gain > best.gain:
-            best = Probe(hypothesis, gain, start, clear.moves(stretch * responses[k]), responses[k])
+            moved = clear.moves(stretch * responses[k])
+            best = Probe(hypothesis, gain, _without_pull(hypothesis, held, start, moved), moved, responses[k])
     return best
+
+
+def _without_pull(
+    hypothesis: Hypothesis, held: Mapping[str, int], start: dict[str, float], moved: Floats
+) -> dict[str, float]:
+    """The start as a fit counts it. The trial lies beside the parameter that its prior holds, which moves back as
+    `moved` (p,) says; a fit has one parameter for both."""
+    found = dict(start)
+    for p in hypothesis.main:
+        if p.name in found and p.name in held:
+            found[p.name] = float(np.clip(found[p.name] + moved[held[p.name]], p.low, p.high))
+    return found
 
 
 def _along_tangents(point: Point, held: Mapping[str, int], trials: Sequence[dict[str, float]]) -> Floats:

@@ -81,7 +81,7 @@ def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe
     free = {u.name for u in point.unknowns if u.deviation is None}
     every = [
         h
-        for h in hypotheses(point.model, options.effects, options.joints)
+        for h in hypotheses(point.model, options.effects, options.joints, point.observation.scales)
         if h.name not in case.excluded and not {p.name for p in h.main} <= free  # what has been added is free already
     ]
     every = keep_promising(point, every, earlier, REMEMBERED * thresholds.interesting)

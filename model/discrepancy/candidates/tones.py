@@ -17,6 +17,7 @@ from scipy.fft import fft, ifft, next_fast_len
 from model.arrays import Floats
 from model.discrepancy.candidates.library import Hypothesis, tone
 from model.discrepancy.candidates.probing import Probe, Projection, projection
+from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
 from model.discrepancy.output_error.search import Point
 from model.discrepancy.output_error.thinning import LEAST_PERIOD
@@ -92,6 +93,13 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
         return np.zeros(0)
     span = high - low
     return np.linspace(low, high, int(max(2.0, min(span / step, max(MOST_TONES, math.ceil(span / alike) + 1)))))
+
+
+def _of_the_excitation(rates: Floats, observation: Observation) -> NDArray[np.bool_]:
+    """Which frequencies, (k,), are those of the motion that was asked for; of the motion itself without set points."""
+    asked = [r.inputs.set_points if r.inputs.has_set_points else r.measured for r in observation.records]
+    speeds = [np.diff(positions, axis=0) for positions in asked]
+    return own_frequencies(rates, speeds, observation.records[0].inputs.period)
 
 
 def _most_moving(observation: Observation, joint: int) -> int | None:
@@ -243,6 +251,8 @@ def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: in
     observation = point.observation
     column = point.model.machine.modelled_joints.index(joint)
     rates, every = rates_tried(observation, name, joint), _samples_together(observation)
+    if over is Tone.OVER_TIME:
+        rates = rates[~_of_the_excitation(rates, observation)]
     few, n = _of_means(clear, observation, every), len(observation.deviations)
     columns = np.arange(column, len(few.residual), n)
     best, shown = None, np.zeros_like(point.weighted)
@@ -259,7 +269,8 @@ def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: in
     if best is None:
         return None
     gain, in_sine, in_cosine, rate = best
-    found = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, over: rate})
+    sizes = {"sine": in_sine, "cosine": in_cosine, over.value: rate}
+    found = tone(point.model, name, joint, sizes, float(rates[0]), observation.scales)
     return None if found is None else Probe(found, gain, found.trials[0], clear.moves(shown), shown)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from daq.contracts.effects import effect_names
+from daq.contracts.effects import FORMER_EFFECTS, effect_names
 from model.discrepancy.diagnosis import FoundValue
 from model.effects.library import effect as effect_of
+from model.effects.names import effect_name
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ WORDS: dict[str, EffectWords] = {
     "stribeck_friction": EffectWords("Stribeck friction", "torque"),
     "stiction": EffectWords("stiction", "breakaway"),
     "direction_dependent_friction": EffectWords("friction that depends on the direction", "difference"),
-    "back_emf_error": EffectWords("a back-EMF constant off its data sheet", "relative"),
+    "weakened_magnet": EffectWords("a motor whose magnet has weakened", "loss"),
     "resistance_drift": EffectWords("a winding that warms", "heating"),
     "motor_inductance": EffectWords("motor inductance", "inductance"),
     "dead_zone": EffectWords("a dead zone of the amplifier", "width"),
@@ -56,7 +57,7 @@ IN_TORQUES = {
     "stribeck_friction": "a {torque} against slow motion fades as the joint gets faster",
     "stiction": "more {torque} is needed to set the joint in motion than to keep it moving",
     "direction_dependent_friction": "motion one way takes more {torque} than the other way",
-    "back_emf_error": "the drive lacks {torque} in proportion to speed, as with a larger back-EMF",
+    "weakened_magnet": "the drive gives less {torque} for the same volts, and brakes less with speed",
     "resistance_drift": "the drive gives less {torque} the longer and harder it has worked",
     "motor_inductance": "{torque} follows the drive with a lag that dies out exponentially",
     "dead_zone": "a constant part of the drive has no effect, whether the drive is large or small",
@@ -86,8 +87,9 @@ def words_of(effect: str) -> EffectWords:
     """The entry of an effect; of the user's own effects, its identifier in words."""
     if effect in WORDS:
         return WORDS[effect]
-    called = effect.replace("_", " ")
-    return EffectWords(called if effect in effect_names() else f"{called} (an effect of the user's own)", None)
+    called = effect_name(effect)
+    shared = effect in effect_names() or effect in FORMER_EFFECTS
+    return EffectWords(called if shared else f"{called} (an effect of the user's own)", None)
 
 
 def size_of(effect: str, parameters: Mapping[str, FoundValue], joint: int = 0) -> FoundValue | None:

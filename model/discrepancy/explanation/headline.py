@@ -19,7 +19,8 @@ def headline(found: Diagnosis) -> str:
         if any(s.effect is not None for s in found.steps):
             return "nothing that the held-out traces confirm"
         return "the model explains these traces within their noise and its tolerances"
-    findings = [_group(s) if s.group else _finding(s) for s in found.steps if s.adopted]
+    shown = [s for s in found.steps if s.adopted and (s.main_joints or not s.joints)]
+    findings = [_group(s) if s.group else _finding(s) for s in shown]
     if found.verdict == "unknown-effect":
         findings.append("none of the known effects explains what is left")
     return "; ".join(findings) or "several effects that these traces cannot tell apart"
@@ -35,5 +36,9 @@ def _group(step: Step) -> str:
 def _finding(step: Step) -> str:
     effect = step.effect or ""
     part = words_of(effect).size
-    sizes = [size_words(v) for v in step.parameters.values() if v.part == part]
-    return ", ".join((effect_on(effect, step.joints), *sizes))
+    sizes = [
+        size_words(v)
+        for v in step.parameters.values()
+        if v.part == part and not (v.joints and set(v.joints) <= set(step.slight_joints))
+    ]
+    return ", ".join((effect_on(effect, step.main_joints), *sizes))

@@ -251,7 +251,7 @@ PATTERNS: dict[str, tuple[FindPattern, ...]] = {
     "stribeck_friction": (lags_when_slow, lags_alike),
     "stiction": (sticks, stops_short, lags_when_slow),
     "direction_dependent_friction": (lags_one_way,),
-    "back_emf_error": (lags_with_speed,),
+    "weakened_magnet": (lags_under_drive, goes_with_weight, lags_with_speed),
     "resistance_drift": (grows_with_time, lags_under_drive),
     "motor_inductance": (late_at_changes,),
     "dead_zone": (lags_alike, stops_short, lags_when_slow),

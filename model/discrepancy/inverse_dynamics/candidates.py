@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from daq.contracts.machine import DcMotor, NoController
+from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
+from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
@@ -17,6 +18,7 @@ from model.effects.library import library
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
+from model.machine_model.effect_parameters import suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -24,7 +26,6 @@ Start = dict[str, float]
 
 UNSEEN = "damping"
 """Part of an effect that torques do not show: a transmission's damping acts in its vibration, above every cutoff."""
-MOTOR_EFFECTS = ("back_emf_error", "resistance_drift", "motor_inductance")
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
@@ -156,11 +157,12 @@ def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
     falls = any(model.machine.gravity)
     if not joints:
         return effect.name != "base_tilt" or falls
+    if not suits_drive(model.machine, effect.name, joints[0]):
+        return False
     joint, row = model.machine.joint(joints[0]), at.slot(joints[0], 0)
     needs = {
         "centre_of_mass": model.vector[row + at.A] != 0.0,
         "load_dependent_friction": falls,
-        **dict.fromkeys(MOTOR_EFFECTS, isinstance(joint.drive, DcMotor)),
         **dict.fromkeys(
             SENSOR_EFFECTS,
             joint.sensor is not None and joint.sensor.measures == "position" and joint.sensor.linearity is not None,
@@ -262,6 +264,7 @@ def _ripple(place: _Place) -> Iterator[Start]:
 def _disturbance(place: _Place) -> Iterator[Start]:
     longest = max(float(np.ptp(r.time)) for r in place.records)
     grid = _scanned(max(0.05, 2 / longest), 0.8 * place.records[0].cutoff, 0.4 / longest)
+    grid = grid[~own_frequencies(grid, [r.speed for r in place.records], place.records[0].period)]
     for rate in _peaks(2 * np.pi * grid, [r.time[r.rows] for r in place.records], place):
         yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi)}
 

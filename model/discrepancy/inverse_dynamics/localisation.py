@@ -61,7 +61,7 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
     model, records, residual, floor = now.balance.model, now.balance.records, now.residual, case.noise
     cells: list[PhaseCell] = []
     dependences: list[Dependence] = []
-    worst: tuple[float, int, Phase] | None = None
+    places: list[WorstPlace] = []
     for j, joint in enumerate(model.machine.modelled_joints):
         pieces = case.stretches.of_joint(residual, j)
         if not pieces:
@@ -93,16 +93,20 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
         dependences += [_dependence(joint, a, b, u) for a, b, u in _bins(now, case, j)]
         phase = max(squares, key=lambda p: squares[p])
         relative = float(np.sqrt(np.mean(np.concatenate(pieces) ** 2))) / floor[j]
-        if worst is None or relative > worst[0]:
-            worst = relative, joint, phase
-    if worst is None:
+        rms, unit = relative * floor[j], torque_unit(model, joint)
+        places.append(WorstPlace(joint=joint, phase=phase, ratio=relative, rms=rms, unit=unit, whole_record=True))
+    if not places:
         return Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=())
-    ratio, joint, where = worst
-    unit = torque_unit(model, joint)
-    rms = ratio * floor[model.machine.modelled_joints.index(joint)]
-    place = WorstPlace(joint=joint, phase=where, ratio=ratio, rms=rms, unit=unit, whole_record=True)
+    worst = max(places, key=lambda p: p.ratio)
+    largest = max((p for p in places if p.unit == worst.unit), key=lambda p: p.rms or 0.0)
     return Where(
-        joint=joint, phase=where, summary=UNWRITTEN, cells=tuple(cells), dependences=tuple(dependences), worst=place
+        joint=worst.joint,
+        phase=worst.phase,
+        summary=UNWRITTEN,
+        cells=tuple(cells),
+        dependences=tuple(dependences),
+        worst=worst,
+        largest=None if largest is worst else largest,
     )
 
 

@@ -13,25 +13,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import Machine, SampledPid
+from daq.contracts.machine import Machine, PlainGain, SampledPid
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
-from model.effects.effect import Tone
+from model.effects.effect import JointScale, Tone
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
+from model.inverse_dynamics.recorded_sizes import as_driven
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
 from model.simulation.batch import BatchRun
@@ -80,6 +81,8 @@ BATCH = 64
 AT_ONCE = 2
 """Fits that run at the same time. Fixed, not the core count: the batch size affects which candidates are fitted, and
 results must not depend on the machine."""
+FAST = 0.99
+"""Quantile of a joint's speed from reading to reading that it is said to reach: single readings are noise."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,8 @@ class Observation:
 
     records: inputs of the simulations and what was measured. deviations: (n,) rad, noise and rounding of one reading.
     unit: (n,) rad per count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
-    with the share of the recorded readings that the simulated controller is given.
+    with the share of the recorded readings that the simulated controller is given. scales: natural sizes, from the
+    records, of joints (from 1) whose file does not say how far they are driven.
     """
 
     machine: Machine
@@ -96,6 +100,7 @@ class Observation:
     deviations: Floats
     unit: Floats
     prepared: tuple[Prepared, ...]
+    scales: Mapping[int, JointScale] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:
@@ -311,8 +316,23 @@ def observe(
     unknowns = tuple(
         _sudden_friction(_loose_start(_even_bend(_as_given(u, given), problem.model))) for u in problem.unknowns
     )
-    observation = Observation(model.machine, problem.records, problem.floor, unit, prepared)
+    scales = _recorded_scales(model, problem.records)
+    observation = Observation(model.machine, problem.records, problem.floor, unit, prepared, scales)
     return observation, Calibration(problem.model, unknowns, np.array([u.start for u in unknowns]))
+
+
+def _recorded_scales(model: Model, records: Sequence[Record]) -> dict[int, JointScale]:
+    """Natural sizes, by joint, of drives that are plain gains: sizes that followed from the file alone would be others
+    in every unit of the drive."""
+    found = {}
+    for column, joint in enumerate(model.machine.modelled_joints):
+        driven = [r.inputs.drive[:, column] for r in records if r.inputs.has_drive]
+        if not driven or not isinstance(model.machine.joint(joint).drive, PlainGain):
+            continue
+        steps = [np.abs(np.diff(r.inputs.readings[:, column])) / r.inputs.period for r in records]
+        speed = float(np.nanquantile(np.concatenate(steps), FAST))
+        found[joint] = as_driven(model, column, np.concatenate(driven), speed)
+    return found
 
 
 def _drive_is_input(machine: Machine, record: Record) -> bool:

@@ -41,6 +41,7 @@ from model.discrepancy.output_error.search import Point, converge, descend, poin
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
+from model.discrepancy.slight_joints import with_slight_joints
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown
@@ -228,6 +229,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
     if answered == "unknown-effect":
         found = _withdraw(found, joints)
     current, steps = update_to_last_fit(found.current, found.steps)
+    steps = with_slight_joints(steps, case.model, current.point.fitted_model)
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
     remaining = case.remaining(end) if answered == "unknown-effect" else ()

@@ -54,6 +54,8 @@ def test_all_but_the_ramp_end_where_they_began(name: str) -> None:
         ("diagnostic-c", ((0.0, 9.0), (-9.0, 0.0), (0.0, 9.0))),
         ("diagnostic-d", ((-7.5, 30.0), (-7.5, 30.0), (-7.5, 30.0))),
         ("diagnostic-e", ((0.0, 61.6), (0.0, 56.6), (-50.0, 0.0))),
+        ("pseudo-random", ((-3.0, 3.0), (-3.0, 3.0), (-3.0, 3.0))),
+        ("sweep", ((-120.0, 120.0), (-60.0, 150.0), (-120.0, 120.0))),
         ("held-out", ((-25.0, 9.73), (-8.0, 25.0), (-12.0, 35.0))),
     ],
 )
@@ -94,6 +96,15 @@ def test_part_e_is_at_another_posture() -> None:
     plan = made("diagnostic-e")
     middle = plan.angles[len(plan) // 2, :3] - plan.angles[0, :3]
     assert (np.abs(middle) > math.radians(25)).all()
+
+
+def test_pseudo_random_steps_are_fast_and_differ_from_joint_to_joint() -> None:
+    motion = made("pseudo-random").angles[25:-50, :3] - made("pseudo-random").angles[0, :3]
+    signs = np.sign(motion)
+    assert np.abs(np.corrcoef(signs.T) - np.eye(3)).max() < 0.1
+    changes = np.flatnonzero(np.diff(signs[:, 0]) != 0)
+    assert np.diff(changes).min() == 4, "80 ms of 20 ms each"
+    assert made("pseudo-random").duration == pytest.approx(22, abs=0.5)
 
 
 def test_an_unknown_preset_is_refused_with_the_names_there_are() -> None:

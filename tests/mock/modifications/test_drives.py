@@ -12,14 +12,13 @@ from mock_controller.plant import default_plant
 from tests.mock.modifications.steady import STRETCHED, effect, plant_with, steady_rate, without_friction
 
 
-def test_back_emf_sets_the_speed_at_which_a_motor_settles() -> None:
+def test_a_weak_magnet_gives_a_faster_motor_with_less_torque() -> None:
     joint = default_plant().joints[0]
     plain = plant_with(parameters=without_friction())
-    slow = plant_with(effect("back_emf_error", joint=1, factor=1.5), parameters=without_friction())
-    electrical = joint.torque_constant * joint.back_emf_constant / joint.resistance
-    expected = (1.5 * electrical + joint.viscous_friction) / (electrical + joint.viscous_friction)
-    assert steady_rate(plain, 1, 0.5) / steady_rate(slow, 1, 0.5) == pytest.approx(expected, rel=1e-3)
-    assert slow.parameters.joints[0].torque_constant == joint.torque_constant
+    weak = plant_with(effect("weakened_magnet", joint=1, loss=0.4), parameters=without_friction())
+    electrical, flux = joint.torque_constant * joint.back_emf_constant / joint.resistance, 0.6
+    damping = (flux**2 * electrical + joint.viscous_friction) / (electrical + joint.viscous_friction)
+    assert steady_rate(weak, 1, 0.5) / steady_rate(plain, 1, 0.5) == pytest.approx(flux / damping, rel=1e-3)
 
 
 def test_inductance_delays_the_torque_and_changes_nothing_in_the_end() -> None:

@@ -49,9 +49,10 @@ class OutsideArm:
     """Numbers of one arm, in SI units.
 
     Args:
-        load: kg at the end, which the machine file does not know. load_share: share of the gravity torque that rubs.
-        dead_zone: V. stiffness: N·m/rad of a spring to the posture 0. resolution, limit: of the controller's output, V.
-        factor: of the controller's gains. lost: share of the set points that it does not get.
+        load: kg at the end, unknown to the machine file. load_share: share of the gravity torque that rubs.
+        dead_zone: V. stiffness: N·m/rad of a spring to posture 0. resolution, limit: of the controller's output, V.
+        flux: share that magnets still have. factor: of the controller's gains. lost: share of its set points that it
+        does not get.
     """
 
     mass: Floats = field(default_factory=lambda: np.array([18.0, *MASSES]))
@@ -64,6 +65,7 @@ class OutsideArm:
     dead_zone: Floats = field(default_factory=lambda: np.zeros(3))
     stiffness: Floats = field(default_factory=lambda: np.zeros(3))
     back_emf: Floats = field(default_factory=lambda: np.full(3, BACK_EMF))
+    flux: Floats = field(default_factory=lambda: np.ones(3))
     resolution: float = RESOLUTION
     limit: float = LIMIT
     factor: Floats = field(default_factory=lambda: np.ones(3))
@@ -124,12 +126,15 @@ def record(arm: OutsideArm, seed: int, duration: float = 17.0) -> Trace:
         used[k] = np.where(losses[k], used[k - 1], used[k])
     position, drive = np.zeros_like(used), np.zeros_like(used)
     dynamics = np.concatenate(
-        [arm.mass, arm.viscous, arm.coulomb, arm.resistance, arm.load_share, arm.dead_zone, arm.stiffness, arm.back_emf]
+        [
+            *(arm.mass, arm.viscous, arm.coulomb, arm.resistance, arm.load_share, arm.dead_zone, arm.stiffness),
+            *(arm.back_emf, arm.flux),
+        ]
     )
     _run(
         used,
         noise,
-        dynamics.reshape(8, 3),
+        dynamics.reshape(9, 3),
         np.array([arm.delay, arm.load, arm.resolution, arm.limit, arm.period]),
         arm.factor,
         position,
@@ -207,8 +212,8 @@ def _rates(q: Floats, v: Floats, volts: Floats, p: Floats, load: float, stuck: F
     for j in range(3):
         u = volts[j]
         u = u - p[5, j] if u > p[5, j] else (u + p[5, j] if u < -p[5, j] else 0.0)
-        gain = gears[j] * 0.055 / p[3, j]
-        torque[j] = gain * (u - p[7, j] * gears[j] * v[j]) - p[1, j] * gears[j] ** 2 * v[j] - p[6, j] * q[j]
+        gain = gears[j] * p[8, j] * 0.055 / p[3, j]
+        torque[j] = gain * (u - p[8, j] * p[7, j] * gears[j] * v[j]) - p[1, j] * gears[j] ** 2 * v[j] - p[6, j] * q[j]
         torque[j] -= bias[j] + weight[j]
         level[j] = p[2, j] + p[4, j] * abs(weight[j])
     held = stuck.copy()
@@ -250,7 +255,7 @@ def _run(
     volts, stuck, last = np.zeros(3), np.ones(3), np.zeros(3)
     gears = (90.0, 110.0, 80.0)
     for j in range(3):
-        volts[j] = weight[j] * p[3, j] / (gears[j] * 0.055)
+        volts[j] = weight[j] * p[3, j] / (gears[j] * p[8, j] * 0.055)
         if abs(weight[j]) <= p[2, j]:
             volts[j] = 0.0
         q[j] -= volts[j] / gains_p[j]

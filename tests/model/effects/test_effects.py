@@ -11,6 +11,7 @@ from daq.contracts.machine import load_machine
 from model import layout as at
 from model.effects.library import library
 from model.machine_model.model import Model, base_model
+from model.machine_model.model_file import model_of
 from model.simulation.inputs import RunInputs
 from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, simulate
@@ -69,6 +70,25 @@ def test_at_its_expected_size_an_effect_moves_the_arm_or_its_reading(
     difference = np.abs(run(changed, inputs).reading - run(model, inputs).reading).max()
     # the shoulder's gear hides its load; heating of a short record is slight
     assert difference > (2e-5 if name in ("resistance_drift", "supply_limit", "centre_of_mass") else 2e-4)
+
+
+def test_a_weakened_magnet_takes_more_volts_to_hold_a_load(model: Model) -> None:
+    """A joint at rest has no back-EMF and no viscous friction: what is missing there is torque."""
+    rest, joint = ramp_inputs(model.machine), 2
+    sound, weak = (
+        run(with_(model, "weakened_magnet", joint, loss=loss), rest).power[-20:, joint - 1].mean()
+        for loss in (0.0, 0.3)
+    )
+    assert 0.7 * weak == pytest.approx(sound, rel=0.1)
+
+
+def test_a_back_emf_constant_that_changes_alone_is_refused_in_one_line(model: Model) -> None:
+    """Also from a saved model, which has the effect by its old name."""
+    with pytest.raises(SpecError, match=r"back_emf_error: no longer in the library: .* one magnet; .* weakened_magnet"):
+        model.with_effect("back_emf_error", (1,))
+    saved = model.model_dump(mode="json") | {"effects": [{"name": "back_emf_error", "joints": [1]}]}
+    with pytest.raises(SpecError, match=r"effect back_emf_error: no longer"):
+        model_of(saved, "old.json")
 
 
 def test_unknown_names_are_refused_in_one_line(model: Model) -> None:

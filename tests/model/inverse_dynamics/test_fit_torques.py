@@ -123,8 +123,8 @@ def test_effects_that_torques_cannot_show_are_refused_by_name(name: str) -> None
         fit_torques(rod().with_effect(name, (1,)), [swinging(1)], [], OPTIONS)
 
 
-OF_A_MOTOR = {"back_emf_error", "supply_limit"}
-"""The rod's drive is a plain gain: it has neither back-EMF nor a limit."""
+OF_A_MOTOR = {"supply_limit"}
+"""The rod's drive is a plain gain: it has no limit."""
 
 
 @pytest.mark.parametrize("name", sorted(set(library()) - set(NOT_IN_TORQUES) - OF_A_MOTOR))

@@ -287,8 +287,8 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
             [
                 of("motor.resistance"),
                 of("motor_inductance.inductance", 1.0),
-                of("motor.torque_constant"),
-                of("motor.back_emf_constant") * (1 + of("back_emf_error.relative")),
+                of("motor.torque_constant") * (1 - of("weakened_magnet.loss")),
+                of("motor.back_emf_constant") * (1 - of("weakened_magnet.loss")),
                 of("motor.rotor_inertia"),
                 drive.gear_ratio.value,
                 of("resistance_drift.heating"),

@@ -47,7 +47,7 @@ CASES = (
     _of("stribeck_friction", "torque", (1.4, 2.4, 0.6), 2, speed=0.2),
     _of("stiction", "breakaway", (3.0, 3.6, 1.7), 2),
     _of("direction_dependent_friction", "difference", (0.6, 2.7, 0.7), 3),
-    _of("back_emf_error", "relative", (0.5, 0.4, 0.5), 1),
+    _of("weakened_magnet", "loss", (0.2, 0.2, 0.2), 1),
     _of("resistance_drift", "heating", (0.2, 0.05, 0.2), 2, time_constant=10.0),
     _of("motor_inductance", "inductance", (0.017, 0.042, 0.014), 1),
     _of("dead_zone", "width", (0.5, 0.7, 0.5), 3),

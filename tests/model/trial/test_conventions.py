@@ -31,7 +31,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "load_dependent_friction": (2, {"arm": 0.6}),
     "stribeck_friction": (1, {"torque": 5.0, "speed": 0.2}),
     "direction_dependent_friction": (3, {"torque": -3.0}),
-    "back_emf_error": (2, {"factor": 1.5}),
+    "weakened_magnet": (2, {"loss": 0.3}),
     "motor_inductance": (3, {"inductance": 0.03}),
     "dead_zone": (1, {"width": 2.0}),
     "supply_limit": (2, {"reduction": 12.0}),

@@ -56,8 +56,8 @@ def test_a_wrong_model_lies_above_its_noise_floor() -> None:
 def test_where_the_model_cannot_be_simulated_the_floor_is_that_of_the_readings_and_is_said_to_be() -> None:
     """A joint that its spring drives away faster than the motor can hold it, for as long as numbers last."""
     model, trace = arm(), multisine_trace(arm(), 60.0)
-    model = model.with_effect("spring_torque", (1,), {"stiffness": -80.0}).with_effect("back_emf_error", (1,))
-    model = model.with_values({"joint1.back_emf_error.relative": -0.95})
+    model = model.with_effect("spring_torque", (1,), {"stiffness": -80.0})
+    model = model.with_effect("weakened_magnet", (1,), {"loss": 0.95})
     seen = smooth(model, trace)
     floor, simulated = noise_floor(model, trace, seen)
     assert not simulated

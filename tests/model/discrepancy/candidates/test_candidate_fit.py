@@ -49,12 +49,24 @@ def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pyt
     arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
     given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     before = judge(converge(given, 4))
-    (found,) = probe(before.point, hypotheses(before.point.model, ("back_emf_error",), (2,)))
+    (found,) = probe(before.point, hypotheses(before.point.model, ("viscous_friction",), (2,)))
     counted = counting(monkeypatch)
     assert refit(before, found) is not None
     with_time, counted[:] = len(counted), []
     refit(before, found, goal=1.0)
     assert 0 < len(counted) < 0.7 * with_time
+
+
+def test_a_probe_that_lifts_a_prior_begins_near_where_its_fit_ends() -> None:
+    """Not further off by what the prior had pulled the number back."""
+    stated = imagined.arm().parameter("joint2.viscous_friction.coefficient")
+    arm = imagined.arm().with_values({stated.name: stated.value + 8 * (stated.deviation or 0.0)})
+    before = judge(converge(point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])), 4))
+    (found,) = probe(before.point, hypotheses(before.point.model, ("viscous_friction",), (2,)))
+    end = refit(before, found)
+    assert end is not None
+    far = end.fit.point.value(stated.name) - stated.value
+    assert abs(found.start[stated.name] - stated.value - far) < 0.15 * far
 
 
 def test_a_point_has_diverged_where_unlikely_numbers_leave_the_record_unexplained() -> None:

@@ -17,7 +17,7 @@ def test_every_effect_is_tried_on_every_joint() -> None:
     found = {(c.name, c.joints) for c in hypotheses(arm)}
     for name, effect in library().items():
         if name in ("torque_ripple", "periodic_disturbance"):
-            assert all(tone(arm, name, j, {"sine": 0.1, "cosine": 0.0}) is not None for j in (1, 2, 3))
+            assert all(tone(arm, name, j, {"sine": 0.1, "cosine": 0.0}, 0.5) is not None for j in (1, 2, 3))
         elif effect.whole_machine:
             assert (name, ()) in found
         else:

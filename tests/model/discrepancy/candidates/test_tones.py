@@ -44,6 +44,17 @@ def test_a_ripple_is_proposed_at_its_cycles(has_hum: bool) -> None:
     assert np.hypot(*(best.start[f"joint2.torque_ripple.{p}"] for p in ("sine", "cosine"))) == pytest.approx(1, rel=0.5)
 
 
+def test_a_ripple_may_not_become_so_slow_that_it_is_a_spring() -> None:
+    """A spring on a joint is like a part of one slow wave: a wave that is fitted keeps half of itself on the travel."""
+    arm = imagined.arm().with_effect("spring_torque", (2,), {"stiffness": 8.0})
+    point = seen(arm, imagined.arm())
+    found = next(p for p in propose_tones(point, (2,)) if p.hypothesis.name == "torque_ripple")
+    travel = float(np.ptp(point.observation.records[0].measured[:, 1]))
+    low, _ = found.hypothesis.bounds["joint2.torque_ripple.cycles"]
+    assert low == pytest.approx(np.pi / travel, rel=1e-6)
+    assert found.start["joint2.torque_ripple.cycles"] >= low
+
+
 def test_tones_of_a_fast_record_are_those_that_all_of_its_samples_propose(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is compared with them in means of several samples."""
     point = seen(imagined.arm().with_effect("periodic_disturbance", (2,), HUM), imagined.arm())
@@ -80,7 +91,7 @@ def test_no_disturbance_falls_between_the_tones_that_are_tried(seconds: float) -
     rates = rates_tried(observation, "periodic_disturbance", 1)
     assert np.diff(rates).max() <= 1.0 / seconds + 1e-12
     assert rates[-1] == 8.0
-    hypothesis = tone(imagined.arm(), "periodic_disturbance", 1, {"frequency": 1.0})
+    hypothesis = tone(imagined.arm(), "periodic_disturbance", 1, {"frequency": 1.0}, 0.1)
     assert hypothesis is not None
     assert tones_tried(observation, hypothesis) == max(MOST_TONES, len(rates))
 

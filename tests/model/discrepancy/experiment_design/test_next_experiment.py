@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
 from daq_cli.trial.experiments import trial_experiment
-from model.discrepancy.candidates.candidate_fit import CandidateFit, judge
+from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, refit
 from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
@@ -41,9 +41,10 @@ EXPERIMENTS = {e.name: e for e in offered_experiments()}
 FRICTION = ("coulomb_friction", "stribeck_friction")
 SPEED_LAWS = {
     "viscous_friction": "joint2.viscous_friction.coefficient",
-    "back_emf_error": "joint2.motor.back_emf_constant",
+    "weakened_magnet": "joint2.motor.back_emf_constant",
 }
-"""Effects, and the parameters that stand for them; the size of a torque in proportion to speed."""
+"""Names of two rivals, and the parameter that each frees. Either is a torque in proportion to speed, so no motion tells
+them apart (which a weakened magnet itself is not: it takes K_T with it)."""
 
 
 def plan(spec: ExperimentSpec) -> NDArray[np.float64]:
@@ -131,14 +132,44 @@ def test_candidates_that_no_experiment_separates_are_named_in_a_note() -> None:
     rivals = [speed_law(trace, point, effect) for effect in SPEED_LAWS]
     moved = [r.fit.point.value(SPEED_LAWS[r.hypothesis.name]) for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
-    assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["back_emf_error"]).value
+    assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["weakened_magnet"]).value
     asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), plan))
     assert asked.experiment is None
     assert asked.note is not None
     words = note_words(asked.note)
     assert "no experiment" in words
     assert "viscous friction on joint 2" in words
-    assert "back-EMF error on joint 2" in words
+    assert "weakened magnet on joint 2" in words
+
+
+PAIRS = {
+    "pseudo-random": ("motor_inductance", 1, {"inductance": 0.03}, "input_delay"),
+    "sweep": ("potentiometer_nonlinearity", 3, {"bend_1": 0.03}, "potentiometer_offset"),
+}
+"""Presets, and the effect, joint, size and rival that each is made for."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_preset_separates_the_pair_that_it_is_made_for(name: str) -> None:
+    effect, joint, size, rival = PAIRS[name]
+    trace = record(imagined.arm().with_effect(effect, (joint,), size), trial_experiment("ramp"), 3)
+    point = known(trace)
+    options = DiagnosisOptions(effects=(effect, rival), joints=(joint,))
+    found = rank(build_case(point.model, point, point, [trace], options=options), judge(point), silent, Never())
+    fitted = {f.hypothesis.name: f for f in found.fitted}
+    for probed in found.probed:
+        tried = None if probed.hypothesis.name in fitted else refit(judge(point), probed)
+        if tried is not None:
+            fitted[probed.hypothesis.name] = tried
+    rivals = converge_rivals([fitted[effect], fitted[rival]])
+    predicted = {}
+    for offered in (name, "diagnostic-b", "diagnostic-d", "diagnostic-e"):
+        asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS[offered],), plan))
+        predicted[offered] = 0.0 if asked.experiment is None else asked.experiment.predicted_separation
+    best = predicted.pop(name)
+    assert best > 8
+    assert best > 2 * max(predicted.values())
 
 
 def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_step: Trace) -> None:

@@ -19,11 +19,18 @@ from model.discrepancy.diagnosis import (
     SignalError,
     Step,
     Where,
+    WorstPlace,
 )
 from model.discrepancy.explanation.effect_words import WORDS
 from model.discrepancy.explanation.patterns import PATTERNS
 from model.discrepancy.explanation.reasons import reason
-from model.discrepancy.explanation.renderer import reason_text, step_with_sentences, what_is_left, with_sentences
+from model.discrepancy.explanation.renderer import (
+    reason_text,
+    step_with_sentences,
+    what_is_left,
+    where_with_summary,
+    with_sentences,
+)
 from model.discrepancy.grounds import ControllerProof, Reason, Refusal
 from model.discrepancy.numbers import plain
 from model.discrepancy.verdict import worse_held_out
@@ -41,7 +48,7 @@ SIZES: dict[str, dict[str, float]] = {
     "stribeck_friction": {"torque": 4.0, "speed": 0.05},
     "stiction": {"breakaway": 4.0},
     "direction_dependent_friction": {"difference": 4.0},
-    "back_emf_error": {"relative": 0.3},
+    "weakened_magnet": {"loss": 0.3},
     "resistance_drift": {"heating": 0.05, "time_constant": 60.0},
     "motor_inductance": {"inductance": 0.03},
     "dead_zone": {"width": 1.0},
@@ -364,3 +371,12 @@ def test_a_tolerance_fit_that_held_out_traces_refute_is_warned_of(arm: Model) ->
         " The fit of the tolerance parameters does not hold on held-out traces, where the error of joints 1 and 2 "
         "grows: do not use the model after."
     )
+
+
+def test_the_joint_with_the_largest_torque_left_is_told_beside_the_one_furthest_above_its_noise() -> None:
+    worst = WorstPlace(joint=6, phase="creep", ratio=40.0, rms=8.0, unit="N·m", whole_record=True)
+    largest = WorstPlace(joint=2, phase="hold", ratio=12.0, rms=2000.0, unit="N·m", whole_record=True)
+    where = Where(joint=6, phase="creep", summary="", cells=(), dependences=(), worst=worst)
+    assert where_with_summary(where).summary == "Joint 6, mostly in slow motion: 8 N·m rms, 40 times its noise."
+    both = where_with_summary(where.model_copy(update={"largest": largest}))
+    assert both.summary.endswith("40 times its noise; more is left of joint 2, 2000 N·m rms.")

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from daq.contracts.machine import Machine, PlainGain
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
@@ -15,45 +14,15 @@ from model.fitting.options import FitOptions
 from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.model.discrepancy.units import in_unit, recorded
 
 RUBBING = {"coulomb": 6.0, "viscous": 15.0}
-
-
-def in_unit(machine: Machine, factor: float) -> Machine:
-    """The machine whose drive is recorded in a unit that many times smaller."""
-    joints = []
-    for joint in machine.joints:
-        assert isinstance(joint.drive, PlainGain)
-        gain = joint.drive.gain.model_copy(update={"value": joint.drive.gain.value / factor, "unit": "N/unit"})
-        joints.append(joint.model_copy(update={"drive": joint.drive.model_copy(update={"gain": gain})}))
-    return machine.model_copy(update={"joints": tuple(joints)})
-
-
-def recorded(trace: Trace, factor: float) -> Trace:
-    assert trace.drive is not None
-    return replace(trace, drive=factor * trace.drive)
 
 
 def pushed(trace: Trace, force: float) -> Trace:
     """The same record with a constant force that the drive has to bear."""
     assert trace.drive is not None
     return replace(trace, drive=trace.drive + force)
-
-
-def diagnosed(factor: float) -> Diagnosis:
-    fitted, held = (recorded(rigs.slide_trace(seed, RUBBING, duration=10.0), factor) for seed in (1, 2))
-    return diagnose_torques(base_model(in_unit(rigs.slide_machine(), factor)), [fitted], [held])
-
-
-def test_a_diagnosis_is_the_same_in_every_unit_of_the_drive() -> None:
-    usual, others = diagnosed(1.0), [diagnosed(factor) for factor in (1e-2, 1e3)]
-    assert usual.verdict == "named"
-    for other in others:
-        assert [(s.effect, s.joints) for s in other.steps] == [(s.effect, s.joints) for s in usual.steps]
-        for one, same in zip(usual.steps, other.steps, strict=True):
-            assert same.margin == pytest.approx(one.margin, rel=1e-3)
-            for name, value in one.parameters.items():
-                assert same.parameters[name].value == pytest.approx(value.value, rel=1e-4)
 
 
 def test_a_fit_of_torques_is_the_same_in_every_unit_of_the_drive() -> None:

@@ -39,7 +39,9 @@ def given() -> Point:
 def unstable(point: Point, fails: Callable[[float, Floats], bool]) -> Point:
     """The point on a record whose simulations fail there."""
     own = point.observation
-    return replace(point, observation=Unstable(own.machine, own.records, own.deviations, own.unit, own.prepared, fails))
+    return replace(
+        point, observation=Unstable(own.machine, own.records, own.deviations, own.unit, own.prepared, fails=fails)
+    )
 
 
 def test_the_fit_starts_from_the_given_model_where_the_closed_loop_has_led_to_instability() -> None:

@@ -1922,6 +1922,11 @@ export interface components {
             reason_data?: components["schemas"]["Reason"] | null;
             proof?: components["schemas"]["ControllerProof"] | null;
             refusal?: components["schemas"]["Refusal"] | null;
+            /**
+             * Slight Joints
+             * @default []
+             */
+            slight_joints?: number[];
             /** Called */
             called: string;
             /** Chance */
@@ -5389,7 +5394,8 @@ export interface components {
          * Where
          * @description Where simulation and measurement disagree, for a step before it: a one-line summary, and the numbers behind it.
          *
-         *     `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells.
+         *     `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells. Most is
+         *     by the noise of each joint; in torques, `largest` is the joint with the largest residual, where it is another.
          */
         Where: {
             /** Joint */
@@ -5408,6 +5414,7 @@ export interface components {
              */
             moving?: components["schemas"]["MovingParameter"][];
             worst?: components["schemas"]["WorstPlace"] | null;
+            largest?: components["schemas"]["WorstPlace"] | null;
         };
         /**
          * WorstPlace

@@ -1,0 +1,34 @@
+"""Frequencies of the motion itself: a torque that repeats at one of them may go with the motion, and not with time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from model.arrays import Floats, Mask
+
+LINE = 0.5
+"""Share of a joint's motion, by the variance of its speed, from which a single frequency is the motion's own. A sine
+has all of it in one, a triangle four fifths."""
+PERIODS = 4
+"""Least number of periods in a record: what a short motion repeats less often is no frequency."""
+
+
+def own_frequencies(frequencies: Floats, speeds: Sequence[Floats], period: float) -> Mask:
+    """Which of the frequencies (k,), Hz, are those at which some joint moves in some record.
+
+    A record tells frequencies apart that differ by more than one over its duration, so what lies that near is one line.
+
+    Args:
+        speeds: (m, n) a record, in any unit. period: between their samples, s.
+    """
+    own = np.zeros(len(frequencies), dtype=bool)
+    for speed in speeds:
+        moved = speed - speed.mean(axis=0)
+        power = np.abs(np.fft.rfft(moved, axis=0)) ** 2
+        total = power.sum(axis=0)
+        bins = np.round(frequencies * len(speed) * period).astype(np.int64)
+        line = sum(power[np.clip(bins + shift, 0, len(power) - 1)] for shift in (-1, 0, 1))
+        own |= ((line > LINE * total) & (total > 0)).any(axis=1) & (bins >= PERIODS)
+    return own
