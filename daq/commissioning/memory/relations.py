@@ -1,0 +1,256 @@
+"""How the quantities of one joint give themselves away.
+
+A position is a number of 12 bits that runs without jumps while its joint is led; error + position stays the set point,
+from one switching-on to the next, and right after that the error is next to nothing; a power is the error times P up
+to the limits of 8 bits. Each reading may be torn, and its bytes are up to a few periods apart: so a relation has to
+hold in nearly all readings, with an allowance for what the joint moves meanwhile. What holds with a delay of a period
+is a copy of the period before, and not the quantity itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.commissioning.memory.bytes import Followers
+from daq.commissioning.memory.recording import Pages, Recording, Stage
+from firmware_protocol.units import ADC_COUNTS, counts_to_posture, posture_to_counts
+
+Numbers = NDArray[np.float64]
+
+HOLDS = 0.95
+"""Least share of readings in which a relation must hold; the others may be torn."""
+JUMP = 200.0
+"""Largest change (ADC counts) of a position between two readings: half a control period's worth of a hand that moves a
+joint by its whole range in a second. A wrong high byte makes jumps of 256 or more."""
+LEAST_TRAVEL = 400
+"""Least travel (ADC counts) of a led joint from which its bytes are told apart; 256 are one turn of a low byte."""
+NOISE = 2.5
+"""Largest difference (ADC counts) between two readings of a joint at rest, from noise and rounding."""
+SAME_PERIOD = 0.4
+"""Largest delay, in control periods, of what belongs to the same period; a copy of the period before has a delay of 1."""
+SETTLED = 24
+"""Largest error (ADC counts) right after switching on that agrees with set points that are the measured posture."""
+LEAST_INSIDE = 12
+"""Least number of different errors, inside the limits of a register, by which it is judged."""
+LEAST_GAIN = 0.3
+"""Least ratio of power to error; the adjustable P is a whole number from 1 on."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Offsets of a value's bytes in the page; `high` None for a value of one byte."""
+
+    low: int
+    high: int | None = None
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Position and error of one joint, as one hypothesis. `share` is that of readings in which both agree with one set
+    point, `delay` (s) how far the error lags behind, `fault` what speaks against the hypothesis."""
+
+    position: Place
+    error: Place
+    share: float
+    delay: float
+
+
+@dataclass(frozen=True)
+class PowerFit:
+    """A power of one joint, as a hypothesis: `gain` is DAC counts per ADC count of error, `inside` the number of
+    different errors below the limit."""
+
+    place: Place
+    gain: float
+    share: float
+    delay: float
+    inside: int
+
+
+def position_of(pages: Pages, place: Place) -> Numbers:
+    """Position (ADC counts): 12 bits; the four bits above may be anything."""
+    assert place.high is not None
+    return (pages[:, place.low] + 256.0 * (pages[:, place.high] & 0x0F)).astype(np.float64)
+
+
+def signed_of(pages: Pages, place: Place) -> Numbers:
+    """A signed value of one byte or two."""
+    if place.high is None:
+        return pages[:, place.low].astype(np.int8).astype(np.float64)
+    return (pages[:, place.low] + 256 * pages[:, place.high].astype(np.int16)).astype(np.int16).astype(np.float64)
+
+
+class JointStages:
+    """What one joint did while it was led, in the form that the relations need."""
+
+    def __init__(self, recording: Recording, joint: int) -> None:
+        self.led = recording.led(joint)
+        self.recording = recording
+        self.pages = np.concatenate([stage.pages for stage in self.led])
+        self.times = np.concatenate([stage.times for stage in self.led])
+        self.ends = np.cumsum([len(stage.times) for stage in self.led])[:-1]
+
+    def rate(self, values: Numbers) -> Numbers:
+        """Counts per s at each reading, from the readings around it; 0 at the ends of a stage."""
+        rates = np.zeros_like(values)
+        for part in np.split(np.arange(len(values)), self.ends):
+            if len(part) > 2:
+                inner = part[1:-1]
+                rates[inner] = (values[part[2:]] - values[part[:-2]]) / (self.times[part[2:]] - self.times[part[:-2]])
+        return rates
+
+    def is_smooth(self, values: Numbers) -> bool:
+        """Whether a value travels far enough, and without jumps."""
+        if np.ptp(values) < LEAST_TRAVEL:
+            return False
+        steps = np.concatenate([np.abs(np.diff(part)) for part in np.split(values, self.ends)])
+        return bool(np.mean(steps <= JUMP) >= HOLDS and np.quantile(values, 0.98) - np.quantile(values, 0.02) > 256)
+
+
+def positions(stages: JointStages, follow: Followers) -> list[Place]:
+    """Every pair of bytes that could be a position."""
+    places = (Place(low, high) for low in follow.low for high in follow.high if low != high)
+    return [place for place in places if stages.is_smooth(position_of(stages.pages, place))]
+
+
+def _errors(stages: JointStages, follow: Followers) -> Iterator[Place]:
+    for low in follow.low:
+        for high in follow.high:
+            if low != high and stages.is_smooth(signed_of(stages.pages, Place(low, high))):
+                yield Place(low, high)
+    for low in sorted({*follow.low, *follow.byte}):
+        yield Place(low)
+
+
+def _inside(values: Numbers) -> tuple[NDArray[np.bool_], float, float]:
+    """Which values are not at a limit of their register, and the limits that they reach."""
+    lowest, highest = float(values.min()), float(values.max())
+    return (values > lowest + 2) & (values < highest - 2), lowest, highest
+
+
+def _delay(difference: Numbers, rate: Numbers) -> float:
+    """How far (s) something lags behind, if it differs by `difference` while its quantity changes at `rate`."""
+    moving = np.abs(rate) > 20
+    if moving.sum() < 8:
+        return float("inf")
+    kept = moving & (np.abs(difference) <= 12 + 0.1 * np.abs(rate))
+    squares = float((rate[kept] ** 2).sum())
+    return float((difference[kept] * rate[kept]).sum()) / squares if squares else float("inf")
+
+
+def set_point_counts(stage_pages: Pages, position: Place, error: Place) -> float:
+    """The set point (ADC counts) by error + position, where the error is inside its limits."""
+    e = signed_of(stage_pages, error)
+    total = position_of(stage_pages, position) + e
+    inside = np.abs(e) < 120
+    return float(np.median(total[inside] if inside.sum() >= 3 else total))
+
+
+def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
+    """Every position and error that belong together."""
+    found = []
+    allowance = 1.5 * stages.recording.period_s
+    errors = [(place, signed_of(stages.pages, place)) for place in _errors(stages, follow)]
+    for position in positions(stages, follow):
+        p = position_of(stages.pages, position)
+        rate = stages.rate(p)
+        for error, e in errors:
+            if {error.low, error.high} & {position.low, position.high}:
+                continue
+            inside, lowest, highest = _inside(e)
+            if len(np.unique(e[inside])) < LEAST_INSIDE or lowest > -30 or highest < 30:
+                continue
+            target = float(np.median((p + e)[inside]))
+            expected = np.clip(target - p, lowest, highest)
+            share = float(np.mean(np.abs(e - expected) <= NOISE + allowance * np.abs(rate)))
+            if share < HOLDS or not _settles(stages.recording, position, error):
+                continue
+            delay = _delay((target - p - e)[inside] * -1.0, rate[inside])
+            found.append(Pair(position, error, share, delay))
+    return found
+
+
+def _settles(recording: Recording, position: Place, error: Place) -> bool:
+    """Whether the error is next to nothing right after each switching-on, though the posture differs.
+
+    Without it position and error could be taken for one another.
+    """
+    starts = [stage for stage in recording.stages if stage.kind == "power_up"]
+    if any(abs(float(np.median(signed_of(stage.pages, error)))) > SETTLED for stage in starts):
+        return False
+    postures = [float(np.median(position_of(stage.pages, position))) for stage in starts]
+    return not postures or max(postures) - min(postures) > 4 * SETTLED
+
+
+def _later(stages: JointStages, one: Place, other: Place) -> float:
+    """How far (s) the position `other` lags behind `one`."""
+    a, b = position_of(stages.pages, one), position_of(stages.pages, other)
+    return _delay(a - b, stages.rate(a))
+
+
+def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) -> Pair | None:
+    """The pair of the present period, where all other candidates are older by a period; None where that is unclear."""
+    limit = SAME_PERIOD * period_s
+    current = [pair for pair in candidates if abs(pair.delay) <= limit]
+    newest = [
+        pair
+        for pair in current
+        if all(
+            other.position == pair.position or _later(stages, pair.position, other.position) > limit
+            for other in current
+        )
+    ]
+    return newest[0] if len(newest) == 1 else None
+
+
+def powers(stages: JointStages, follow: Followers, pair: Pair, position_rate: Numbers) -> list[PowerFit]:
+    """Every byte that could be the power of the joint whose position and error are known."""
+    error = signed_of(stages.pages, pair.error)
+    period = stages.recording.period_s
+    taken = {pair.position.low, pair.position.high, pair.error.low, pair.error.high}
+    found = []
+    for low in sorted({*follow.low, *follow.byte} - taken):
+        w = signed_of(stages.pages, Place(low))
+        inside = (np.abs(w) < 125) & (np.abs(error) < 120)
+        if len(np.unique(error[inside])) < LEAST_INSIDE or w[inside].min() > -15 or w[inside].max() < 15:
+            continue
+        gain = _ratio(w[inside], error[inside])
+        if gain < LEAST_GAIN or w.max() > 127.5 or w.min() < -128.5:
+            continue
+        limit = 127.0
+        expected = np.clip(gain * error, -limit, limit)
+        allowed = 1.5 + gain * (NOISE + 1.5 * period * np.abs(position_rate))
+        share = float(np.mean(np.abs(w - expected) <= allowed))
+        still = inside & (np.abs(position_rate) < 20)
+        exact = float(np.mean(np.abs(w - expected)[still] <= 1.5 + gain * NOISE)) if still.any() else 0.0
+        if share < HOLDS or exact < HOLDS:
+            continue
+        delay = _delay(((expected - w) / gain * -1.0)[inside], position_rate[inside])
+        found.append(PowerFit(Place(low), gain, share, delay, len(np.unique(error[inside]))))
+    return found
+
+
+def _ratio(power: Numbers, error: Numbers) -> float:
+    """The ratio of power to error that most readings agree on."""
+    clear = np.abs(error) >= 4
+    if clear.sum() < 6:
+        return 0.0
+    return float(np.median(power[clear] / error[clear]))
+
+
+def posture_of(counts: float) -> int | None:
+    """The set point (posture units) whose counts these are; None where no posture has these counts."""
+    whole = round(counts)
+    if not 0 <= whole < ADC_COUNTS:
+        return None
+    posture = counts_to_posture(whole)
+    return posture if posture_to_counts(posture) == whole else None
+
+
+def stage_set_point(stages: list[Stage], pair: Pair) -> float:
+    """The set point (ADC counts) in stages of one epoch."""
+    return set_point_counts(np.concatenate([stage.pages for stage in stages]), pair.position, pair.error)

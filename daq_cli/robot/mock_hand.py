@@ -1,0 +1,89 @@
+"""A stand-in for the person at the arm: does with a mock what the procedure asks a person to do with a real arm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from daq.commissioning.memory.procedure import Task
+from daq.contracts.machine import Machine
+from firmware_protocol.memory_map import JOINTS
+
+WIGGLE = ((35, 0.4), (-35, 0.7), (20, 0.5), (-12, 0.4), (0, 0.2))
+"""Posture units from where the joint is, and seconds to get there: slow, about the set point, for the power."""
+SWEEP = ((60, 1.2), (940, 2.0))
+"""Posture units, and seconds to get there: most of the range."""
+
+
+class MockArm(Protocol):
+    """What a mock offers to somebody who stands beside it."""
+
+    def now(self) -> float:
+        """Time in s, that of the mock."""
+
+    def emergency_stop(self, *, pressed: bool) -> None:
+        """Presses or releases it."""
+
+    def lead(self, degrees: Mapping[int, float], seconds: float) -> None:
+        """Moves joints by hand."""
+
+    def switch_off_and_on(self) -> None:
+        """Interrupts the controller's supply."""
+
+    def inputs(self, bits: int) -> None:
+        """Switches process inputs."""
+
+
+@dataclass
+class MockOperator:
+    """Carries out the tasks of a search on a mock that begins at `postures` (posture units)."""
+
+    arm: MockArm
+    machine: Machine
+    postures: dict[int, float] = field(default_factory=lambda: dict.fromkeys(range(1, JOINTS + 1), 500.0))
+    _path: list[tuple[dict[int, float], float]] = field(default_factory=list)
+    _until: float = 0.0
+
+    def begin(self, task: Task) -> bool:
+        """Begins a task; everything can be done."""
+        self._path, self._until = [], self.arm.now()
+        if task.kind == "press_emergency_stop":
+            self.arm.emergency_stop(pressed=True)
+        elif task.kind == "release_emergency_stop":
+            self.arm.emergency_stop(pressed=False)
+        elif task.kind == "switch_off_and_on":
+            self.arm.switch_off_and_on()
+        elif task.kind == "set_inputs":
+            self.arm.inputs(task.inputs)
+        elif task.kind == "lead" and task.joint is not None:
+            here = self.postures[task.joint]
+            centre = min(max(here, 60.0), 940.0)
+            self._path = [({task.joint: centre + by}, seconds) for by, seconds in WIGGLE]
+            self._path += [({task.joint: to}, seconds) for to, seconds in SWEEP]
+            self._path.append(({task.joint: here}, 1.2))
+        elif task.kind == "place":
+            self._path = [({joint: float(to) for joint, to in task.targets.items()}, 1.0)]
+        return True
+
+    def finished(self) -> bool:
+        """Goes on to the next part of a movement when one is done."""
+        if self.arm.now() < self._until:
+            return False
+        if not self._path:
+            return True
+        to, seconds = self._path.pop(0)
+        self.postures |= to
+        self.arm.lead({joint: self._degrees(joint, posture) for joint, posture in to.items()}, seconds)
+        self._until = self.arm.now() + seconds
+        return False
+
+    def show(self, text: str) -> None:
+        """Nobody reads it."""
+
+    def watch(self, postures: Mapping[int, int]) -> None:
+        """Nobody looks."""
+
+    def _degrees(self, joint: int, posture: float) -> float:
+        return math.degrees(self.machine.calibration(joint).posture_to_rad(posture))
