@@ -131,6 +131,9 @@ class Board:
         self.memory.check(address, count)
         self._take_memory(count)
         end_us = self._host_until_us
+        if self._stored == len(self._published) and end_us < self._next_us:  # nothing changes meanwhile
+            self.run_until(end_us)
+            return self.memory.block(address, count)
         data = bytearray()
         for left in range(count - 1, -1, -1):
             self.run_until(end_us - left * self._timing.host_byte)

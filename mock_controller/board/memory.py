@@ -56,6 +56,11 @@ class SharedMemory:
         """One byte."""
         return self._bytes[address - self._base]
 
+    def block(self, address: int, count: int) -> bytes:
+        """`count` bytes from `address` on."""
+        start = address - self._base
+        return bytes(self._bytes[start : start + count])
+
     def put(self, address: int, value: int) -> None:
         """Stores one byte."""
         self._bytes[address - self._base] = value

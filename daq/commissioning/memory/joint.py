@@ -71,10 +71,10 @@ def joint_evidence(recording: Recording, joint: int) -> JointEvidence:
     fits = [fit for fit in powers(stages, follow, pair, rate) if abs(fit.delay) <= limit]
     power = fits[0] if len(fits) == 1 else None
     lacks = "" if power else f"{len(fits)} powers are possible" if fits else "no byte is in proportion to its error"
-    return JointEvidence(joint, pair, power, _set_point(recording, joint, pair), lacks)
+    return JointEvidence(joint, pair, power, set_point_bytes(recording, joint, pair), lacks)
 
 
-def _set_point(recording: Recording, joint: int, pair: Pair) -> SetPointBytes | None:
+def set_point_bytes(recording: Recording, joint: int, pair: Pair) -> SetPointBytes | None:
     """Bytes that hold the set point in every epoch, and do not change within one."""
     low, high = np.ones(recording.size, bool), np.ones(recording.size, bool)
     postures = []

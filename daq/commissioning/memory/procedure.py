@@ -14,14 +14,17 @@ from typing import Literal, Protocol
 import numpy as np
 
 from daq.commissioning.memory.findings import Findings, judge
-from daq.commissioning.memory.joint import JointEvidence, joint_evidence
+from daq.commissioning.memory.joint import JointEvidence, joint_evidence, set_point_bytes
 from daq.commissioning.memory.recording import PageReading, Recording, Stage, StageKind
 from daq.commissioning.memory.relations import position_of, signed_of
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 
-AT_REST = 40
-"""Number of readings of a memory that rests."""
+AT_REST = 150
+"""Number of readings of a memory that rests: long enough for a counter of every period to run on by more than a joint
+at rest may."""
+AFTER_POWER_UP = 30
+"""Number of readings after switching on."""
 MOST_READINGS = 4000
 """Largest number of readings of one movement."""
 ATTEMPTS = 3
@@ -118,24 +121,25 @@ class Finder:
             return judge(self.recording)
         self._read("rest", None, AT_REST)
         if self._do(Task("press_emergency_stop")):
-            joints = [self._lead(joint) for joint in range(1, JOINTS + 1)]
+            joints = self._lead_all()
             self._switch_inputs()
             self._switch_on(joints)
         return judge(self.recording)
 
     # --- stages
 
-    def _lead(self, joint: int) -> JointEvidence:
-        again = ""
+    def _lead_all(self) -> list[JointEvidence]:
+        """Leads every joint once, which also shows what does not follow the others; then again those still unclear."""
+        wanted = dict.fromkeys(range(1, JOINTS + 1), "")
         for _ in range(ATTEMPTS):
-            if not self._do(Task("lead", joint=joint, again=again)):
+            for joint, lacks in wanted.items():
+                if self._do(Task("lead", joint=joint, again=lacks)):
+                    self._read("lead", joint)
+            found = [joint_evidence(self.recording, joint) for joint in range(1, JOINTS + 1)]
+            wanted = {one.joint: one.lacks for one in found if one.pair is None or one.power is None}
+            if not wanted:
                 break
-            self._read("lead", joint)
-            found = joint_evidence(self.recording, joint)
-            if found.pair is not None and found.power is not None:
-                return found
-            again = found.lacks
-        return joint_evidence(self.recording, joint)
+        return found
 
     def _switch_inputs(self) -> None:
         for bits in (1, 0, 3, 1, 0)[: self.inputs]:
@@ -156,11 +160,15 @@ class Finder:
                 return
             self._wait_for_power()
             self.epoch += 1
-            self._read("power_up", None, AT_REST)
-            open_joints = [j for j in known if not _has_set_point(joint_evidence(self.recording, j))]
+            self._read("power_up", None, AFTER_POWER_UP)
+            open_joints = [joint for joint, one in known.items() if not self._has_set_point(one)]
             if self.epoch >= 3 and not open_joints:
                 return
             again = f"set points of joints {', '.join(map(str, open_joints))} are not clear yet" if open_joints else ""
+
+    def _has_set_point(self, one: JointEvidence) -> bool:
+        found = None if one.pair is None else set_point_bytes(self.recording, one.joint, one.pair)
+        return found is not None and found.place is not None
 
     def _wait_for_power(self) -> None:
         """Waits until the memory, which reads the same everywhere without supply, is alive again."""
@@ -203,10 +211,6 @@ class Finder:
 def _quarter(joint: int, epoch: int) -> int:
     """About where (posture units) a joint is to be at a switching-on: no two joints go the same way."""
     return QUARTERS[(_WAYS[epoch % len(_WAYS)][joint - 1] + epoch // len(_WAYS)) % len(QUARTERS)]
-
-
-def _has_set_point(found: JointEvidence) -> bool:
-    return found.set_point is not None and found.set_point.place is not None
 
 
 def errors_now(page: Page, joints: Sequence[JointEvidence]) -> dict[int, int]:

@@ -23,21 +23,36 @@ Numbers = NDArray[np.float64]
 
 HOLDS = 0.95
 """Least share of readings in which a relation must hold; the others may be torn."""
+WIDEST = 80.0
+"""Largest allowance (ADC counts): less than a third of what a wrong high byte would be off by."""
+MOSTLY = 0.75
+"""Least share of readings that are not torn; a fast movement reads many a position with its high byte of the period
+before or after."""
 JUMP = 200.0
 """Largest change (ADC counts) of a position between two readings: half a control period's worth of a hand that moves a
 joint by its whole range in a second. A wrong high byte makes jumps of 256 or more."""
+JUMPS = 0.02
+"""Largest share of such jumps that remain where single readings are passed over. With a wrong high byte there is one at
+each turn of the low byte."""
 LEAST_TRAVEL = 400
 """Least travel (ADC counts) of a led joint from which its bytes are told apart; 256 are one turn of a low byte."""
 NOISE = 2.5
 """Largest difference (ADC counts) between two readings of a joint at rest, from noise and rounding."""
 SAME_PERIOD = 0.4
 """Largest delay, in control periods, of what belongs to the same period; a copy of the period before has a delay of 1."""
-SETTLED = 24
-"""Largest error (ADC counts) right after switching on that agrees with set points that are the measured posture."""
+SETTLED = 60
+"""Largest error (ADC counts) of an arm that its drives hold, or whose set points are the posture at switching on: 4
+degrees of a major axis, by which its load may pull it down."""
 LEAST_INSIDE = 12
 """Least number of different errors, inside the limits of a register, by which it is judged."""
+STILL = 20.0
+"""Rate (ADC counts/s) below which a joint counts as still: less than half a count a period."""
 LEAST_GAIN = 0.3
 """Least ratio of power to error; the adjustable P is a whole number from 1 on."""
+
+
+_APART = 3
+"""Number of readings before and after one by which its rate is measured."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +99,14 @@ def signed_of(pages: Pages, place: Place) -> Numbers:
     return (pages[:, place.low] + 256 * pages[:, place.high].astype(np.int16)).astype(np.int16).astype(np.float64)
 
 
+def _without_tears(values: Numbers) -> Numbers:
+    """The median of every five readings in a row: it passes over single torn ones, and keeps lasting jumps."""
+    if len(values) < 5:
+        return values
+    windows = np.lib.stride_tricks.sliding_window_view(values, 5)
+    return np.asarray(np.sort(windows, axis=1)[:, 2])
+
+
 class JointStages:
     """What one joint did while it was led, in the form that the relations need."""
 
@@ -95,20 +118,28 @@ class JointStages:
         self.ends = np.cumsum([len(stage.times) for stage in self.led])[:-1]
 
     def rate(self, values: Numbers) -> Numbers:
-        """Counts per s at each reading, from the readings around it; 0 at the ends of a stage."""
-        rates = np.zeros_like(values)
+        """Counts per s at each reading, from readings before and after it; 0 at the ends of a stage.
+
+        The readings are far enough apart that it matters little how many periods lie between them.
+        """
+        rates, wide = np.zeros_like(values), 2 * _APART
         for part in np.split(np.arange(len(values)), self.ends):
-            if len(part) > 2:
-                inner = part[1:-1]
-                rates[inner] = (values[part[2:]] - values[part[:-2]]) / (self.times[part[2:]] - self.times[part[:-2]])
+            if len(part) > wide:
+                inner, after, before = part[_APART:-_APART], part[wide:], part[:-wide]
+                rates[inner] = (values[after] - values[before]) / (self.times[after] - self.times[before])
         return rates
+
+    def pace(self, rate: Numbers) -> Numbers:
+        """The fastest rate (counts/s) around each reading, without its sign: what readings may differ by follows it."""
+        padded = np.pad(np.abs(rate), 2 * _APART, mode="edge")
+        return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4 * _APART + 1).max(axis=1))
 
     def is_smooth(self, values: Numbers) -> bool:
         """Whether a value travels far enough, and without jumps."""
         if np.ptp(values) < LEAST_TRAVEL:
             return False
-        steps = np.concatenate([np.abs(np.diff(part)) for part in np.split(values, self.ends)])
-        return bool(np.mean(steps <= JUMP) >= HOLDS and np.quantile(values, 0.98) - np.quantile(values, 0.02) > 256)
+        steps = np.concatenate([np.abs(np.diff(_without_tears(part))) for part in np.split(values, self.ends)])
+        return float(np.mean(steps > JUMP)) <= JUMPS
 
 
 def positions(stages: JointStages, follow: Followers) -> list[Place]:
@@ -132,9 +163,16 @@ def _inside(values: Numbers) -> tuple[NDArray[np.bool_], float, float]:
     return (values > lowest + 2) & (values < highest - 2), lowest, highest
 
 
+def _near_turn(values: Numbers, tolerance: Numbers) -> NDArray[np.bool_]:
+    """Where a value is so close to a multiple of 256 that its high byte may be of another period than its low byte."""
+    over = values % 256
+    result: NDArray[np.bool_] = np.minimum(over, 256 - over) <= tolerance
+    return result
+
+
 def _delay(difference: Numbers, rate: Numbers) -> float:
     """How far (s) something lags behind, if it differs by `difference` while its quantity changes at `rate`."""
-    moving = np.abs(rate) > 20
+    moving = np.abs(rate) > STILL
     if moving.sum() < 8:
         return float("inf")
     kept = moving & (np.abs(difference) <= 12 + 0.1 * np.abs(rate))
@@ -153,11 +191,12 @@ def set_point_counts(stage_pages: Pages, position: Place, error: Place) -> float
 def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
     """Every position and error that belong together."""
     found = []
-    allowance = 1.5 * stages.recording.period_s
+    allowance = 2.0 * stages.recording.period_s
     errors = [(place, signed_of(stages.pages, place)) for place in _errors(stages, follow)]
     for position in positions(stages, follow):
         p = position_of(stages.pages, position)
         rate = stages.rate(p)
+        tolerance = np.minimum(NOISE + allowance * stages.pace(rate), WIDEST)
         for error, e in errors:
             if {error.low, error.high} & {position.low, position.high}:
                 continue
@@ -166,8 +205,11 @@ def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
                 continue
             target = float(np.median((p + e)[inside]))
             expected = np.clip(target - p, lowest, highest)
-            share = float(np.mean(np.abs(e - expected) <= NOISE + allowance * np.abs(rate)))
-            if share < HOLDS or not _settles(stages.recording, position, error):
+            difference = np.abs(e - expected)
+            agree = difference <= tolerance
+            torn = (np.abs(difference - 256) <= tolerance) & (_near_turn(p, tolerance) | _near_turn(e, tolerance))
+            share = float(np.mean(agree | torn))
+            if share < HOLDS or np.mean(agree) < MOSTLY or not _settles(stages.recording, position, error):
                 continue
             delay = _delay((target - p - e)[inside] * -1.0, rate[inside])
             found.append(Pair(position, error, share, delay))
@@ -175,15 +217,12 @@ def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
 
 
 def _settles(recording: Recording, position: Place, error: Place) -> bool:
-    """Whether the error is next to nothing right after each switching-on, though the posture differs.
+    """Whether the error is small while the drives hold the arm, and right after each switching-on at other postures.
 
     Without it position and error could be taken for one another.
     """
-    starts = [stage for stage in recording.stages if stage.kind == "power_up"]
-    if any(abs(float(np.median(signed_of(stage.pages, error)))) > SETTLED for stage in starts):
-        return False
-    postures = [float(np.median(position_of(stage.pages, position))) for stage in starts]
-    return not postures or max(postures) - min(postures) > 4 * SETTLED
+    starts = [stage for stage in recording.stages if stage.kind in ("rest", "power_up")]
+    return all(abs(float(np.median(signed_of(stage.pages, error)))) <= SETTLED for stage in starts)
 
 
 def _later(stages: JointStages, one: Place, other: Place) -> float:
@@ -211,6 +250,7 @@ def powers(stages: JointStages, follow: Followers, pair: Pair, position_rate: Nu
     """Every byte that could be the power of the joint whose position and error are known."""
     error = signed_of(stages.pages, pair.error)
     period = stages.recording.period_s
+    pace = stages.pace(position_rate)
     taken = {pair.position.low, pair.position.high, pair.error.low, pair.error.high}
     found = []
     for low in sorted({*follow.low, *follow.byte} - taken):
@@ -223,11 +263,10 @@ def powers(stages: JointStages, follow: Followers, pair: Pair, position_rate: Nu
             continue
         limit = 127.0
         expected = np.clip(gain * error, -limit, limit)
-        allowed = 1.5 + gain * (NOISE + 1.5 * period * np.abs(position_rate))
+        allowed = 1.5 + gain * (NOISE + 2.0 * period * pace)
         share = float(np.mean(np.abs(w - expected) <= allowed))
-        still = inside & (np.abs(position_rate) < 20)
-        exact = float(np.mean(np.abs(w - expected)[still] <= 1.5 + gain * NOISE)) if still.any() else 0.0
-        if share < HOLDS or exact < HOLDS:
+        below = float(np.mean((np.abs(w - expected) <= allowed)[inside]))
+        if share < HOLDS or below < HOLDS:
             continue
         delay = _delay(((expected - w) / gain * -1.0)[inside], position_rate[inside])
         found.append(PowerFit(Place(low), gain, share, delay, len(np.unique(error[inside]))))
