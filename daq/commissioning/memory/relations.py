@@ -225,25 +225,59 @@ def _settles(recording: Recording, position: Place, error: Place) -> bool:
     return all(abs(float(np.median(signed_of(stage.pages, error)))) <= SETTLED for stage in starts)
 
 
-def _later(stages: JointStages, one: Place, other: Place) -> float:
-    """How far (s) the position `other` lags behind `one`."""
-    a, b = position_of(stages.pages, one), position_of(stages.pages, other)
-    return _delay(a - b, stages.rate(a))
+def _continuous(stages: JointStages, low: int) -> Numbers:
+    """A low byte without its turns: a number that runs on, from 0 in each stage."""
+    parts = np.split(stages.pages[:, low].astype(np.int64), stages.ends)
+    steps = [(np.diff(part, prepend=part[:1]) + 128) % 256 - 128 for part in parts]
+    return np.concatenate([np.cumsum(step) for step in steps]).astype(np.float64)
+
+
+def _low_delay(stages: JointStages, one: int, other: int) -> float:
+    """How far (s) the low byte `other` lags behind `one`."""
+    difference = (stages.pages[:, one].astype(np.float64) - stages.pages[:, other] + 128) % 256 - 128
+    return _delay(difference, stages.rate(_continuous(stages, one)))
+
+
+def _high_delay(stages: JointStages, place: Place, values: Numbers, turn: int) -> float:
+    """How far (s) the high byte of values, which begin anew after `turn`, lags behind the low byte.
+
+    A high byte that is late is wrong by 256 for as long as it is late, after each turn of the low byte.
+    """
+    runs = _continuous(stages, place.low)
+    rate = stages.rate(runs)
+    squares = float((rate**2).sum())
+    if not squares:
+        return float("inf")
+    off = values - runs
+    parts = [part - np.median(part) for part in np.split(off, stages.ends)]
+    late = (np.concatenate(parts) + turn / 2) % turn - turn / 2
+    return -float((late * rate).sum()) / squares
 
 
 def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) -> Pair | None:
-    """The pair of the present period, where all other candidates are older by a period; None where that is unclear."""
+    """The pair whose bytes are all of the present period; None unless all others are clearly older, or torn.
+
+    The low byte of the position is the one that is ahead of all others by most of a period; its high byte and the
+    error are those that are neither ahead nor behind.
+    """
     limit = SAME_PERIOD * period_s
-    current = [pair for pair in candidates if abs(pair.delay) <= limit]
-    newest = [
+    lows = sorted({pair.position.low for pair in candidates})
+    ahead = [
+        low for low in lows if all(other == low or _low_delay(stages, low, other) > limit for other in lows)
+    ]
+    if len(ahead) != 1:
+        return None
+    left = [pair for pair in candidates if pair.position.low == ahead[0] and abs(pair.delay) <= limit]
+    left = [
         pair
-        for pair in current
-        if all(
-            other.position == pair.position or _later(stages, pair.position, other.position) > limit
-            for other in current
+        for pair in left
+        if abs(_high_delay(stages, pair.position, position_of(stages.pages, pair.position), ADC_COUNTS)) <= limit
+        and (
+            pair.error.high is None
+            or abs(_high_delay(stages, pair.error, signed_of(stages.pages, pair.error), 0x10000)) <= limit
         )
     ]
-    return newest[0] if len(newest) == 1 else None
+    return left[0] if len(left) == 1 else None
 
 
 def powers(stages: JointStages, follow: Followers, pair: Pair, position_rate: Numbers) -> list[PowerFit]:
