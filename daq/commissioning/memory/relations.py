@@ -28,9 +28,9 @@ WIDEST = 80.0
 MOSTLY = 0.75
 """Least share of readings that are not torn; a fast movement reads many a position with its high byte of the period
 before or after."""
-JUMP = 200.0
-"""Largest change (ADC counts) of a position between two readings: half a control period's worth of a hand that moves a
-joint by its whole range in a second. A wrong high byte makes jumps of 256 or more."""
+JUMP = 128.0
+"""Largest change (ADC counts) of a position between two readings: half a turn of the low byte, above which nothing tells
+forwards from backwards. At 50 readings a second a joint may be led by 6000 counts/s: its whole range in 0.7 s."""
 JUMPS = 0.02
 """Largest share of such jumps that remain where single readings are passed over. With a wrong high byte there is one at
 each turn of the low byte."""
