@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
+import socket
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
+from urllib.parse import urlsplit
 
 from daq.commissioning.memory.procedure import Task
+from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.machine import Machine
 from firmware_protocol.memory_map import JOINTS
 
@@ -87,3 +91,59 @@ class MockOperator:
 
     def _degrees(self, joint: int, posture: float) -> float:
         return math.degrees(self.machine.calibration(joint).posture_to_rad(posture))
+
+
+class MockRefusedError(DaqError):
+    """The mock did not do what it was asked to."""
+
+
+class ControlPortArm:
+    """`MockArm` through a mock's control port, `tcp://HOST:PORT`."""
+
+    def __init__(self, url: str) -> None:
+        where = urlsplit(url)
+        if where.scheme != "tcp" or where.hostname is None or where.port is None:
+            raise SpecError(f"--mock-control {url!r}: write tcp://HOST:PORT, as the mock prints it")
+        try:
+            self._socket = socket.create_connection((where.hostname, where.port), timeout=10.0)
+        except OSError as error:
+            raise SpecError(f"--mock-control {url}: {error.strerror or error}") from error
+        self._lines = self._socket.makefile("rb")
+
+    def ask(self, command: str, **values: object) -> dict[str, Any]:
+        """The answer to one command. Raises MockRefusedError."""
+        self._socket.sendall(json.dumps({"do": command, **values}).encode() + b"\n")
+        line = self._lines.readline()
+        answer: dict[str, Any] = json.loads(line) if line else {"ok": False, "error": "it has ended"}
+        if not answer["ok"]:
+            raise MockRefusedError(f"the mock refused {command}: {answer['error']}")
+        return answer
+
+    def now(self) -> float:
+        """The board's time in s."""
+        return float(self.ask("state")["time_us"]) * 1e-6
+
+    def postures(self) -> dict[int, float]:
+        """Where its set points are (posture units)."""
+        return {joint: float(posture) for joint, posture in enumerate(self.ask("state")["set_points"], start=1)}
+
+    def emergency_stop(self, *, pressed: bool) -> None:
+        """Presses or releases it."""
+        self.ask("emergency_stop", pressed=pressed)
+
+    def lead(self, degrees: Mapping[int, float], seconds: float) -> None:
+        """Moves joints by hand."""
+        self.ask("hand", to={str(joint): angle for joint, angle in degrees.items()}, seconds=seconds)
+
+    def switch_off_and_on(self) -> None:
+        """Interrupts the controller's supply."""
+        self.ask("brown_out")
+
+    def inputs(self, bits: int) -> None:
+        """Switches process inputs."""
+        self.ask("inputs", bits=bits)
+
+    def close(self) -> None:
+        """Ends the connection."""
+        self._lines.close()
+        self._socket.close()

@@ -39,7 +39,14 @@ SAFE_ERROR = 12
 """Largest error (ADC counts) with which the drives may have their power back: the arm will move by that much."""
 
 TaskKind = Literal[
-    "rest", "press_emergency_stop", "lead", "place", "switch_off_and_on", "release_emergency_stop", "set_inputs"
+    "rest",
+    "press_emergency_stop",
+    "lead",
+    "place",
+    "switch_off_and_on",
+    "release_emergency_stop",
+    "set_inputs",
+    "command",
 ]
 
 
