@@ -21,6 +21,10 @@ Documented = Literal["kept", "moved"]
 """Whether the six documented positions lie where the source has them."""
 Pairs = list[tuple[int, int]]
 
+_NEVER_CHANGED = ("gain_p", "gain_i", "gain_d", "process_inputs", "process_outputs", "gripper")
+"""Registers that the controller never changes by itself: hardly anything that is read proves where they lie."""
+_KEPT = 1 / 3
+"""Share of memories in which these lie where the shipped map assumes them."""
 _ROW = 8
 """Bytes from a row of low bytes to its row of high bytes, as in the documented positions."""
 
@@ -110,13 +114,17 @@ def draw_memory(seed: int, documented: Documented = "kept") -> HiddenMemory:
     columns: dict[str, tuple[list[int], list[int] | None]] = {}
     bits = {"set_point": 10, "position": 12, "error": random.choice((8, 12, 16)), "power": 8}
     columns["position"] = _positions(random, page, documented)
+    kept = {name: list(shipped[name].low) for name in _NEVER_CHANGED}
+    if random.random() < _KEPT and page.take([address for column in kept.values() for address in column]):
+        columns |= {name: (column, None) for name, column in kept.items()}
     for name in random.sample(("set_point", "error"), 2):
         columns[name] = _two_bytes(random, page) if bits[name] > 8 else (_one_byte(random, page), None)
     columns["power"] = _one_byte(random, page), None
-    for name, column in zip(("gain_p", "gain_i", "gain_d"), _gain_columns(random, page), strict=True):
-        columns[name] = column, None
-    for name in ("process_inputs", "process_outputs", "gripper"):
-        columns[name] = page.anywhere(1), None
+    if "gain_p" not in columns:
+        for name, column in zip(("gain_p", "gain_i", "gain_d"), _gain_columns(random, page), strict=True):
+            columns[name] = column, None
+        for name in ("process_inputs", "process_outputs", "gripper"):
+            columns[name] = page.anywhere(1), None
     registers = {}
     for name, register in shipped.registers.items():
         low, high = columns[name]

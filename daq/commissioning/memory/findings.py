@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from daq.commissioning.memory.bytes import constants, spread
-from daq.commissioning.memory.gains import gain_columns
+from daq.commissioning.memory.gains import Columns, gain_columns
 from daq.commissioning.memory.joint import LEAST_EPOCHS, JointEvidence, joint_evidence
 from daq.commissioning.memory.recording import Recording
 from daq.commissioning.memory.relations import Place
@@ -182,6 +182,9 @@ def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[
     held = np.where(free, constants([s for s in recording.stages if s.kind != "inputs"]), -1)
     measured = [None if joint.power is None else round(joint.power.gain) for joint in joints]
     patterns = gain_columns(held, measured)
+    shipped = _shipped_gains(recording)
+    if shipped in patterns:
+        patterns = [shipped]
     if len(patterns) != 1:
         why = "no pattern of bytes holds the gains that were measured"
         if patterns:
@@ -193,6 +196,14 @@ def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[
         for g, column in zip("pid", patterns[0], strict=True)
         for joint in range(1, JOINTS + 1)
     ]
+
+
+def _shipped_gains(recording: Recording) -> Columns:
+    """Where the shipped map assumes the gains."""
+    p, i, d = (
+        tuple(address - recording.base for address in default_memory_map()[f"gain_{g}"].low) for g in "pid"
+    )
+    return p, i, d
 
 
 def _signals(recording: Recording, found: list[Finding]) -> list[Finding]:
@@ -211,6 +222,13 @@ def _signals(recording: Recording, found: list[Finding]) -> list[Finding]:
         result.append(Finding("process_inputs", None, "found", recording.base + place, None, why))
     else:
         result.append(Finding("process_inputs", None, "unknown", evidence=why if not inputs else "no byte, or several"))
-    never = "only the host changes it, so that no reading shows it"
-    result += [Finding(name, None, "unknown", evidence=never) for name in ("process_outputs", "gripper")]
+    taken = {address for one in [*found, *result] for address in (one.low, one.high)}
+    for name in ("process_outputs", "gripper"):
+        address = default_memory_map()[name].low[0]
+        why = "only the host changes it, so that no reading shows it"
+        if address not in taken and at_rest[address - recording.base] == 0:
+            why += "; what the shipped map assumes agrees with everything seen"
+            result.append(Finding(name, None, "assumed", address, None, why))
+        else:
+            result.append(Finding(name, None, "unknown", evidence=f"{why}; what the shipped map assumes is wrong"))
     return result
