@@ -21,19 +21,15 @@ from firmware_protocol.units import ADC_COUNTS, counts_to_posture, posture_to_co
 
 Numbers = NDArray[np.float64]
 
+SIXTEEN_BITS = 0x10000
 HOLDS = 0.95
 """Least share of readings in which a relation must hold; the others may be torn."""
 WIDEST = 80.0
 """Largest allowance (ADC counts): less than a third of what a wrong high byte would be off by."""
 MOSTLY = 0.75
 """Least share of readings that are not torn; a fast movement reads many a position with its high byte of the period
-before or after."""
-JUMP = 128.0
-"""Largest change (ADC counts) of a position between two readings: half a turn of the low byte, above which nothing tells
-forwards from backwards. At 50 readings a second a joint may be led by 6000 counts/s: its whole range in 0.7 s."""
-JUMPS = 0.02
-"""Largest share of such jumps that remain where single readings are passed over. With a wrong high byte there is one at
-each turn of the low byte."""
+before or after. Between two readings a joint may move by half a turn of its low byte, 128 counts: at 50 readings a
+second by 6000 counts/s, its whole range in 0.7 s."""
 LEAST_TRAVEL = 400
 """Least travel (ADC counts) of a led joint from which its bytes are told apart; 256 are one turn of a low byte."""
 NOISE = 2.5
@@ -99,14 +95,6 @@ def signed_of(pages: Pages, place: Place) -> Numbers:
     return (pages[:, place.low] + 256 * pages[:, place.high].astype(np.int16)).astype(np.int16).astype(np.float64)
 
 
-def _without_tears(values: Numbers) -> Numbers:
-    """The median of every five readings in a row: it passes over single torn ones, and keeps lasting jumps."""
-    if len(values) < 5:
-        return values
-    windows = np.lib.stride_tricks.sliding_window_view(values, 5)
-    return np.asarray(np.sort(windows, axis=1)[:, 2])
-
-
 class JointStages:
     """What one joint did while it was led, in the form that the relations need."""
 
@@ -116,6 +104,7 @@ class JointStages:
         self.pages = np.concatenate([stage.pages for stage in self.led])
         self.times = np.concatenate([stage.times for stage in self.led])
         self.ends = np.cumsum([len(stage.times) for stage in self.led])[:-1]
+        self._continuous: dict[int, Numbers] = {}
 
     def rate(self, values: Numbers) -> Numbers:
         """Counts per s at each reading, from readings before and after it; 0 at the ends of a stage.
@@ -134,25 +123,40 @@ class JointStages:
         padded = np.pad(np.abs(rate), 2 * _APART, mode="edge")
         return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4 * _APART + 1).max(axis=1))
 
-    def is_smooth(self, values: Numbers) -> bool:
-        """Whether a value travels far enough, and without jumps."""
-        if np.ptp(values) < LEAST_TRAVEL:
+    def continuous(self, low: int) -> Numbers:
+        """A low byte without its turns: a number that runs on, from 0 in each stage."""
+        if low not in self._continuous:
+            parts = np.split(self.pages[:, low].astype(np.int64), self.ends)
+            steps = [(np.diff(part, prepend=part[:1]) + 128) % 256 - 128 for part in parts]
+            self._continuous[low] = np.concatenate([np.cumsum(step) for step in steps]).astype(np.float64)
+        return self._continuous[low]
+
+    def off_track(self, low: int, values: Numbers, turn: int) -> Numbers:
+        """By how much values, which begin anew after `turn`, are off what their low byte alone says: a multiple of 256
+        where the high byte is wrong, or of another period."""
+        off = values - self.continuous(low)
+        parts = [part - np.median(part) for part in np.split(off, self.ends)]
+        return np.asarray((np.concatenate(parts) + turn / 2) % turn - turn / 2)
+
+    def is_whole(self, place: Place, values: Numbers, turn: int) -> bool:
+        """Whether low and high byte belong together: the high byte changes when the low byte turns."""
+        if np.ptp(self.continuous(place.low)) < LEAST_TRAVEL:
             return False
-        steps = np.concatenate([np.abs(np.diff(_without_tears(part))) for part in np.split(values, self.ends)])
-        return float(np.mean(steps > JUMP)) <= JUMPS
+        return float(np.mean(np.abs(self.off_track(place.low, values, turn)) < 128)) >= MOSTLY
 
 
 def positions(stages: JointStages, follow: Followers) -> list[Place]:
     """Every pair of bytes that could be a position."""
     places = (Place(low, high) for low in follow.low for high in follow.high if low != high)
-    return [place for place in places if stages.is_smooth(position_of(stages.pages, place))]
+    return [place for place in places if stages.is_whole(place, position_of(stages.pages, place), ADC_COUNTS)]
 
 
 def _errors(stages: JointStages, follow: Followers) -> Iterator[Place]:
     for low in follow.low:
         for high in follow.high:
-            if low != high and stages.is_smooth(signed_of(stages.pages, Place(low, high))):
-                yield Place(low, high)
+            place = Place(low, high)
+            if low != high and stages.is_whole(place, signed_of(stages.pages, place), SIXTEEN_BITS):
+                yield place
     for low in sorted({*follow.low, *follow.byte}):
         yield Place(low)
 
@@ -225,17 +229,10 @@ def _settles(recording: Recording, position: Place, error: Place) -> bool:
     return all(abs(float(np.median(signed_of(stage.pages, error)))) <= SETTLED for stage in starts)
 
 
-def _continuous(stages: JointStages, low: int) -> Numbers:
-    """A low byte without its turns: a number that runs on, from 0 in each stage."""
-    parts = np.split(stages.pages[:, low].astype(np.int64), stages.ends)
-    steps = [(np.diff(part, prepend=part[:1]) + 128) % 256 - 128 for part in parts]
-    return np.concatenate([np.cumsum(step) for step in steps]).astype(np.float64)
-
-
 def _low_delay(stages: JointStages, one: int, other: int) -> float:
     """How far (s) the low byte `other` lags behind `one`."""
     difference = (stages.pages[:, one].astype(np.float64) - stages.pages[:, other] + 128) % 256 - 128
-    return _delay(difference, stages.rate(_continuous(stages, one)))
+    return _delay(difference, stages.rate(stages.continuous(one)))
 
 
 def _high_delay(stages: JointStages, place: Place, values: Numbers, turn: int) -> float:
@@ -243,15 +240,11 @@ def _high_delay(stages: JointStages, place: Place, values: Numbers, turn: int) -
 
     A high byte that is late is wrong by 256 for as long as it is late, after each turn of the low byte.
     """
-    runs = _continuous(stages, place.low)
-    rate = stages.rate(runs)
+    rate = stages.rate(stages.continuous(place.low))
     squares = float((rate**2).sum())
     if not squares:
         return float("inf")
-    off = values - runs
-    parts = [part - np.median(part) for part in np.split(off, stages.ends)]
-    late = (np.concatenate(parts) + turn / 2) % turn - turn / 2
-    return -float((late * rate).sum()) / squares
+    return -float((stages.off_track(place.low, values, turn) * rate).sum()) / squares
 
 
 def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) -> Pair | None:
@@ -274,7 +267,7 @@ def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) ->
         if abs(_high_delay(stages, pair.position, position_of(stages.pages, pair.position), ADC_COUNTS)) <= limit
         and (
             pair.error.high is None
-            or abs(_high_delay(stages, pair.error, signed_of(stages.pages, pair.error), 0x10000)) <= limit
+            or abs(_high_delay(stages, pair.error, signed_of(stages.pages, pair.error), SIXTEEN_BITS)) <= limit
         )
     ]
     return left[0] if len(left) == 1 else None
