@@ -105,6 +105,9 @@ class BoardArm:
 
         self.board.lead({joint: radians(angle) for joint, angle in degrees.items()}, seconds)
 
+    def wait(self, seconds: float) -> None:
+        self.board.run_until(self.board.time_us + round(seconds * 1e6))
+
     def switch_off_and_on(self) -> None:
         self.board.brown_out()
 

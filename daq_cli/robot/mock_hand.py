@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import socket
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -21,6 +22,10 @@ SWEEP = ((60, 1.2), (940, 2.0))
 """Posture units, and seconds to get there: most of the range."""
 
 
+PLACES, PLACES_APART = 11, 3
+"""Postures of a protractor over a joint's range, and from one to the next."""
+
+
 class MockArm(Protocol):
     """What a mock offers to somebody who stands beside it."""
 
@@ -32,6 +37,9 @@ class MockArm(Protocol):
 
     def lead(self, degrees: Mapping[int, float], seconds: float) -> None:
         """Moves joints by hand."""
+
+    def wait(self, seconds: float) -> None:
+        """Lets the mock's time pass."""
 
     def switch_off_and_on(self) -> None:
         """Interrupts the controller's supply."""
@@ -83,6 +91,19 @@ class MockOperator:
         self._until = self.arm.now() + seconds
         return False
 
+    def read_angle(self, joint: int, number: int) -> float | None:
+        """Moves a joint by hand to posture `number` (from 1), spread over its range; the angle, read to half a degree."""
+        to = 100.0 + 800.0 * ((number * PLACES_APART) % PLACES) / (PLACES - 1)
+        self._path = [({joint: to}, 1.0)]
+        while not self.finished():
+            self.arm.wait(0.05)
+        self.arm.wait(0.2)
+        degrees = self._degrees(joint, to)
+        offset = round(2 * degrees) / 2 - degrees
+        self.arm.lead({joint: degrees + offset}, 0.1)
+        self.arm.wait(0.3)
+        return degrees + offset
+
     def show(self, text: str) -> None:
         """Nobody reads it."""
 
@@ -122,6 +143,10 @@ class ControlPortArm:
     def now(self) -> float:
         """The board's time in s."""
         return float(self.ask("state")["time_us"]) * 1e-6
+
+    def wait(self, seconds: float) -> None:
+        """Sleeps; a mock in lock-step has no time of its own to wait for."""
+        time.sleep(seconds)
 
     def postures(self) -> dict[int, float]:
         """Where its set points are (posture units)."""

@@ -72,6 +72,21 @@ class TerminalOperator:
         self._answer()
         return True
 
+    def read_angle(self, joint: int, number: int) -> float | None:
+        """Asks for the angle of a joint that was moved by hand."""
+        while True:
+            console().print(
+                f"    joint {joint}, posture {number}: move it, hold it, and type its angle in degrees (Enter for no more): ",
+                end="",
+            )
+            answer = self._answer()
+            if not answer:
+                return None
+            try:
+                return float(answer)
+            except ValueError:
+                console().print(f"    {answer!r} is no number")
+
     def show(self, text: str) -> None:
         """Prints a line."""
         console().print(text)
