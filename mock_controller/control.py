@@ -19,6 +19,7 @@ from mock_controller.faults.registry import describe
 
 Answer = dict[str, Any]
 _LONGEST_LEAD_S = 600.0
+_JOINTS = tuple("123456")
 
 
 class ControlError(ValueError):
@@ -182,7 +183,7 @@ class Control:
     def _hand(self, request: Answer) -> Answer:
         """Leads joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees}, "seconds"."""
         to, seconds = request.get("to"), request.get("seconds", 0.0)
-        if not isinstance(to, dict) or not all(key in "123456" and _is_number(value) for key, value in to.items()):
+        if not isinstance(to, dict) or not all(key in _JOINTS and _is_number(value) for key, value in to.items()):
             raise ControlError('"to": degrees by joint are needed, as in {"1": 90}')
         if not _is_number(seconds) or not 0 <= seconds <= _LONGEST_LEAD_S:
             raise ControlError(f'"seconds": a number from 0 to {_LONGEST_LEAD_S:g} is needed')
@@ -196,7 +197,7 @@ class Control:
     def _disconnect(self, request: Answer) -> Answer:
         """Cuts the line: "seconds" of the clock until it is back (without: until reconnect)."""
         seconds = request.get("seconds")
-        if seconds is not None and not (_is_number(seconds) and 0 <= seconds):
+        if seconds is not None and not (_is_number(seconds) and seconds >= 0):
             raise ControlError('"seconds": a number from 0 on, or nothing, is needed')
         self._process.disconnect(seconds)
         return {"seconds": seconds}

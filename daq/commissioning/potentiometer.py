@@ -1,7 +1,7 @@
 """Direction, zero, range and bend of a potentiometer, from readings at postures that a protractor has measured.
 
-A straight line through angles over readings, by least squares; intervals are Student's at 95 %, from the scatter that the
-readings themselves show. The bend is the largest departure of a parabola from that line within the range of readings.
+A straight line through angles over readings, by least squares; intervals are Student's at 95 %, from the scatter that
+the readings themselves show. The bend is the largest departure of a parabola from that line within the range of readings.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _line(c: Any, a: Any) -> tuple[float, float, tuple[float, float], Any]:
 
 
 def _bend(c: Any, a: Any, whole: float) -> tuple[float, float]:
-    """The largest departure of a parabola from a line over the readings, and its standard error, as shares of the range."""
+    """The largest departure of a parabola from a line, and its standard error, as shares of the range."""
     half = np.ptp(c) / 2
     x = (c - (c.max() + c.min()) / 2) / half
     matrix = np.column_stack([x**2 - 0.5, x, np.ones_like(x)])

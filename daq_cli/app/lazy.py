@@ -17,7 +17,10 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "gains": ("daq_cli.commands.gains", "Show or set the controller's PID gains."),
     "io": ("daq_cli.commands.process_io", "Show and switch process signals, and the gripper."),
     "teach": ("daq_cli.commands.teach.motion", "Jog the arm, lead it, make steps, and play back."),
-    "commission": ("daq_cli.commands.commission.command", "Commission an arm, step by step, up to its acceptance sheet."),
+    "commission": (
+        "daq_cli.commands.commission.command",
+        "Commission an arm, step by step, up to its acceptance sheet.",
+    ),
     "memory": ("daq_cli.commands.memory", "Watch the shared memory, and find out what lies where."),
     "calibrate": ("daq_cli.commands.calibrate", "Measure what the machine really does."),
     "serve": ("daq_cli.commands.serve", "Serve experiments and traces to people and programs."),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -120,9 +120,7 @@ def search(
         with replacing(keep) as part:
             part.write_text(json.dumps(findings_data(found, proofs), indent=2) + "\n", "utf-8")
 
-    found = Finder(
-        page, operator, inputs=5 if inputs else 0, keep=lambda recording: save(judge(recording), [])
-    ).find()
+    found = Finder(page, operator, inputs=5 if inputs else 0, keep=lambda recording: save(judge(recording), [])).find()
     save(found, [])
     proofs = _prove(call, page, operator, consent, found) if commands else []
     save(found, proofs)
@@ -168,7 +166,7 @@ def keep_map(found: Findings, path: Path) -> bool:
     memory_map = found.memory_map("found at this arm")
     if memory_map is None:
         return False
-    remarks = ("Found by `daq memory find`. \"found\": by evidence at the arm; \"assumed\": agrees with what was seen.",)
+    remarks = ('Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with what was seen.',)
     with replacing(path) as part:
         part.write_text(memory_map_text(memory_map, remarks), "utf-8")
     return True
@@ -229,17 +227,17 @@ def _watch_text(found: list[WatchedByte]) -> str:
         if one.changes:
             together = ", ".join(f"{address:04X}" for address in one.together)
             lines.append(
-                f"{one.address:04X}  {one.value:3d}  from {one.lowest:3d} to {one.highest:3d}  {one.rate:6.1f} changes/s"
+                f"{one.address:04X}  {one.value:3d}  from {one.lowest:3d} to {one.highest:3d}  {one.rate:5.1f} changes/s"
                 + (f"  with {together}" if together else "")
             )
     return "\n".join(lines)
 
 
 @contextmanager
-def _screen(live: bool) -> Iterator[object]:
+def _screen(live: bool) -> Iterator[Callable[[str], None]]:
     """A function that shows text in place, in a terminal."""
     if not live:
-        yield lambda text: None
+        yield lambda _text: None
         return
     from rich.live import Live
 

@@ -55,9 +55,7 @@ class LinkPage:
         if self.link.lock_step:
             self.wait(LOCK_STEP_PAUSE_S)
         end = self.base + self.size
-        requests = [
-            ReadBlock(start, min(MAX_PAYLOAD, end - start)) for start in range(self.base, end, MAX_PAYLOAD)
-        ]
+        requests = [ReadBlock(start, min(MAX_PAYLOAD, end - start)) for start in range(self.base, end, MAX_PAYLOAD)]
         if not self._forward:
             requests.reverse()
         self._forward = not self._forward

@@ -92,7 +92,7 @@ class MockOperator:
         return False
 
     def read_angle(self, joint: int, number: int) -> float | None:
-        """Moves a joint by hand to posture `number` (from 1), spread over its range; the angle, read to half a degree."""
+        """Moves a joint by hand to posture `number` (from 1) of its range; the angle, read to half a degree."""
         to = 100.0 + 800.0 * ((number * PLACES_APART) % PLACES) / (PLACES - 1)
         self._path = [({joint: to}, 1.0)]
         while not self.finished():

@@ -22,18 +22,18 @@ def words(task: Task) -> str:
         "rest": "Leave the arm as it is, switched on and at rest. Nothing is written, nothing moves.",
         "press_emergency_stop": "Hold the arm, for it may sink, and press the emergency stop. The controller itself "
         "must stay switched on. It stays pressed until you are told otherwise.",
-        "lead": f"Move joint {task.joint} by hand, and no other: first a few degrees to and fro around where it is, slowly "
-        "(some 10 s), then evenly to one end of its range, to the other end, and back to where it was.",
+        "lead": f"Move joint {task.joint} by hand, and no other: first a few degrees to and fro around where it is, "
+        "slowly (some 10 s), then evenly to one end of its range, to the other end, and back to where it was.",
         "place": "Bring the joints to about these postures (0 to 999 over a joint's range), and hold them there: "
         + ", ".join(f"joint {joint}: {posture}" for joint, posture in task.targets.items()),
-        "switch_off_and_on": "With the emergency stop still pressed, switch the controller off and on again. The arm must "
-        "stay where it is.",
+        "switch_off_and_on": "With the emergency stop still pressed, switch the controller off and on again. The arm "
+        "must stay where it is.",
         "release_emergency_stop": "Hold the arm lightly, keep a hand at the emergency stop, and release it. The errors "
         "have been read: the arm should stay where it is. If it moves, press at once.",
-        "set_inputs": f"Switch the process inputs so that their number is {task.inputs} (input 1 counts 1, input 2 counts "
-        "2). Without switches at the inputs, skip this.",
-        "command": f"Joint {task.joint} will move by at most 4 posture units (about a degree of a major axis) and back. Watch "
-        "it; the emergency stop ends it.",
+        "set_inputs": f"Switch the process inputs so that their number is {task.inputs} (input 1 counts 1, input 2 "
+        "counts 2). Without switches at the inputs, skip this.",
+        "command": f"Joint {task.joint} will move by at most 4 posture units (about a degree of a major axis) and back. "
+        "Watch it; the emergency stop ends it.",
     }[task.kind]
     return f"{text} (once more: {task.again})" if task.again else text
 
@@ -76,7 +76,7 @@ class TerminalOperator:
         """Asks for the angle of a joint that was moved by hand."""
         while True:
             console().print(
-                f"    joint {joint}, posture {number}: move it, hold it, and type its angle in degrees (Enter for no more): ",
+                f"    joint {joint}, posture {number}: move it, hold it, type its angle in degrees (Enter for no more): ",
                 end="",
             )
             answer = self._answer()

@@ -128,11 +128,13 @@ def draw_memory(seed: int, documented: Documented = "kept") -> HiddenMemory:
     registers = {}
     for name, register in shipped.registers.items():
         low, high = columns[name]
-        where = {"low": tuple(low), "high": None if high is None else tuple(high), "bits": bits.get(name, register.bits)}
+        where = {
+            "low": tuple(low),
+            "high": None if high is None else tuple(high),
+            "bits": bits.get(name, register.bits),
+        }
         registers[name] = register.model_copy(update={**where, "provenance": ("assumed",) * len(low)})
-    memory_map = MemoryMap(
-        version=1, name=f"secret {seed}", base=shipped.base, size=shipped.size, registers=registers
-    )
+    memory_map = MemoryMap(version=1, name=f"secret {seed}", base=shipped.base, size=shipped.size, registers=registers)
     p = [random.choice((2, 2, 3)) for _ in range(JOINTS)] if random.random() < 0.5 else [2] * JOINTS
     flags = [0] * JOINTS if random.random() < 0.6 else [random.randrange(16) for _ in range(JOINTS)]
     return HiddenMemory(seed, memory_map, tuple((g, 0, 0) for g in p), tuple(flags), _others(random, page))
@@ -204,18 +206,18 @@ def _others(random: Random, page: _Page) -> tuple[OtherRegister, ...]:
 
 def _constant(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     value = random.choice((0, 0, 2, random.randrange(256), random.randrange(256)))
-    return OtherRegister("constant", addresses, lambda now, before: (value,), changes=False)
+    return OtherRegister("constant", addresses, lambda _now, _before: (value,), changes=False)
 
 
 def _counter(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     step, start = random.choice((1, 1, 2, 5, -1)), random.randrange(256)
-    return OtherRegister("counter", addresses, lambda now, before: (start + step * now.tick,))
+    return OtherRegister("counter", addresses, lambda now, _before: (start + step * now.tick,))
 
 
 def _long_counter(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     divisor, start = random.choice((1, 1, 5, 50)), random.randrange(65536)
 
-    def value(now: PeriodSnapshot, before: PeriodSnapshot | None) -> tuple[int, int]:
+    def value(now: PeriodSnapshot, _before: PeriodSnapshot | None) -> tuple[int, int]:
         count = start + now.tick // divisor
         return count, count >> 8
 
@@ -224,13 +226,13 @@ def _long_counter(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
 
 def _noise(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     own, most = Random(random.getrandbits(64)), random.choice((3, 31, 255))
-    return OtherRegister("noise", addresses, lambda now, before: (own.randint(0, most),))
+    return OtherRegister("noise", addresses, lambda _now, _before: (own.randint(0, most),))
 
 
 def _drift(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     own, state = Random(random.getrandbits(64)), [random.randrange(60, 200)]
 
-    def value(now: PeriodSnapshot, before: PeriodSnapshot | None) -> tuple[int]:
+    def value(now: PeriodSnapshot, _before: PeriodSnapshot | None) -> tuple[int]:
         if now.tick % 25 == 0:
             state[0] += own.choice((-1, 0, 1))
         return (state[0],)
@@ -241,7 +243,7 @@ def _drift(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
 def _target(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     joint = random.randrange(JOINTS)
 
-    def value(now: PeriodSnapshot, before: PeriodSnapshot | None) -> tuple[int, int]:
+    def value(now: PeriodSnapshot, _before: PeriodSnapshot | None) -> tuple[int, int]:
         counts = posture_to_counts(min(now.set_points[joint], POSTURE_UNITS - 1))
         return counts, counts >> 8
 
@@ -269,19 +271,20 @@ def _last_position(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
 
 def _coarse_position(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     joint = random.randrange(JOINTS)
-    return OtherRegister(f"position {joint + 1} in 8 bits", addresses, lambda now, before: (now.positions[joint] >> 4,))
+    kind = f"position {joint + 1} in 8 bits"
+    return OtherRegister(kind, addresses, lambda now, _before: (now.positions[joint] >> 4,))
 
 
 def _pulse_width(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     joint = random.randrange(JOINTS)
     kind = f"pulse width {joint + 1} and its direction"
-    return OtherRegister(kind, addresses, lambda now, before: (abs(now.powers[joint]), int(now.powers[joint] < 0)))
+    return OtherRegister(kind, addresses, lambda now, _before: (abs(now.powers[joint]), int(now.powers[joint] < 0)))
 
 
 def _saturated(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     del random
 
-    def value(now: PeriodSnapshot, before: PeriodSnapshot | None) -> tuple[int]:
+    def value(now: PeriodSnapshot, _before: PeriodSnapshot | None) -> tuple[int]:
         return (sum((abs(power) >= 127) << joint for joint, power in enumerate(now.powers)),)
 
     return OtherRegister("joints at their limit", addresses, value)
@@ -289,7 +292,7 @@ def _saturated(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
 
 def _sum(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     del random
-    return OtherRegister("check sum", addresses, lambda now, before: (sum(now.positions) + sum(now.errors),))
+    return OtherRegister("check sum", addresses, lambda now, _before: (sum(now.positions) + sum(now.errors),))
 
 
 _MAKERS: tuple[tuple[Callable[[Random, tuple[int, ...]], OtherRegister], int], ...] = (

@@ -193,7 +193,7 @@ class Plant:
             self._step(pushed)
 
     def place(self, angles: Sequence[float], duration_us: int) -> None:
-        """Puts the arm at rest at six angles (rad) after `duration_us`, in which something else has held and moved it."""
+        """Puts the arm at rest at six angles (rad) after `duration_us`, in which something else held and moved it."""
         self._q[:] = angles
         self._v[:] = 0.0
         self._bristle = [0.0] * JOINTS

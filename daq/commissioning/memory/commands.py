@@ -65,7 +65,9 @@ def prove_by_command(page: Page, joints: Sequence[JointEvidence], joint: int) ->
     there = page.read_byte(low) | page.read_byte(high) << 8
     expected = before.positions[joint] + before.errors[joint]
     if not 0 <= there < POSTURE_UNITS or abs(posture_to_counts(there) - expected) > MOVED:
-        return CommandProof(joint, False, 0, 0.0, 0, f"its set point reads {there}, and error + position is {expected:.0f}")
+        return CommandProof(
+            joint, False, 0, 0.0, 0, f"its set point reads {there}, and error + position is {expected:.0f}"
+        )
     result = CommandProof(joint, False, 0, 0.0, 0)
     direction = 1 if (there & 0xFF) + LONGEST_STEP <= 0xFF and there + LONGEST_STEP < POSTURE_UNITS else -1
     try:

@@ -164,7 +164,6 @@ def _set_point_evidence(joint: JointEvidence, base: int) -> str:
     return f"for {shown}: low byte {low}, high byte {high}"
 
 
-
 def _documented(name: str, joint: int, low: int, high: int | None) -> Verdict:
     """Whether something found contradicts the source."""
     register = default_memory_map()[name]
@@ -200,9 +199,7 @@ def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[
 
 def _shipped_gains(recording: Recording) -> Columns:
     """Where the shipped map assumes the gains."""
-    p, i, d = (
-        tuple(address - recording.base for address in default_memory_map()[f"gain_{g}"].low) for g in "pid"
-    )
+    p, i, d = (tuple(address - recording.base for address in default_memory_map()[f"gain_{g}"].low) for g in "pid")
     return p, i, d
 
 

@@ -23,9 +23,7 @@ def gain_columns(held: NDArray[np.int64], measured: Sequence[int | None]) -> lis
     """
     if any(gain is None or not 1 <= gain <= GAIN_MAX for gain in measured):
         return []
-    shapes = [
-        tuple(tuple(row * apart + joint for joint in range(JOINTS)) for row in range(3)) for apart in (6, 8, 16)
-    ]
+    shapes = [tuple(tuple(row * apart + joint for joint in range(JOINTS)) for row in range(3)) for apart in (6, 8, 16)]
     shapes.append(tuple(tuple(3 * joint + row for joint in range(JOINTS)) for row in range(3)))
     wanted = np.array([measured, [0] * JOINTS, [0] * JOINTS])
     found: list[Columns] = []

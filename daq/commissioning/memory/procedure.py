@@ -114,7 +114,7 @@ class Finder:
     page: Page
     operator: Operator
     inputs: int = 0
-    keep: Callable[[Recording], None] = lambda recording: None
+    keep: Callable[[Recording], None] = lambda _recording: None
     """Called after every stage, so that nothing is lost."""
     recording: Recording = field(init=False)
     epoch: int = 0
@@ -223,9 +223,7 @@ def _quarter(joint: int, epoch: int) -> int:
 def errors_now(page: Page, joints: Sequence[JointEvidence]) -> dict[int, int]:
     """The errors (ADC counts) of the joints whose error is known: the median of a few readings."""
     pages = np.frombuffer(b"".join(page.read().data for _ in range(5)), np.uint8).reshape(5, -1)
-    return {
-        one.joint: int(np.median(signed_of(pages, one.pair.error))) for one in joints if one.pair is not None
-    }
+    return {one.joint: int(np.median(signed_of(pages, one.pair.error))) for one in joints if one.pair is not None}
 
 
 def may_have_power(errors: Mapping[int, int]) -> str:

@@ -35,7 +35,7 @@ LEAST_TRAVEL = 400
 NOISE = 2.5
 """Largest difference (ADC counts) between two readings of a joint at rest, from noise and rounding."""
 SAME_PERIOD = 0.4
-"""Largest delay, in control periods, of what belongs to the same period; a copy of the period before has a delay of 1."""
+"""Largest delay, in control periods, of what belongs to the same period; a copy of the last one has a delay of 1."""
 SETTLED = 60
 """Largest error (ADC counts) of an arm that its drives hold, or whose set points are the posture at switching on: 4
 degrees of a major axis, by which its load may pull it down."""
@@ -213,14 +213,14 @@ def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
             agree = difference <= tolerance
             torn = (np.abs(difference - 256) <= tolerance) & (_near_turn(p, tolerance) | _near_turn(e, tolerance))
             share = float(np.mean(agree | torn))
-            if share < HOLDS or np.mean(agree) < MOSTLY or not _settles(stages.recording, position, error):
+            if share < HOLDS or np.mean(agree) < MOSTLY or not _settles(stages.recording, error):
                 continue
             delay = _delay((target - p - e)[inside] * -1.0, rate[inside])
             found.append(Pair(position, error, share, delay))
     return found
 
 
-def _settles(recording: Recording, position: Place, error: Place) -> bool:
+def _settles(recording: Recording, error: Place) -> bool:
     """Whether the error is small while the drives hold the arm, and right after each switching-on at other postures.
 
     Without it position and error could be taken for one another.
@@ -255,9 +255,7 @@ def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) ->
     """
     limit = SAME_PERIOD * period_s
     lows = sorted({pair.position.low for pair in candidates})
-    ahead = [
-        low for low in lows if all(other == low or _low_delay(stages, low, other) > limit for other in lows)
-    ]
+    ahead = [low for low in lows if all(other == low or _low_delay(stages, low, other) > limit for other in lows)]
     if len(ahead) != 1:
         return None
     left = [pair for pair in candidates if pair.position.low == ahead[0] and abs(pair.delay) <= limit]

@@ -45,7 +45,10 @@ def acceptance_sheet(record: Record) -> Report:
     sections = []
     for step in done:
         result = record.steps[step.name]
-        blocks: list[Block] = [Text(f"{step.does} Done {result['done']}.", "quiet"), *_pictures(record, step.name, result)]
+        blocks: list[Block] = [
+            Text(f"{step.does} Done {result['done']}.", "quiet"),
+            *_pictures(record, step.name, result),
+        ]
         blocks.append(_table(result))
         sections.append(Section(step.title, tuple(blocks)))
     answer = f"{len(done)} of {len(STEPS)} steps are done."
@@ -54,7 +57,10 @@ def acceptance_sheet(record: Record) -> Report:
     skipped = [one for one in done if record.steps[one.name].get("skipped")]
     if skipped:
         answer += f" Skipped: {', '.join(one.title for one in skipped)}."
-    facts = (("folder", record.folder.absolute().name), ("port", str(record.steps.get("line", {}).get("port", "not known"))))
+    facts = (
+        ("folder", record.folder.absolute().name),
+        ("port", str(record.steps.get("line", {}).get("port", "not known"))),
+    )
     return Report("Acceptance sheet", answer, facts, tuple(sections), errors="Intervals hold 95 %.")
 
 
@@ -81,10 +87,17 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
 
     if name == "memory" and (record.folder / FINDINGS).exists():
         findings = json.loads((record.folder / FINDINGS).read_text("utf-8"))
-        return [Picture(memory_picture(findings), "The shared memory. Filled: found; outlined: assumed; letters name the register.")]
+        return [
+            Picture(
+                memory_picture(findings),
+                "The shared memory. Filled: found; outlined: assumed; letters name the register.",
+            )
+        ]
     sensors = {key: value for key, value in result.items() if key.startswith("joint_") and isinstance(value, dict)}
     if name == "potentiometers" and sensors:
-        return [Picture(_sensor_picture(sensors), "Departure of the protractor's angles from each joint's straight line.")]
+        return [
+            Picture(_sensor_picture(sensors), "Departure of the protractor's angles from each joint's straight line.")
+        ]
     return []
 
 
@@ -97,10 +110,11 @@ def memory_picture(findings: dict[str, Any]) -> str:
             if half in one:
                 owner[int(one[half], 16)] = (one, half)
     rows = -(-size // COLUMNS)
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {COLUMNS * CELL + 50} {rows * CELL + 4}" '
-        'role="img" font-family="monospace" font-size="10">'
-    ]
+    view = f"0 0 {COLUMNS * CELL + 50} {rows * CELL + 4}"
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{view}" role="img" font-family="monospace" font-size="10">'
+    )
+    parts = [head]
     for offset in range(size):
         x, y = 46 + offset % COLUMNS * CELL, offset // COLUMNS * CELL
         if offset % COLUMNS == 0:

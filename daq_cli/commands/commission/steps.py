@@ -1,4 +1,4 @@
-"""The steps of a commissioning, in order. Each says what it does, what to watch and how to stop, and returns its result."""
+"""The steps of a commissioning, in order: what each does, what to watch, how to stop, and its result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from daq_cli.app.context import Invocation, console
 from daq_cli.commands.commission.record import Record
 
 if TYPE_CHECKING:
-    from daq.commissioning.memory.procedure import Operator, Task
+    from daq.commissioning.memory.procedure import Task
     from daq.commissioning.potentiometer import Potentiometer
     from daq.driver import Controller
     from daq_cli.robot.memory_page import LinkPage
@@ -172,7 +172,7 @@ def bridge(bench: Bench) -> dict[str, Any]:
     far = [joint for joint, position in told.items() if abs(position - own[joint]) > SAME_READING]
     if far:
         raise NotCommissionedError(
-            f"the bridge reads joints {', '.join(map(str, far))} elsewhere than {MAP} says: it works by another memory map. "
+            f"the bridge reads joints {', '.join(map(str, far))} elsewhere than {MAP} says: it works by another map. "
             "Give it this one (a mock: --memory-map; a board: docs/hardware.md), then run `daq commission` again"
         )
     return {"positions": [round(own[joint]) for joint in sorted(own)]}
@@ -207,7 +207,9 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
         errors = _errors(page, memory_map)
         far = [joint for joint, error in errors.items() if abs(error) > SAME_READING]
         if far:
-            raise SafetyError(f"joints {far} are away from their set points and would jump: keep the emergency stop pressed")
+            raise SafetyError(
+                f"joints {far} are away from their set points and would jump: keep the emergency stop pressed"
+            )
         bench.operator.begin(Task("release_emergency_stop"))
     with replacing(bench.folder / MACHINE) as part:
         part.write_text(measured_machine_text(sensors), "utf-8")
@@ -225,7 +227,10 @@ def stop(bench: Bench) -> dict[str, Any]:
         if not confirmation.acknowledged:
             raise NotCommissionedError(f"the stop was not confirmed: {confirmation.problem}. Use the emergency stop")
         controller.release()
-    return {"confirmed_ms": round(taken, 2), "frozen": [confirmation.frozen[joint] for joint in sorted(confirmation.frozen)]}
+    return {
+        "confirmed_ms": round(taken, 2),
+        "frozen": [confirmation.frozen[joint] for joint in sorted(confirmation.frozen)],
+    }
 
 
 def period(bench: Bench) -> dict[str, Any]:
@@ -289,7 +294,9 @@ def model(bench: Bench) -> dict[str, Any]:
     return {
         **left,
         "above_the_noise_floor": above,
-        "next": f"daq diagnose {bench.record.steps['ramp']['trace']}" if above else "nothing: the model explains the ramp",
+        "next": f"daq diagnose {bench.record.steps['ramp']['trace']}"
+        if above
+        else "nothing: the model explains the ramp",
     }
 
 
@@ -316,7 +323,14 @@ STEPS = (
         "the emergency stop; q or Ctrl-C ends the search",
         memory,
     ),
-    Step("bridge", "The bridge's memory map", "Compares the bridge's readings with the map that was found.", SEE, "Ctrl-C", bridge),
+    Step(
+        "bridge",
+        "The bridge's memory map",
+        "Compares the bridge's readings with the map that was found.",
+        SEE,
+        "Ctrl-C",
+        bridge,
+    ),
     Step(
         "potentiometers",
         "Potentiometers",
@@ -325,9 +339,23 @@ STEPS = (
         "the emergency stop stays pressed throughout",
         potentiometers,
     ),
-    Step("stop", "The program's stop", "Stops the resting arm and releases it again.", "The arm stays where it is.", KEY, stop),
+    Step(
+        "stop",
+        "The program's stop",
+        "Stops the resting arm and releases it again.",
+        "The arm stays where it is.",
+        KEY,
+        stop,
+    ),
     Step("period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period),
-    Step("gain", "Gain of each joint", "Moves the joints by steps of 1 to 3 degrees at three postures.", "The arm.", KEY, gain),
+    Step(
+        "gain",
+        "Gain of each joint",
+        "Moves the joints by steps of 1 to 3 degrees at three postures.",
+        "The arm.",
+        KEY,
+        gain,
+    ),
     Step("first_ramp", "First ramp, joint 1", "Moves joint 1 by 21.6 degrees in 0.65 s.", "The arm.", KEY, first_ramp),
     Step("ramp", "Ramp, joints 1 to 3", "Moves joints 1 to 3 by 21.6 degrees in 0.65 s.", "The arm.", KEY, ramp),
     Step("model", "The model", "Compares the ramp with the machine file.", "It only computes.", "Ctrl-C", model),
@@ -340,8 +368,9 @@ def sensor_line(found: Potentiometer) -> str:
     degrees = math.degrees
     return (
         f"joint {found.joint}: reading {'rises' if found.direction > 0 else 'falls'} with the angle, range "
-        f"{degrees(found.range.value):.2f}° ± {degrees(found.range.half_width):.2f}°, zero {degrees(found.at_zero.value):.2f}° "
-        f"± {degrees(found.at_zero.half_width):.2f}°, bend {100 * found.bend.value:.2f} % ± {100 * found.bend.half_width:.2f} %"
+        f"{degrees(found.range.value):.2f}° ± {degrees(found.range.half_width):.2f}°, "
+        f"zero {degrees(found.at_zero.value):.2f}° ± {degrees(found.at_zero.half_width):.2f}°, "
+        f"bend {100 * found.bend.value:.2f} % ± {100 * found.bend.half_width:.2f} %"
     )
 
 
