@@ -1,7 +1,8 @@
 """Direction, zero, range and bend of a potentiometer, from readings at postures that a protractor has measured.
 
 A straight line through angles over readings, by least squares; intervals are Student's at 95 %, from the scatter that
-the readings themselves show. The bend is the largest departure of a parabola from that line within the range of readings.
+the readings themselves show. The bend is the largest departure of a parabola from that line between the outermost
+readings.
 """
 
 from __future__ import annotations

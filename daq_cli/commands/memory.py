@@ -227,7 +227,7 @@ def _watch_text(found: list[WatchedByte]) -> str:
         if one.changes:
             together = ", ".join(f"{address:04X}" for address in one.together)
             lines.append(
-                f"{one.address:04X}  {one.value:3d}  from {one.lowest:3d} to {one.highest:3d}  {one.rate:5.1f} changes/s"
+                f"{one.address:04X}  {one.value:3d}  {one.lowest:3d} to {one.highest:3d}  {one.rate:5.1f} changes/s"
                 + (f"  with {together}" if together else "")
             )
     return "\n".join(lines)

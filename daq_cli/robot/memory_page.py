@@ -20,8 +20,8 @@ from firmware_protocol.framing import MAX_PAYLOAD
 if TYPE_CHECKING:
     from firmware_protocol.memory_map import MemoryMap
 
-LOCK_STEP_PAUSE_S = 0.012
-"""Time between two readings of a mock in lock-step, where reading itself takes next to none."""
+APART = 0.8
+"""Least time from one reading of the memory to the next, in control periods: nothing new comes more often."""
 
 
 class UnprovedWriteError(SafetyError):
@@ -38,6 +38,7 @@ class LinkPage:
     proved: set[int] = field(default_factory=set)
     """Addresses that may be written."""
     _forward: bool = True
+    _next_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.hello = self._greet()
@@ -52,14 +53,14 @@ class LinkPage:
 
     def read(self) -> PageReading:
         """All bytes, in as few requests as possible. Raises LinkError, RequestRefusedError."""
-        if self.link.lock_step:
-            self.wait(LOCK_STEP_PAUSE_S)
+        self.clock.sleep_until(self._next_s)
         end = self.base + self.size
         requests = [ReadBlock(start, min(MAX_PAYLOAD, end - start)) for start in range(self.base, end, MAX_PAYLOAD)]
         if not self._forward:
             requests.reverse()
         self._forward = not self._forward
         begun = self.clock.now()
+        self._next_s = begun + APART * self.period_s
         data = bytearray(self.size)
         for request, reply in zip(requests, self.link.exchange(*requests), strict=True):
             offset = request.address - self.base

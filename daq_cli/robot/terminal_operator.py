@@ -76,7 +76,7 @@ class TerminalOperator:
         """Asks for the angle of a joint that was moved by hand."""
         while True:
             console().print(
-                f"    joint {joint}, posture {number}: move it, hold it, type its angle in degrees (Enter for no more): ",
+                f"    joint {joint}, posture {number}: move and hold it, type its angle in degrees (Enter: no more): ",
                 end="",
             )
             answer = self._answer()

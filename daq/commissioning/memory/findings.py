@@ -99,7 +99,7 @@ def judge(recording: Recording) -> Findings:
 
 
 def _places(joint: JointEvidence) -> dict[str, Place]:
-    found = {}
+    found: dict[str, Place] = {}
     if joint.pair is not None:
         found |= {"position": joint.pair.position, "error": joint.pair.error}
     if joint.power is not None:

@@ -30,8 +30,7 @@ def _with_sensor(joint: str, sensor: Potentiometer) -> str:
     }
     values["direction"] = str(sensor.direction)
     for name, value in values.items():
-        line = f"{name} = {value}\n"
-        after, count = re.subn(rf"(?m)^{name} = .*\n", lambda _match, line=line: line, after, count=1)
-        if not count:
-            after = line + after
+        found = re.search(rf"(?m)^{name} = .*\n", after)
+        start, end = found.span() if found else (0, 0)
+        after = f"{after[:start]}{name} = {value}\n{after[end:]}"
     return before + table + after
