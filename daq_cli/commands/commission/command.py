@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -15,7 +15,7 @@ from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, YesOption, console, invocation
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import write_sheet
-from daq_cli.commands.commission.steps import STEPS, Bench, Step, step_named
+from daq_cli.commands.commission.steps import STEPS, Bench, Commissioner, Step, step_named
 
 app = typer.Typer(add_completion=False)
 
@@ -68,7 +68,7 @@ def _carry_out(bench: Bench, step: Step) -> None:
 
 
 @contextmanager
-def _person(call: Invocation, mock_control: str | None) -> Iterator[Any]:
+def _person(call: Invocation, mock_control: str | None) -> Iterator[Commissioner]:
     """The person at the terminal, or a mock's stand-in."""
     if mock_control is None:
         from daq_cli.robot.terminal_operator import TerminalOperator

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from daq.commissioning.memory.procedure import Operator, Task
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError, SpecError
 from daq_cli.app.consent import ConsentPrompt
@@ -18,7 +19,6 @@ from daq_cli.app.context import Invocation, console
 from daq_cli.commands.commission.record import Record
 
 if TYPE_CHECKING:
-    from daq.commissioning.memory.procedure import Task
     from daq.commissioning.potentiometer import Potentiometer
     from daq.driver import Controller
     from daq_cli.robot.memory_page import LinkPage
@@ -42,12 +42,9 @@ class NotCommissionedError(DaqError):
     exit_code = exit_codes.NOT_REACHED
 
 
-class Commissioner(Protocol):
+class Commissioner(Operator, Protocol):
     """The person at the arm, who also reads a protractor."""
 
-    def begin(self, task: Task) -> bool: ...
-    def finished(self) -> bool: ...
-    def show(self, text: str) -> None: ...
     def read_angle(self, joint: int, number: int) -> float | None:
         """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more."""
 
@@ -58,7 +55,7 @@ class Bench:
 
     call: Invocation
     folder: Path
-    operator: Commissioner | Any
+    operator: Commissioner
     consent: ConsentPrompt
     record: Record
     joints: tuple[int, ...] = (1, 2, 3)
@@ -180,7 +177,6 @@ def bridge(bench: Bench) -> dict[str, Any]:
 
 def potentiometers(bench: Bench) -> dict[str, Any]:
     """Direction, zero, range and bend of the sensors, by a protractor."""
-    from daq.commissioning.memory.procedure import Task
     from daq.commissioning.potentiometer import calibrate_potentiometer
     from daq_cli.app.output_file import replacing
     from daq_cli.commands.commission.machine_text import measured_machine_text
