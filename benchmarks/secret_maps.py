@@ -139,7 +139,7 @@ def search(seed: int, documented: Documented, *, commands: bool = True) -> Score
     options = Options(tcp="nowhere:0", secret_map=seed, documented=documented, seed=seed, start=start, lock_step=True)
     board = build_device(options, lambda _: None).board
     page, arm = BoardPage(board), BoardArm(board)
-    operator = MockOperator(arm, load_machine("ma2000"), dict(enumerate(map(float, start), start=1)))
+    operator = MockOperator(arm, load_machine("ma2000"), postures=dict(enumerate(map(float, start), start=1)))
     findings = Finder(page, operator, inputs=5).find()
     proofs: list[CommandProof] = []
     if commands and not may_have_power(errors_now(page, findings.joints)):

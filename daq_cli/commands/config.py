@@ -32,7 +32,9 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
 @app.command()
 def copy(
     what: Annotated[str, typer.Argument(help="memory-map, or machine.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write (default: its own name).")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write (default: its own name).")
+    ] = None,
 ) -> None:
     """Copy a file that ships, the memory map or the machine file, in order to change the copy."""
     from importlib import resources

@@ -265,10 +265,10 @@ def _operator(call: Invocation, mock_control: str | None) -> Iterator[Operator]:
 
         yield TerminalOperator()
         return
-    from daq_cli.robot.mock_hand import ControlPortArm, MockOperator
+    from daq_cli.robot.mock_hand import IN_REAL_TIME, ControlPortArm, MockOperator
 
     arm: ControlPortArm = ControlPortArm(mock_control)
     try:
-        yield MockOperator(arm, call.settings.machine(), arm.postures())
+        yield MockOperator(arm, call.settings.machine(), IN_REAL_TIME, arm.postures())
     finally:
         arm.close()

@@ -22,6 +22,8 @@ SWEEP = ((60, 1.2), (940, 2.0))
 """Posture units, and seconds to get there: most of the range."""
 
 
+IN_REAL_TIME = 2.5
+"""Factor by which a mock's arm is led more slowly through its control port, where this computer may pause."""
 PLACES, PLACES_APART = 11, 3
 """Postures of a protractor over a joint's range, and from one to the next."""
 
@@ -54,6 +56,8 @@ class MockOperator:
 
     arm: MockArm
     machine: Machine
+    slow: float = 1.0
+    """Factor on all times of a movement."""
     postures: dict[int, float] = field(default_factory=lambda: dict.fromkeys(range(1, JOINTS + 1), 500.0))
     _path: list[tuple[dict[int, float], float]] = field(default_factory=list)
     _until: float = 0.0
@@ -86,6 +90,7 @@ class MockOperator:
         if not self._path:
             return True
         to, seconds = self._path.pop(0)
+        seconds *= self.slow
         self.postures |= to
         self.arm.lead({joint: self._degrees(joint, posture) for joint, posture in to.items()}, seconds)
         self._until = self.arm.now() + seconds

@@ -32,7 +32,7 @@ def words(task: Task) -> str:
         "have been read: the arm should stay where it is. If it moves, press at once.",
         "set_inputs": f"Switch the process inputs so that their number is {task.inputs} (input 1 counts 1, input 2 "
         "counts 2). Without switches at the inputs, skip this.",
-        "command": f"Joint {task.joint} will move by at most 4 posture units (about a degree of a major axis) and back. "
+        "command": f"Joint {task.joint} will move by at most 4 posture units (a degree of a major axis) and back. "
         "Watch it; the emergency stop ends it.",
     }[task.kind]
     return f"{text} (once more: {task.again})" if task.again else text

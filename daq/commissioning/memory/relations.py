@@ -30,6 +30,9 @@ MOSTLY = 0.75
 """Least share of readings that are not torn; a fast movement reads many a position with its high byte of the period
 before or after. Between two readings a joint may move by half a turn of its low byte, 128 counts: at 50 readings a
 second by 6000 counts/s, its whole range in 0.7 s."""
+GAP = 3.5
+"""Longest time between two readings, in control periods, over which a movement is followed: half a turn of a low byte
+at 1800 counts/s."""
 LEAST_TRAVEL = 400
 """Least travel (ADC counts) of a led joint from which its bytes are told apart; 256 are one turn of a low byte."""
 NOISE = 2.5
@@ -103,7 +106,10 @@ class JointStages:
         self.recording = recording
         self.pages = np.concatenate([stage.pages for stage in self.led])
         self.times = np.concatenate([stage.times for stage in self.led])
-        self.ends = np.cumsum([len(stage.times) for stage in self.led])[:-1]
+        gaps = np.diff(self.times) > GAP * recording.period_s
+        within = np.cumsum([len(stage.times) for stage in self.led])[:-1]
+        self.ends = np.union1d(np.flatnonzero(gaps) + 1, within)
+        """Where readings do not follow one another: a new stage, or a pause of the computer."""
         self._continuous: dict[int, Numbers] = {}
 
     def rate(self, values: Numbers) -> Numbers:

@@ -75,10 +75,10 @@ def _person(call: Invocation, mock_control: str | None) -> Iterator[Commissioner
 
         yield TerminalOperator()
         return
-    from daq_cli.robot.mock_hand import ControlPortArm, MockOperator
+    from daq_cli.robot.mock_hand import IN_REAL_TIME, ControlPortArm, MockOperator
 
     arm = ControlPortArm(mock_control)
     try:
-        yield MockOperator(arm, call.settings.machine(), arm.postures())
+        yield MockOperator(arm, call.settings.machine(), IN_REAL_TIME, arm.postures())
     finally:
         arm.close()

@@ -34,9 +34,9 @@ class Arm:
         target = posture_to_counts(self.posture)
         position = self.start + self.sign * (target - self.start)
         error = (target - position) & 0xFFFF
-        return bytes(
-            byte for value in (position, error, self.posture) for byte in (value & 0xFF, value >> 8)
-        ) + bytes(2)
+        return bytes(byte for value in (position, error, self.posture) for byte in (value & 0xFF, value >> 8)) + bytes(
+            2
+        )
 
     def read(self) -> PageReading:
         self.time += 0.02
@@ -67,7 +67,7 @@ def evidence(*, proved: bool = True) -> JointEvidence:
 def test_the_value_that_is_there_is_written_first_then_one_unit_more_and_at_last_the_old_value() -> None:
     arm = Arm(500)
     proof = prove_by_command(arm, [evidence()], 1)
-    assert proof.proved and proof.sign == 1 and proof.step == 1
+    assert (proof.proved, proof.sign, proof.step) == (True, 1, 1)
     assert arm.writes == [(BASE + 4, 0xF4), (BASE + 4, 0xF5), (BASE + 4, 0xF4)]
 
 
