@@ -162,17 +162,23 @@ def bridge(bench: Bench) -> dict[str, Any]:
     """Whether the bridge works by the memory map that was found."""
     from daq_cli.robot.memory_page import open_page
 
-    with open_page(bench.call.port, bench.memory_map()) as page:
-        own = _positions(page, bench.memory_map())
+    memory_map = bench.memory_map()
+    with open_page(bench.call.port, memory_map) as page:
+        own = {name: _medians(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
     with _controller(bench) as controller:
-        told = {joint: reading.position for joint, reading in controller.errors_positions_powers().items()}
-    far = [joint for joint, position in told.items() if abs(position - own[joint]) > SAME_READING]
+        told = controller.errors_positions_powers()
+    far = [
+        f"{name.replace('_', ' ')} {joint}"
+        for name, values in own.items()
+        for joint, value in values.items()
+        if abs(getattr(told[joint], name) - value) > (SAME_READING if name != "set_point" else 0)
+    ]
     if far:
         raise NotCommissionedError(
-            f"the bridge reads joints {', '.join(map(str, far))} elsewhere than {MAP} says: it works by another map. "
+            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
             "Give it this one (a mock: --memory-map; a board: docs/hardware.md), then run `daq commission` again"
         )
-    return {"positions": [round(own[joint]) for joint in sorted(own)]}
+    return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
 
 
 def potentiometers(bench: Bench) -> dict[str, Any]:
