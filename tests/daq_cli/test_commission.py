@@ -118,3 +118,16 @@ def test_every_task_that_takes_the_drives_power_says_that_the_arm_may_sink() -> 
     assert "may sink" in words(Task("press_emergency_stop"))
     assert "keep a hand at the emergency stop" in words(Task("release_emergency_stop"))
     assert "once more: no byte follows it" in words(Task("lead", joint=1, again="no byte follows it"))
+
+
+@pytest.mark.parametrize("options", ["", "&no_sample=1"])
+def test_a_sound_controller_keeps_every_promise(daq: CommandLine, options: str) -> None:
+    said = daq("--port", MOCK + options, "robot", "check", "--json")
+    assert said.code == 0
+    assert all(one["kept"] for one in json.loads(said.out))
+
+
+def test_a_controller_whose_bridge_believes_in_a_wrong_map_breaks_some(daq: CommandLine) -> None:
+    said = daq("--port", MOCK + "&secret_map=3&documented=moved", "robot", "check")
+    assert said.code == 5
+    assert "BROKEN  position + error is the set point" in said.out
