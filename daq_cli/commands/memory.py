@@ -123,6 +123,8 @@ def search(
     found = Finder(page, operator, inputs=5 if inputs else 0, keep=lambda recording: save(judge(recording), [])).find()
     save(found, [])
     proofs = _prove(call, page, operator, consent, found) if commands else []
+    if not commands:
+        operator.show("The emergency stop stays pressed: release it only when every error is small, or the arm jumps.")
     save(found, proofs)
     return found, proofs
 

@@ -150,8 +150,11 @@ class ControlPortArm:
         return float(self.ask("state")["time_us"]) * 1e-6
 
     def wait(self, seconds: float) -> None:
-        """Sleeps; a mock in lock-step has no time of its own to wait for."""
+        """Sleeps. Raises MockRefusedError for a mock in lock-step, whose time stands still meanwhile."""
+        before = self.now()
         time.sleep(seconds)
+        if self.now() == before:
+            raise MockRefusedError("a mock in lock-step has no time of its own: start it without --lock-step")
 
     def postures(self) -> dict[int, float]:
         """Where its set points are (posture units)."""

@@ -34,7 +34,7 @@ class CommandProof:
     """What a joint did when its set point was moved.
 
     proved:   whether the error followed the set point that was written
-    steps:    the largest step that was written (posture units, signed); 0 if none was
+    step:     the largest step that was written (posture units, signed); 0 if none was
     moved:    ADC counts by which the joint moved with that step
     sign:     1 if the joint moved towards the set point, -1 if away from it, 0 if it did not move
     problem:  why the proof was not completed; empty otherwise

@@ -64,8 +64,10 @@ class Findings:
         return [one for one in self.all if one.low is None]
 
     def memory_map(self, name: str) -> MemoryMap | None:
-        """The memory map, with "found" and "assumed" for each address; None while a register has no place."""
-        if self.missing():
+        """The memory map, with "found" and "assumed" for each address; None while a register has no place, and where
+        the errors of some joints have two bytes and of others one."""
+        widths = {one.high is None for one in self.all if one.register == "error"}
+        if self.missing() or len(widths) > 1:
             return None
         shipped = default_memory_map()
         registers = {key: self._register(key, register) for key, register in shipped.registers.items()}

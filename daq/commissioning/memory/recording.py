@@ -25,7 +25,7 @@ class Stage:
     """Readings during which one thing was done.
 
     kind:  rest, or a joint led by hand, or the rest after the controller was switched on again, or inputs switched
-    joint: the joint that was led; None for all else
+    joint: the joint that was led, or the number of the inputs that were on; None for all else
     epoch: how often the controller had been switched on again before
     pages: (n, size)
     times: (n,) in s

@@ -22,6 +22,7 @@ from firmware_protocol.units import ADC_COUNTS, counts_to_posture, posture_to_co
 Numbers = NDArray[np.float64]
 
 SIXTEEN_BITS = 0x10000
+"""After which a value of two bytes begins anew."""
 HOLDS = 0.95
 """Least share of readings in which a relation must hold; the others may be torn."""
 WIDEST = 80.0
@@ -65,7 +66,7 @@ class Place:
 @dataclass(frozen=True)
 class Pair:
     """Position and error of one joint, as one hypothesis. `share` is that of readings in which both agree with one set
-    point, `delay` (s) how far the error lags behind, `fault` what speaks against the hypothesis."""
+    point, `delay` (s) how far the error lags behind."""
 
     position: Place
     error: Place

@@ -91,7 +91,7 @@ class Bench:
 
 
 class Step(NamedTuple):
-    """One step. `moves` is what moves; empty for nothing."""
+    """One step: what it does, what to watch, how to stop, and the function that returns its result."""
 
     name: str
     title: str
@@ -164,7 +164,7 @@ def bridge(bench: Bench) -> dict[str, Any]:
 
     memory_map = bench.memory_map()
     with open_page(bench.call.port, memory_map) as page:
-        own = {name: _medians(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
+        own = {name: _typical(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
     with _controller(bench) as controller:
         told = controller.errors_positions_powers()
     far = [
@@ -403,15 +403,16 @@ def _controller(bench: Bench) -> Controller:
 
 
 def _positions(page: LinkPage, memory_map: MemoryMap, count: int = 5) -> dict[int, float]:
-    """Positions (ADC counts), the median of readings of each: a torn one does not count."""
-    return _medians(page, memory_map, "position", count)
+    """Positions (ADC counts) from a number of readings."""
+    return _typical(page, memory_map, "position", count)
 
 
 def _errors(page: LinkPage, memory_map: MemoryMap) -> dict[int, float]:
-    return _medians(page, memory_map, "error", 5)
+    return _typical(page, memory_map, "error", 5)
 
 
-def _medians(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
+def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
+    """A register of each joint: the mean of its readings without the smallest and the largest, which may be torn."""
     register = memory_map[name]
     values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
     for _ in range(count):
@@ -419,7 +420,7 @@ def _medians(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> di
         for joint, of_joint in values.items():
             high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
             of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
-    return {joint: float(np.mean(np.sort(of_joint)[1:-1])) for joint, of_joint in values.items()}
+    return {joint: float(np.mean(np.sort(one)[1:-1])) for joint, one in values.items()}
 
 
 def step_named(name: str) -> Step:
