@@ -33,7 +33,7 @@ from mock_controller.device import build_device
 from mock_controller.hidden.memory import Documented, draw_memory
 from mock_controller.options import Options
 
-REGISTRATION = Path(__file__).parent.parent / "docs" / "trial" / "secret-maps.toml"
+REGISTRATION = Path(__file__).parent.parent / "docs" / "secret-maps.toml"
 TARGET = ("position", "error", "power")
 """Registers of which nearly all must be found."""
 LEAST_FOUND = 0.99
