@@ -79,6 +79,9 @@ class MockOperator:
             self._path = [({task.joint: centre + by}, seconds) for by, seconds in WIGGLE]
             self._path += [({task.joint: to}, seconds) for to, seconds in SWEEP]
             self._path.append(({task.joint: here}, 1.2))
+        elif task.kind == "push" and task.joint is not None:
+            here = self.postures[task.joint]
+            self._path = [({task.joint: here + (12 if here < 500 else -12)}, 0.5)]
         elif task.kind == "place":
             self._path = [({joint: float(to) for joint, to in task.targets.items()}, 1.0)]
         return True

@@ -42,6 +42,7 @@ TaskKind = Literal[
     "rest",
     "press_emergency_stop",
     "lead",
+    "push",
     "place",
     "switch_off_and_on",
     "release_emergency_stop",

@@ -32,6 +32,8 @@ AVERAGED = 12
 """Number of readings averaged at each posture of a protractor."""
 SAME_READING = 12
 """Largest difference (ADC counts) between a position by the bridge's memory map and by the one that was found."""
+PUSHED, STAYS = 25, 5
+"""ADC counts by which a joint is to be pushed off its set point, and by which it may still move then."""
 CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings.json", "machine.toml"
 TO_GAIN = (1, 2, 3)
 
@@ -203,20 +205,50 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
                 angles.append(math.radians(angle))
             sensors.append(calibrate_potentiometer(joint, counts, angles))
             bench.operator.show(sensor_line(sensors[-1]))
-        bench.operator.begin(Task("switch_off_and_on"))
-        page.wait(1.0)
-        page.reconnect()
-        errors = _errors(page, memory_map)
-        far = [joint for joint, error in errors.items() if abs(error) > SAME_READING]
-        if far:
-            raise SafetyError(
-                f"joints {far} are away from their set points and would jump: keep the emergency stop pressed"
-            )
-        bench.operator.begin(Task("release_emergency_stop"))
+        _give_power_back(bench, page, memory_map)
     with replacing(bench.folder / MACHINE) as part:
         part.write_text(measured_machine_text(sensors), "utf-8")
     bench.configure()
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
+
+
+def _give_power_back(bench: Bench, page: LinkPage, memory_map: MemoryMap) -> None:
+    """Makes the posture the set points by switching off and on, and has the emergency stop released. Raises SafetyError
+    where the arm would jump."""
+    bench.operator.begin(Task("switch_off_and_on"))
+    page.wait(1.0)
+    page.reconnect()
+    errors = _typical(page, memory_map, "error", 5)
+    far = [joint for joint, error in errors.items() if abs(error) > SAME_READING]
+    if far:
+        raise SafetyError(
+            f"joints {far} are away from their set points and would jump: keep the emergency stop pressed"
+        )
+    bench.operator.begin(Task("release_emergency_stop"))
+
+
+def emergency_stop(bench: Bench) -> dict[str, Any]:
+    """Whether the emergency stop takes the drives' power: a joint then stays off its set point, whatever its power."""
+    from daq_cli.robot.memory_page import open_page
+
+    memory_map, joint = bench.memory_map(), bench.joints[0]
+    with open_page(bench.call.port, memory_map) as page:
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop was not pressed, so nothing is known about it")
+        bench.operator.begin(Task("push", joint=joint))
+        while not bench.operator.finished():
+            page.read()
+        page.wait(0.5)
+        before, error = (_typical(page, memory_map, name, 5)[joint] for name in ("position", "error"))
+        page.wait(1.0)
+        after, power = (_typical(page, memory_map, name, 5)[joint] for name in ("position", "power"))
+        if abs(error) < PUSHED or abs(after - before) > STAYS or abs(power) < PUSHED / 2:
+            raise NotCommissionedError(
+                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved by {after - before:.0f} counts in a "
+                f"second; an arm without power stays at least {PUSHED} counts off its set point where it was put"
+            )
+        _give_power_back(bench, page, memory_map)
+    return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
 
 
 def stop(bench: Bench) -> dict[str, Any]:
@@ -342,6 +374,14 @@ STEPS = (
         potentiometers,
     ),
     Step(
+        "emergency_stop",
+        "Emergency stop",
+        "Reads whether a joint that you push off its set point stays there while the emergency stop is pressed.",
+        "The arm, which may sink while the emergency stop is pressed.",
+        "the emergency stop stays pressed",
+        emergency_stop,
+    ),
+    Step(
         "stop",
         "The program's stop",
         "Stops the resting arm and releases it again.",
@@ -405,10 +445,6 @@ def _controller(bench: Bench) -> Controller:
 def _positions(page: LinkPage, memory_map: MemoryMap, count: int = 5) -> dict[int, float]:
     """Positions (ADC counts) from a number of readings."""
     return _typical(page, memory_map, "position", count)
-
-
-def _errors(page: LinkPage, memory_map: MemoryMap) -> dict[int, float]:
-    return _typical(page, memory_map, "error", 5)
 
 
 def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
