@@ -244,8 +244,8 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
         after, power = (_typical(page, memory_map, name, 5)[joint] for name in ("position", "power"))
         if abs(error) < PUSHED or abs(after - before) > STAYS or abs(power) < PUSHED / 2:
             raise NotCommissionedError(
-                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved by {after - before:.0f} counts in a "
-                f"second; an arm without power stays at least {PUSHED} counts off its set point where it was put"
+                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved by {after - before:.0f} counts in 1 s; "
+                f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
             )
         _give_power_back(bench, page, memory_map)
     return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
