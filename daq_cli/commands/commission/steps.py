@@ -244,7 +244,7 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
         after, power = (_typical(page, memory_map, name, 5)[joint] for name in ("position", "power"))
         if abs(error) < PUSHED or abs(after - before) > STAYS or abs(power) < PUSHED / 2:
             raise NotCommissionedError(
-                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved by {after - before:.0f} counts in 1 s; "
+                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved {after - before:.0f} "
                 f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
             )
         _give_power_back(bench, page, memory_map)
