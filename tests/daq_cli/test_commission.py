@@ -15,6 +15,7 @@ from daq.commissioning.potentiometer import Interval, Potentiometer
 from daq.config.robot_files import load_memory_map
 from daq.contracts.machine import load_machine, parse_machine
 from daq_cli.commands.commission.machine_text import measured_machine_text
+from daq_cli.commands.commission.sheet import memory_picture
 from daq_cli.robot.memory_page import UnprovedWriteError, open_page
 from daq_cli.robot.terminal_operator import TerminalOperator, words
 from firmware_protocol.memory_map import default_memory_map
@@ -142,3 +143,15 @@ def test_a_controller_whose_bridge_believes_in_a_wrong_map_breaks_some(daq: Comm
     said = daq("--port", MOCK + "&secret_map=3&documented=moved", "robot", "check")
     assert said.code == 5
     assert "BROKEN  position + error is the set point" in said.out
+
+
+def test_the_picture_of_the_memory_fills_what_is_found_and_outlines_what_is_assumed() -> None:
+    found = {"register": "position", "joint": 2, "verdict": "found", "low": "FC02", "high": "FC01"}
+    assumed = {"register": "gain_p", "joint": 1, "verdict": "assumed", "low": "FC03"}
+    svg = memory_picture({"base": "FC00", "size": 32, "findings": [found, assumed]})
+    assert svg.count("<rect") == 32
+    assert svg.count('fill-opacity="0.35"') == 2
+    assert svg.count('fill-opacity="0"') == 1
+    assert ">x2<" in svg
+    assert ">x2+<" in svg
+    assert ">P1<" in svg

@@ -27,6 +27,23 @@ REGISTER_COLOURS = {
     "gripper": 6,
 }
 """Number of the page's colour for each register."""
+LETTERS = {
+    "position": "x",
+    "error": "e",
+    "power": "u",
+    "set_point": "w",
+    "gain_p": "P",
+    "gain_i": "I",
+    "gain_d": "D",
+    "process_inputs": "in",
+    "process_outputs": "out",
+    "gripper": "g",
+}
+"""Letters of each register in the picture of the memory."""
+LEGEND = (
+    "The shared memory: w set point, x position, e error, u power, P I D gains, each with its joint, + a high byte; "
+    "in and out process signals, g gripper. Filled: found; outlined: assumed; empty: nothing of these."
+)
 
 
 def write_sheet(record: Record) -> Path:
@@ -87,12 +104,7 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
 
     if name == "memory" and (record.folder / FINDINGS).exists():
         findings = json.loads((record.folder / FINDINGS).read_text("utf-8"))
-        return [
-            Picture(
-                memory_picture(findings),
-                "The shared memory. Filled: found; outlined: assumed; letters name the register.",
-            )
-        ]
+        return [Picture(memory_picture(findings), LEGEND)]
     sensors = {key: value for key, value in result.items() if key.startswith("joint_") and isinstance(value, dict)}
     if name == "potentiometers" and sensors:
         return [
@@ -125,8 +137,7 @@ def memory_picture(findings: dict[str, Any]) -> str:
             colour = f"var(--colour-{REGISTER_COLOURS[one['register']]})"
             filled = one["verdict"] in ("found", "contradicts")
             style = f'fill="{colour}" fill-opacity="{0.35 if filled else 0}" stroke="{colour}"'
-            letters = "".join(word[0] for word in one["register"].split("_"))
-            text = f"{letters}{one.get('joint', '')}{'' if half == 'low' else '+'}"
+            text = f"{LETTERS[one['register']]}{one.get('joint', '')}{'' if half == 'low' else '+'}"
             parts.append(f"<g><title>{one['register']} {one.get('joint', '')} {half}: {one['verdict']}</title>")
         parts.append(f'<rect x="{x}" y="{y + 2}" width="{CELL - 3}" height="{CELL - 3}" rx="3" {style}/>')
         if text:
