@@ -205,9 +205,9 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
                 angles.append(math.radians(angle))
             sensors.append(calibrate_potentiometer(joint, counts, angles))
             bench.operator.show(sensor_line(sensors[-1]))
+            with replacing(bench.folder / MACHINE) as part:
+                part.write_text(measured_machine_text(sensors), "utf-8")
         _give_power_back(bench, page, memory_map)
-    with replacing(bench.folder / MACHINE) as part:
-        part.write_text(measured_machine_text(sensors), "utf-8")
     bench.configure()
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
