@@ -53,7 +53,10 @@ def copy(
         raise SpecError(f"{path}: is there already; name another file with -o")
     with replacing(path) as part:
         part.write_text(files[what].read_text("utf-8"), "utf-8")
-    print(path)
+    if json:
+        print_json({"file": path})
+    else:
+        print(path)
 
 
 @app.command()

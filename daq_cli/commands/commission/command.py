@@ -12,7 +12,7 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import parse_joints
 from daq_cli.app.consent import ConsentPrompt
-from daq_cli.app.context import Invocation, YesOption, console, invocation
+from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import write_sheet
 from daq_cli.commands.commission.steps import STEPS, Bench, Commissioner, Step, step_named
@@ -32,6 +32,7 @@ def commission(
         str | None, typer.Option(help="Control port of a mock, which then stands in for the person at the arm.")
     ] = None,
     yes: YesOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Commission an arm: line, memory map, potentiometers, stop, period, gains, first ramps, model.
 
@@ -51,7 +52,11 @@ def commission(
                 record.keep(step.name, {"skipped": True})
                 continue
             _carry_out(bench, step)
-    print(write_sheet(record))
+    page = write_sheet(record)
+    if json:
+        print_json({"page": page, "steps": record.steps})
+    else:
+        print(page)
 
 
 def _carry_out(bench: Bench, step: Step) -> None:
