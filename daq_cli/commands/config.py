@@ -35,6 +35,7 @@ def copy(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write (default: its own name).")
     ] = None,
+    json: JsonOption = False,
 ) -> None:
     """Copy a file that ships, the memory map or the machine file, in order to change the copy."""
     from importlib import resources
