@@ -15,7 +15,8 @@ from firmware_protocol.invalid import first_invalid
 JOINTS = 6
 """Joints that the controller serves (section 6.2)."""
 
-Provenance = Literal["documented", "assumed"]
+Provenance = Literal["documented", "found", "assumed"]
+"""Where an address comes from: the source, evidence at the machine itself (`daq memory find`), or nowhere."""
 Unit = Literal["posture_unit", "adc_count", "dac_count", "gain", "bit_field", "on_off"]
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Addresses = Annotated[tuple[Address, ...], Field(strict=False)]

@@ -18,6 +18,8 @@ from mock_controller.faults.fault import FaultError
 from mock_controller.faults.registry import describe
 
 Answer = dict[str, Any]
+_LONGEST_LEAD_S = 600.0
+_JOINTS = tuple("123456")
 
 
 class ControlError(ValueError):
@@ -65,6 +67,9 @@ class Control:
             "modifications": self._modifications,
             "brown_out": self._brown_out,
             "inputs": self._inputs,
+            "emergency_stop": self._emergency_stop,
+            "hand": self._hand,
+            "written": self._written,
             "disconnect": self._disconnect,
             "reconnect": self._reconnect,
             "kill": self._kill,
@@ -166,11 +171,33 @@ class Control:
         self._device.board.set_process_inputs(bits)
         return {"bits": bits}
 
+    def _emergency_stop(self, request: Answer) -> Answer:
+        """Presses the emergency stop ("pressed": true) or releases it: the drives lose their power, and a hand holds
+        the arm."""
+        pressed = request.get("pressed")
+        if not isinstance(pressed, bool):
+            raise ControlError('"pressed": true or false is needed')
+        self._device.board.press_emergency_stop(pressed)
+        return {"pressed": pressed}
+
+    def _hand(self, request: Answer) -> Answer:
+        """Leads joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees}, "seconds"."""
+        to, seconds = request.get("to"), request.get("seconds", 0.0)
+        if not isinstance(to, dict) or not all(key in _JOINTS and _is_number(value) for key, value in to.items()):
+            raise ControlError('"to": degrees by joint are needed, as in {"1": 90}')
+        if not _is_number(seconds) or not 0 <= seconds <= _LONGEST_LEAD_S:
+            raise ControlError(f'"seconds": a number from 0 to {_LONGEST_LEAD_S:g} is needed')
+        self._device.board.lead({int(joint): math.radians(angle) for joint, angle in to.items()}, seconds)
+        return {"to": to, "seconds": seconds}
+
+    def _written(self, _: Answer) -> Answer:
+        """How often the host has written to each address."""
+        return {"written": {f"{address:04X}": count for address, count in sorted(self._device.board.written.items())}}
+
     def _disconnect(self, request: Answer) -> Answer:
         """Cuts the line: "seconds" of the clock until it is back (without: until reconnect)."""
         seconds = request.get("seconds")
-        number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
-        if seconds is not None and not (number and 0 <= seconds < math.inf):
+        if seconds is not None and not (_is_number(seconds) and seconds >= 0):
             raise ControlError('"seconds": a number from 0 on, or nothing, is needed')
         self._process.disconnect(seconds)
         return {"seconds": seconds}
@@ -184,6 +211,10 @@ class Control:
         """Ends the process at once, without an answer."""
         self._process.kill()
         return {}
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _word(request: Answer, key: str) -> str:

@@ -15,6 +15,7 @@ from mock_controller.bridge.bridge import Bridge
 from mock_controller.bridge.link import Link
 from mock_controller.faults.fault_set import FaultSet
 from mock_controller.faulty_board import FaultyBoard
+from mock_controller.modification import Modification
 from mock_controller.modifications import ModificationError, build_modifications
 from mock_controller.options import Options, OptionsError
 from mock_controller.plant import Plant, PlantParameters, default_plant, parse_plant
@@ -56,7 +57,7 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
     else:
         pairs = zip(parameters.calibrations, options.start, strict=True)
         plant = Plant(plant_parameters, modifications, [scale.posture_to_rad(posture) for scale, posture in pairs])
-    board = Board(parameters, _memory_map(options), plant, options.seed, modifications, arm_seed)
+    board = _board(options, parameters, plant, modifications, arm_seed)
     faults = FaultSet(FaultyBoard(board, disconnect), options.seed)
     bridge = Bridge(
         Timeline(board, faults),
@@ -69,6 +70,26 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
     for text in options.fault:
         faults.switch_on(text)
     return Device(board, faults, bridge, link, options.modify, options.secret is not None)
+
+
+def _board(
+    options: Options,
+    parameters: BoardParameters,
+    plant: Plant,
+    modifications: tuple[Modification, ...],
+    arm_seed: int | None,
+) -> Board:
+    """The board; with a secret memory, `memory_map` is only what the bridge has been told."""
+    told = _memory_map(options)
+    if options.secret_map is None:
+        return Board(parameters, told, plant, options.seed, modifications, arm_seed)
+    from mock_controller.hidden.memory import draw_memory
+    from mock_controller.hidden.secret_board import SecretBoard
+
+    secret = draw_memory(options.secret_map, options.documented)
+    if options.gains is None:
+        parameters = replace(parameters, default_gains=secret.gains)
+    return SecretBoard(secret, parameters, secret.map, plant, options.seed, modifications, arm_seed, told_map=told)
 
 
 def _first_number(options: Options) -> int:

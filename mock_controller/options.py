@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -43,6 +43,8 @@ class Options(BaseModel):
     board: Path | None = None
     modify: tuple[str, ...] = ()
     secret: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    secret_map: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    documented: Literal["kept", "moved"] = "kept"
     fault: tuple[str, ...] = ()
 
 
@@ -171,6 +173,19 @@ def _parser() -> argparse.ArgumentParser:
         type=int,
         metavar="SEED",
         help="an arm with secret tolerances and effects; python -m mock_controller.reveal SEED shows them",
+    )
+
+    machine.add_argument(
+        "--secret-map",
+        type=int,
+        metavar="SEED",
+        help="registers at secret addresses, others between them; --memory-map is then what the bridge believes. "
+        "python -m mock_controller.reveal --memory-map SEED shows the truth",
+    )
+    machine.add_argument(
+        "--documented",
+        choices=("kept", "moved"),
+        help="whether a secret map keeps the six documented addresses (kept)",
     )
 
     parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")

@@ -1,4 +1,5 @@
-"""`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each.
+"""`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each; with
+`--memory-map`, what the memories of `--secret-map SEED` hide.
 
 For scoring answers after they have been given. Exit code 2 for seeds without a meaning.
 """
@@ -10,14 +11,21 @@ import json
 import sys
 
 from mock_controller.hidden.arm import draw_arm
+from mock_controller.hidden.memory import draw_memory
 
 
 def main(arguments: list[str]) -> int:
     """Prints the truth; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m mock_controller.reveal", description=__doc__)
     parser.add_argument("seeds", type=int, nargs="+", metavar="SEED")
+    parser.add_argument("--memory-map", action="store_true", help="the seeds are those of --secret-map")
+    parser.add_argument("--documented", choices=("kept", "moved"), default="kept", help="as given to the mock")
+    given = parser.parse_args(arguments)
     try:
-        truths = [draw_arm(seed).truth() for seed in parser.parse_args(arguments).seeds]
+        if given.memory_map:
+            truths = [draw_memory(seed, given.documented).truth() for seed in given.seeds]
+        else:
+            truths = [draw_arm(seed).truth() for seed in given.seeds]
     except ValueError as error:
         print(f"mock_controller.reveal: {error}", file=sys.stderr)
         return 2

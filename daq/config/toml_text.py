@@ -11,7 +11,11 @@ from daq.config.settings import Settings
 
 def settings_text(settings: Settings) -> str:
     """A daq.toml that loads to these settings. A setting without a value becomes a comment, for TOML has no null."""
-    data = settings.model_dump(mode="json")
+    return tables_text(settings.model_dump(mode="json"))
+
+
+def tables_text(data: dict[str, Any]) -> str:
+    """Values and tables as TOML; what is None becomes a comment."""
     lines = _lines("", {key: value for key, value in data.items() if not isinstance(value, dict)})
     for name, table in data.items():
         if isinstance(table, dict):

@@ -73,7 +73,20 @@ _SERIAL_OPTIONS = ("baud",)
 _TCP_OPTIONS = ("baud", "lock_step")
 MOCK_FLAGS = ("lock_step", "no_sample", "no_compact", "pty")
 """Options of mock:// that are on (1) or off (0)."""
-MOCK_VALUES = ("baud", "seed", "start", "gains", "memory_map", "plant", "board", "modify", "secret", "fault")
+MOCK_VALUES = (
+    "baud",
+    "seed",
+    "start",
+    "gains",
+    "memory_map",
+    "secret_map",
+    "documented",
+    "plant",
+    "board",
+    "modify",
+    "secret",
+    "fault",
+)
 """Options of mock:// that are handed to the mock with their value."""
 REPEATABLE = ("modify", "fault")
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
+from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, invocation, print_json
 
 app = typer.Typer(add_completion=False, help="Show and check the configuration.", no_args_is_help=True)
@@ -23,6 +27,37 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
     places = ", ".join(str(file) for file in config_files(call.config_file))
     console().print(f"from {path}" if path else f"nothing is configured (looked for {places}): these are the defaults")
     print(settings_text(settings), end="")
+
+
+@app.command()
+def copy(
+    what: Annotated[str, typer.Argument(help="memory-map, or machine.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write (default: its own name).")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Copy a file that ships, the memory map or the machine file, in order to change the copy."""
+    from importlib import resources
+
+    from daq_cli.app.output_file import check_folder, replacing
+
+    files = {
+        "memory-map": resources.files("firmware_protocol") / "memory_map.toml",
+        "machine": resources.files("daq.contracts") / "machines" / "ma2000.toml",
+    }
+    if what not in files:
+        raise SpecError(f"config copy {what!r}: allowed are {', '.join(files)}")
+    path = output or Path("memory_map.toml" if what == "memory-map" else "ma2000.toml")
+    check_folder(path, what)
+    if path.exists():
+        raise SpecError(f"{path}: is there already; name another file with -o")
+    with replacing(path) as part:
+        part.write_text(files[what].read_text("utf-8"), "utf-8")
+    if json:
+        print_json({"file": path})
+    else:
+        print(path)
 
 
 @app.command()

@@ -10,13 +10,15 @@ A period is three events:
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from firmware_protocol.memory_map import JOINTS, MemoryMap
 from firmware_protocol.units import DAC_MAX, GAIN_MAX, POSTURE_UNITS, counts_to_posture, posture_to_counts
 from mock_controller.board.extension_points import ChangesBoard, ChangesSetPoint
+from mock_controller.board.hand import Hand
 from mock_controller.board.memory import SharedMemory
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.board.pid import IntegerPid
@@ -50,6 +52,7 @@ class Board:
     """Controller and arm, switched on at time 0 with the arm where `plant` has it.
 
     `arm_seed` draws what belongs to this one arm, its potentiometers' curves; without it `seed` draws them.
+    `told_map` is the memory map that the host's side believes in; without it, the true one.
 
     Raises BoardError when the plant's step does not divide the period and the computing delay.
     """
@@ -62,6 +65,7 @@ class Board:
         seed: int,
         modifications: Iterable[Modification] = (),
         arm_seed: int | None = None,
+        told_map: MemoryMap | None = None,
     ) -> None:
         modifications = tuple(modifications)
         for change in of_kind(modifications, ChangesBoard):
@@ -69,6 +73,11 @@ class Board:
         self.parameters = parameters
         self.plant = plant
         self.memory = SharedMemory(memory_map)
+        self.host_memory = self.memory if told_map is None else self.memory.seen_through(told_map)
+        """The memory as the host's side understands it."""
+        self.written: Counter[int] = Counter()
+        """How often the host has written to each address."""
+        self.hand = Hand()
         self.sensors = PositionSensors(parameters, seed, modifications, arm_seed)
         self.snapshots = SnapshotRing()
         self.counters = BoardCounters()
@@ -81,7 +90,7 @@ class Board:
         self._volts_per_count = [
             calibration.direction * parameters.dac_full_scale / DAC_MAX for calibration in parameters.calibrations
         ]
-        self._set_point_addresses = frozenset(memory_map["set_point"].addresses)
+        self._set_point_addresses = frozenset(self.host_memory.map["set_point"].addresses)
         self._time_us = 0
         self._complete_us = 0
         self._frozen = False
@@ -122,6 +131,9 @@ class Board:
         self.memory.check(address, count)
         self._take_memory(count)
         end_us = self._host_until_us
+        if self._stored == len(self._published) and end_us < self._next_us:  # nothing changes meanwhile
+            self.run_until(end_us)
+            return self.memory.block(address, count)
         data = bytearray()
         for left in range(count - 1, -1, -1):
             self.run_until(end_us - left * self._timing.host_byte)
@@ -141,7 +153,7 @@ class Board:
                 limit = POSTURE_UNITS - 1
                 raise BoardError(f"joint {joint}: set point of {posture}: joints 1 to {JOINTS}, values 0 to {limit}")
         by_index = [(joint - 1, posture) for joint, posture in postures.items()]
-        self._write_pairs(self.memory.encoded("set_point", by_index))
+        self._write_pairs(self.host_memory.encoded("set_point", by_index))
 
     def hold_memory(self, duration_us: int) -> None:
         """Keeps the memory busy on the host's side for `duration_us` from now: every fetch in that time is missed."""
@@ -165,10 +177,10 @@ class Board:
         A second freeze changes nothing. The latch outlives a brown-out.
         """
         if self._frozen and self._powered and not self._postureless:
-            return tuple(self.memory.values("set_point"))
+            return tuple(self.host_memory.values("set_point"))
         self._frozen, self._postureless = True, False
         postures = tuple(counts_to_posture(counts) for counts in positions or self._measured)
-        self._write_pairs(self.memory.encoded("set_point", enumerate(postures)), by_freeze=True)
+        self._write_pairs(self.host_memory.encoded("set_point", enumerate(postures)), by_freeze=True)
         return postures
 
     def release(self) -> None:
@@ -203,13 +215,41 @@ class Board:
             raise BoardError(f"process inputs {bits}: allowed are 0 to 255")
         self._process_inputs = bits
 
+    def press_emergency_stop(self, pressed: bool) -> None:
+        """Cuts the drives' power, and a person's hand holds the arm from then on; released, the drives have it again.
+
+        The controller itself stays switched on.
+        """
+        self._advance_plant(self._now_on_step())
+        if pressed:
+            self.hand.take(self.plant.joint_angles)
+        else:
+            self.hand.let_go()
+
+    def lead(self, angles: Mapping[int, float], seconds: float) -> None:
+        """The hand moves joints (from 1) to angles (rad) within `seconds`. Raises BoardError while the drives have
+        power, and for an angle beyond an end stop."""
+        if not self.hand.has_arm:
+            raise BoardError("the drives have power: press the emergency stop before moving the arm by hand")
+        for joint, angle in angles.items():
+            stops = self.plant.parameters.joints[joint - 1]
+            if not stops.lower_stop <= angle <= stops.upper_stop:
+                raise BoardError(f"joint {joint}: {angle:.3f} rad is beyond an end stop")
+        now = self._now_on_step()
+        self._advance_plant(now)
+        self.hand.lead({joint - 1: angle for joint, angle in angles.items()}, now, round(seconds * 1e6))
+
+    def _now_on_step(self) -> int:
+        """The present, rounded up to a step of the plant (µs)."""
+        step = self.plant.step_us
+        return -(-self._time_us // step) * step
+
     def brown_out(self) -> None:
         """The supply sags now: drive off, memory lost; after the reset time the controller powers up again.
 
         Until then the memory reads as zero. Ticks start again at 1.
         """
-        step = self.plant.step_us
-        off_us = -(-self._time_us // step) * step
+        off_us = self._now_on_step()
         self._advance_plant(off_us)
         self._volts = [0.0] * JOINTS
         self._powered = False
@@ -305,22 +345,33 @@ class Board:
         now = self._time_us
         self._advance_plant(now)
         self._volts = [scale * power for scale, power in zip(self._volts_per_count, results.powers, strict=True)]
-        encoded = self.memory.encoded
-        self._published = [
-            *encoded("position", enumerate(results.positions)),
-            *encoded("error", enumerate(results.errors)),
-            *encoded("power", enumerate(results.powers)),
-        ]
+        self._published = self._to_publish(results)
         self._stored = 0
         self._publishing_since_us = now
         self._complete_us = now + len(self._published) * self._timing.publish_byte
         self._schedule(self._complete_us, partial(self._complete_period, results))
 
+    def _to_publish(self, results: PeriodSnapshot) -> list[tuple[int, int]]:
+        """(address, byte) pairs of a period's results, in the order in which they are stored."""
+        encoded = self.memory.encoded
+        return [
+            *encoded("position", enumerate(results.positions)),
+            *encoded("error", enumerate(results.errors)),
+            *encoded("power", enumerate(results.powers)),
+        ]
+
     def _complete_period(self, results: PeriodSnapshot) -> None:
         self._store_published()
         self._complete_us += self._timing.period
-        self.snapshots.append(results)
+        self.snapshots.append(results if self.host_memory is self.memory else self._as_host_sees(results))
         self._schedule(self._period_start_us + self._timing.period, self._start_period)
+
+    def _as_host_sees(self, results: PeriodSnapshot) -> PeriodSnapshot:
+        """The results as a host decodes them that believes in another memory map."""
+        set_points, positions, errors, powers = (
+            tuple(self.host_memory.values(name)) for name in ("set_point", "position", "error", "power")
+        )
+        return replace(results, set_points=set_points, positions=positions, errors=errors, powers=powers)
 
     def _store_published(self) -> None:
         """Brings the memory up to the present: byte k of the results is there k+1 byte times after their start."""
@@ -334,7 +385,11 @@ class Board:
 
     def _advance_plant(self, time_us: int) -> None:
         behind = time_us - self.plant.time_us
-        if behind > 0:
+        if behind <= 0:
+            return
+        if self.hand.has_arm:
+            self.plant.place(self.hand.angles(time_us), behind)
+        else:
             self.plant.advance(self._volts, behind)
 
     # --- contention
@@ -350,6 +405,7 @@ class Board:
         for left, (address, value) in zip(range(len(pairs) - 1, -1, -1), pairs, strict=True):
             self.run_until(end_us - left * self._timing.host_byte)
             self._store_published()
+            self.written[address] += not by_freeze
             if self._frozen and not by_freeze and address in self._set_point_addresses:
                 self.counters.writes_while_frozen += 1
             elif self._powered:

@@ -34,6 +34,16 @@ class SharedMemory:
         self._bytes = bytearray(memory_map.size)
         self._columns = {name: _Column(register) for name, register in memory_map.registers.items()}
 
+    def seen_through(self, memory_map: MemoryMap) -> SharedMemory:
+        """The same bytes under another memory map of the same place and size. Raises MemoryAddressError."""
+        if (memory_map.base, memory_map.size) != (self.map.base, self.map.size):
+            raise MemoryAddressError(
+                f"memory map {memory_map.name!r}: must have {self.map.size} bytes from {self.map.base:04X} on"
+            )
+        other = SharedMemory(memory_map)
+        other._bytes = self._bytes
+        return other
+
     def check(self, address: int, count: int) -> None:
         """Raises MemoryAddressError unless `count` bytes from `address` lie in the memory."""
         end = self._base + len(self._bytes)
@@ -45,6 +55,11 @@ class SharedMemory:
     def get(self, address: int) -> int:
         """One byte."""
         return self._bytes[address - self._base]
+
+    def block(self, address: int, count: int) -> bytes:
+        """`count` bytes from `address` on."""
+        start = address - self._base
+        return bytes(self._bytes[start : start + count])
 
     def put(self, address: int, value: int) -> None:
         """Stores one byte."""

@@ -42,7 +42,7 @@ class MemoryRoutines:
     def __init__(self, timeline: Timeline, sees_period: bool) -> None:
         self._timeline = timeline
         self._board = timeline.board
-        self._map = timeline.board.memory.map
+        self._map = timeline.board.host_memory.map
         self._byte_us = timeline.board.parameters.timing.host_byte
         self._sees_period = sees_period
 

@@ -192,6 +192,17 @@ class Plant:
         for _ in range(steps):
             self._step(pushed)
 
+    def place(self, angles: Sequence[float], duration_us: int) -> None:
+        """Puts the arm at rest at six angles (rad) after `duration_us`, in which something else held and moved it."""
+        self._q[:] = angles
+        self._v[:] = 0.0
+        self._bristle = [0.0] * JOINTS
+        self._current = [0.0] * JOINTS
+        self._motor_volts = [0.0] * JOINTS
+        for index, rotor in self._rotors.items():
+            rotor.angle, rotor.rate = float(angles[index]), 0.0
+        self._steps += duration_us // self._inner_us
+
     def _pushed_by(self, volts: list[float]) -> list[float]:
         """Joint torques (N·m) that volts at the motors give within a step, before any damping."""
         return [drive.torque_per_volt * value for drive, value in zip(self._drives, volts, strict=True)]

@@ -52,7 +52,11 @@ MISTAKES = {
     "number for a truth value": ("signed = false", "signed = 0", r"set_point.signed: .* valid boolean \(found 0\)"),
     "text for an address": ("[0xFC72]", '["FC72"]', r"gripper.low.0: Input should be a valid integer \(found 'FC72'\)"),
     "no list": ("low = [0xFC72]", "low = 0xFC72", "registers.gripper.low: "),
-    "no such provenance": ('"documented", ', '"rumoured", ', r"'documented' or 'assumed' \(found 'rumoured'\)"),
+    "no such provenance": (
+        '"documented", ',
+        '"rumoured", ',
+        r"'documented', 'found' or 'assumed' \(found 'rumoured'\)",
+    ),
     "joint too few": (", 0xFC45]\nprov", "]\nprov", "registers.power: provenance has 6 entries, low has 5"),
     "unit": ('unit = "adc_count"', 'unit = "posture_unit"', "register position in posture_unit: allowed is adc_count"),
     "sign": ("bits = 16\nsigned = true", "bits = 16\nsigned = false", "register error must be signed"),

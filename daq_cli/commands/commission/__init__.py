@@ -1,0 +1,1 @@
+"""`daq commission`: the first day with an arm."""

@@ -1,0 +1,41 @@
+"""What a commissioning has found so far: `commissioning.toml`, written after every step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from daq.contracts.documents import parse_toml, read_text
+from daq.contracts.errors import SpecError
+
+FILE = "commissioning.toml"
+
+
+@dataclass
+class Record:
+    """The results of the steps that are done, by name, in the folder of an arm."""
+
+    folder: Path
+    steps: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @staticmethod
+    def of(folder: Path) -> Record:
+        """What the folder holds. Raises SpecError for a file that is no record."""
+        path = folder / FILE
+        if not path.exists():
+            return Record(folder)
+        steps = parse_toml(read_text(path, FILE), str(path)).get("step", {})
+        if not isinstance(steps, dict) or not all(isinstance(one, dict) and "done" in one for one in steps.values()):
+            raise SpecError(f"{path}: not a record of a commissioning: each [step.NAME] needs `done`")
+        return Record(folder, steps)
+
+    def keep(self, name: str, result: dict[str, Any]) -> None:
+        """Adds the result of a step, and writes the file at once."""
+        from daq.config.toml_text import tables_text
+        from daq_cli.app.output_file import replacing
+
+        self.steps[name] = {"done": datetime.now(UTC).isoformat(timespec="seconds"), **result}
+        with replacing(self.folder / FILE) as part:
+            part.write_text(tables_text({"version": 1, "step": self.steps}), "utf-8")

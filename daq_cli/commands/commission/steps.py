@@ -1,0 +1,467 @@
+"""The steps of a commissioning, in order: what each does, what to watch, how to stop, and its result."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from daq.commissioning.memory.procedure import Operator, Task
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError, SafetyError, SpecError
+from daq_cli.app.consent import ConsentPrompt
+from daq_cli.app.context import Invocation, console
+from daq_cli.commands.commission.record import Record
+
+if TYPE_CHECKING:
+    from daq.commissioning.potentiometer import Potentiometer
+    from daq.driver import Controller
+    from daq_cli.robot.memory_page import LinkPage
+    from firmware_protocol.memory_map import MemoryMap
+
+ROUND_TRIPS = 200
+"""Number of single bytes read to judge the line."""
+PERIODS = 150
+"""Number of control periods over which the period is measured."""
+AVERAGED = 12
+"""Number of readings averaged at each posture of a protractor."""
+SAME_READING = 12
+"""Largest difference (ADC counts) between a position by the bridge's memory map and by the one that was found."""
+PUSHED, STAYS = 25, 5
+"""ADC counts by which a joint is to be pushed off its set point, and by which it may still move then."""
+CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings.json", "machine.toml"
+TO_GAIN = (1, 2, 3)
+
+
+class NotCommissionedError(DaqError):
+    """A step whose result does not permit the next one."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+class Commissioner(Operator, Protocol):
+    """The person at the arm, who also reads a protractor."""
+
+    def read_angle(self, joint: int, number: int) -> float | None:
+        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more."""
+
+
+@dataclass
+class Bench:
+    """What the steps share: the folder of the arm, the port, the person, and what has been found."""
+
+    call: Invocation
+    folder: Path
+    operator: Commissioner
+    consent: ConsentPrompt
+    record: Record
+    joints: tuple[int, ...] = (1, 2, 3)
+    postures: int = 6
+
+    @property
+    def configured(self) -> Invocation:
+        """An invocation that uses the files which the steps have written."""
+        return Invocation(config_file=self.folder / CONFIG, port_option=self.call.port)
+
+    def memory_map(self) -> MemoryMap:
+        """The memory map that was found, or the configured one."""
+        from daq.config.robot_files import load_memory_map
+
+        path = self.folder / MAP
+        return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
+
+    def configure(self) -> None:
+        """Writes daq.toml with the files that there are."""
+        from daq.config.toml_text import settings_text
+        from daq_cli.app.output_file import replacing
+
+        settings = self.call.settings
+        changes: dict[str, Any] = {"port": self.call.port}
+        if (self.folder / MAP).exists():
+            changes["memory_map"] = (self.folder / MAP).absolute()
+        if (self.folder / MACHINE).exists():
+            changes["machine"] = str((self.folder / MACHINE).absolute())
+        robot = settings.robot.model_copy(update=changes)
+        traces = settings.traces.model_copy(update={"folder": (self.folder / "traces").absolute()})
+        with replacing(self.folder / CONFIG) as part:
+            part.write_text(settings_text(settings.model_copy(update={"robot": robot, "traces": traces})), "utf-8")
+
+
+class Step(NamedTuple):
+    """One step: what it does, what to watch, how to stop, and the function that returns its result."""
+
+    name: str
+    title: str
+    does: str
+    watch: str
+    stop: str
+    run: Callable[[Bench], dict[str, Any]]
+
+
+def line(bench: Bench) -> dict[str, Any]:
+    """Round trips, repeats and damage of the line, and what the bridge says about itself."""
+    from firmware_protocol.commands import Capability
+
+    with _page(bench) as page:
+        times = []
+        for _ in range(ROUND_TRIPS):
+            begun = time.perf_counter()
+            page.read_byte(page.base)
+            times.append(1e3 * (time.perf_counter() - begun))
+        counters = page.link.counters.numbers()
+        hello = page.hello
+    bench.configure()
+    capabilities = [flag.name.lower() for flag in Capability(hello.capabilities) if flag.name]
+    return {
+        "port": bench.call.port,
+        "protocol": hello.version,
+        "capabilities": capabilities,
+        "period_stated_ms": hello.period_us / 1e3,
+        "round_trip_median_ms": round(float(np.median(times)), 3),
+        "round_trip_worst_ms": round(max(times), 3),
+        "repeated": int(counters.get("retries", 0)),
+        "damaged": int(counters.get("damaged", 0)),
+    }
+
+
+def memory(bench: Bench) -> dict[str, Any]:
+    """The memory map, by `daq memory find`."""
+    from daq_cli.commands.memory import findings_text, keep_map, search
+
+    with _page(bench) as page:
+        found, proofs = search(
+            bench.call, page, bench.operator, bench.consent, bench.folder / FINDINGS, inputs=True, commands=True
+        )
+    bench.operator.show(findings_text(found, proofs))
+    verdicts = [one.verdict for one in found.all]
+    written = keep_map(found, bench.folder / MAP)
+    bench.configure()
+    if not written:
+        names = ", ".join(sorted({one.register for one in found.missing()}))
+        raise NotCommissionedError(
+            f"no memory map, for these have no place: {names}; {FINDINGS} has what was found. Complete a map by "
+            f"hand as {MAP} (`daq config copy memory-map` gives one to start from), then go on with --skip memory"
+        )
+    set_points = [found.of("set_point", joint).is_found for joint in range(1, 7)]
+    return {
+        "map": MAP,
+        "findings": FINDINGS,
+        "found": sum(one.is_found for one in found.all),
+        "assumed": verdicts.count("assumed"),
+        "contradicts_the_documented": verdicts.count("contradicts"),
+        "set_points_at_power_up": "the measured posture" if all(set_points) else "not seen",
+        "proved_by_command": [proof.joint for proof in proofs if proof.proved and not proof.problem],
+        "drive_signs": [proof.sign for proof in proofs],
+    }
+
+
+def bridge(bench: Bench) -> dict[str, Any]:
+    """Whether the bridge works by the memory map that was found."""
+    from daq_cli.robot.memory_page import open_page
+
+    memory_map = bench.memory_map()
+    with open_page(bench.call.port, memory_map) as page:
+        own = {name: _typical(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
+    with _controller(bench) as controller:
+        told = controller.errors_positions_powers()
+    far = [
+        f"{name.replace('_', ' ')} {joint}"
+        for name, values in own.items()
+        for joint, value in values.items()
+        if abs(getattr(told[joint], name) - value) > (SAME_READING if name != "set_point" else 0)
+    ]
+    if far:
+        raise NotCommissionedError(
+            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
+            "Give it this one (a mock: --memory-map; a board: docs/hardware.md), then run `daq commission` again"
+        )
+    return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
+
+
+def potentiometers(bench: Bench) -> dict[str, Any]:
+    """Direction, zero, range and bend of the sensors, by a protractor."""
+    from daq.commissioning.potentiometer import calibrate_potentiometer
+    from daq_cli.app.output_file import replacing
+    from daq_cli.commands.commission.machine_text import measured_machine_text
+    from daq_cli.robot.memory_page import open_page
+
+    memory_map = bench.memory_map()
+    sensors: list[Potentiometer] = []
+    with open_page(bench.call.port, memory_map) as page:
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
+        for joint in bench.joints:
+            counts, angles = [], []
+            for number in range(1, bench.postures + 1):
+                angle = bench.operator.read_angle(joint, number)
+                if angle is None:
+                    break
+                counts.append(_positions(page, memory_map, AVERAGED)[joint])
+                angles.append(math.radians(angle))
+            sensors.append(calibrate_potentiometer(joint, counts, angles))
+            bench.operator.show(sensor_line(sensors[-1]))
+            with replacing(bench.folder / MACHINE) as part:
+                part.write_text(measured_machine_text(sensors), "utf-8")
+        _give_power_back(bench, page, memory_map)
+    bench.configure()
+    return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
+
+
+def _give_power_back(bench: Bench, page: LinkPage, memory_map: MemoryMap) -> None:
+    """Makes the posture the set points by switching off and on, and has the emergency stop released. Raises SafetyError
+    where the arm would jump."""
+    bench.operator.begin(Task("switch_off_and_on"))
+    page.wait(1.0)
+    page.reconnect()
+    errors = _typical(page, memory_map, "error", 5)
+    far = [joint for joint, error in errors.items() if abs(error) > SAME_READING]
+    if far:
+        raise SafetyError(
+            f"joints {far} are away from their set points and would jump: keep the emergency stop pressed"
+        )
+    bench.operator.begin(Task("release_emergency_stop"))
+
+
+def emergency_stop(bench: Bench) -> dict[str, Any]:
+    """Whether the emergency stop takes the drives' power: a joint then stays off its set point, whatever its power."""
+    from daq_cli.robot.memory_page import open_page
+
+    memory_map, joint = bench.memory_map(), bench.joints[0]
+    with open_page(bench.call.port, memory_map) as page:
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop was not pressed, so nothing is known about it")
+        bench.operator.begin(Task("push", joint=joint))
+        while not bench.operator.finished():
+            page.read()
+        page.wait(0.5)
+        before, error = (_typical(page, memory_map, name, 5)[joint] for name in ("position", "error"))
+        page.wait(1.0)
+        after, power = (_typical(page, memory_map, name, 5)[joint] for name in ("position", "power"))
+        if abs(error) < PUSHED or abs(after - before) > STAYS or abs(power) < PUSHED / 2:
+            raise NotCommissionedError(
+                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved {after - before:.0f} "
+                f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
+            )
+        _give_power_back(bench, page, memory_map)
+    return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
+
+
+def stop(bench: Bench) -> dict[str, Any]:
+    """The program's stop, from the request to the board's confirmation."""
+    with _controller(bench) as controller:
+        bench.consent.require(bench.call.port, controller.identity)
+        begun = time.perf_counter()
+        confirmation = controller.stop()
+        taken = 1e3 * (time.perf_counter() - begun)
+        if not confirmation.acknowledged:
+            raise NotCommissionedError(f"the stop was not confirmed: {confirmation.problem}. Use the emergency stop")
+        controller.release()
+    return {
+        "confirmed_ms": round(taken, 2),
+        "frozen": [confirmation.frozen[joint] for joint in sorted(confirmation.frozen)],
+    }
+
+
+def period(bench: Bench) -> dict[str, Any]:
+    """The control period by the host's clock."""
+    with _controller(bench) as controller:
+        ticks, times, after = [], [], None
+        for _ in range(PERIODS):
+            snapshot = controller.next_snapshot(after, (1,))
+            after = snapshot.tick
+            ticks.append(snapshot.tick)
+            times.append(snapshot.host_time)
+        missed = controller.status().missed
+    slope = float(np.polyfit(ticks, times, 1)[0]) if ticks[-1] > ticks[0] else math.nan
+    left = np.asarray(times) - np.polyval(np.polyfit(ticks, times, 1), ticks)
+    return {
+        "period_ms": round(1e3 * slope, 4),
+        "jitter_ms": round(1e3 * float(np.std(left)), 3),
+        "missed_set_points": missed,
+        "computing_delay": "not measured: the machine file's assumption stands",
+    }
+
+
+def gain(bench: Bench) -> dict[str, Any]:
+    """Volts per radian of each joint, by `daq calibrate gain`."""
+    from daq.calibration import gain_experiment, gains_from_trace
+    from daq.traces.reader import read_trace
+    from daq_cli.robot.access import robot_access
+    from daq_cli.robot.experiment import acquire_complete
+
+    robot = robot_access(bench.configured)
+    joints = tuple(joint for joint in bench.joints if joint in TO_GAIN)
+    done = acquire_complete(robot, gain_experiment(joints), robot.machine, robot.call.trace_folder, bench.consent)
+    found = gains_from_trace(read_trace(done.trace), robot.machine)
+    for one in found:
+        bench.operator.show(str(one))
+    return {"trace": str(done.trace), "gains": {f"joint_{one.joint}": str(one) for one in found if one.joint in joints}}
+
+
+def first_ramp(bench: Bench) -> dict[str, Any]:
+    """A ramp of joint 1."""
+    return _ramp(bench, (1,))
+
+
+def ramp(bench: Bench) -> dict[str, Any]:
+    """The ramp step of the source, on joints 1 to 3."""
+    return _ramp(bench, (1, 2, 3))
+
+
+def model(bench: Bench) -> dict[str, Any]:
+    """Whether the arm behaves as its machine file says."""
+    from daq.traces.reader import read_trace
+    from model.comparison.compare import compare
+    from model.machine_model.model import base_model
+
+    trace = read_trace(Path(bench.record.steps["ramp"]["trace"]))
+    machine = bench.configured.settings.machine()
+    compared = compare([("machine file", base_model(machine))], [trace])
+    joints = compared.models[0].in_sample or ()
+    left = {f"joint_{one.joint}_counts": round(one.counts, 2) for one in joints if one.counts is not None}
+    above = [one.joint for one in joints if one.rmse > 2 * one.floor]
+    return {
+        **left,
+        "above_the_noise_floor": above,
+        "next": f"daq diagnose {bench.record.steps['ramp']['trace']}"
+        if above
+        else "nothing: the model explains the ramp",
+    }
+
+
+def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
+    from daq.contracts.experiment import ExperimentSpec
+    from daq_cli.robot.access import robot_access
+    from daq_cli.robot.experiment import acquire_complete
+
+    robot = robot_access(bench.configured)
+    spec = ExperimentSpec(name="commission-ramp", joints=joints)
+    done = acquire_complete(robot, spec, robot.machine, robot.call.trace_folder, bench.consent)
+    return {"trace": str(done.trace), "samples": done.samples, "missing": done.missing, "outcome": done.outcome}
+
+
+SEE = "It only reads; nothing moves."
+KEY = "Ctrl-C, `daq stop` in another terminal, or the emergency stop"
+STEPS = (
+    Step("line", "Port and line", "Reads one byte 200 times.", SEE, "Ctrl-C", line),
+    Step(
+        "memory",
+        "Memory map",
+        "Finds what lies where, while you move the arm by hand; at the end moves each joint by a degree and back.",
+        "The arm, which may sink while the emergency stop is pressed.",
+        "the emergency stop; q or Ctrl-C ends the search",
+        memory,
+    ),
+    Step(
+        "bridge",
+        "The bridge's memory map",
+        "Compares the bridge's readings with the map that was found.",
+        SEE,
+        "Ctrl-C",
+        bridge,
+    ),
+    Step(
+        "potentiometers",
+        "Potentiometers",
+        "Reads each joint at five postures or more, whose angles you measure with a protractor.",
+        "The arm, which may sink while the emergency stop is pressed.",
+        "the emergency stop stays pressed throughout",
+        potentiometers,
+    ),
+    Step(
+        "emergency_stop",
+        "Emergency stop",
+        "Reads whether a joint that you push off its set point stays there while the emergency stop is pressed.",
+        "The arm, which may sink while the emergency stop is pressed.",
+        "the emergency stop stays pressed",
+        emergency_stop,
+    ),
+    Step(
+        "stop",
+        "The program's stop",
+        "Stops the resting arm and releases it again.",
+        "The arm stays where it is.",
+        KEY,
+        stop,
+    ),
+    Step("period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period),
+    Step(
+        "gain",
+        "Gain of each joint",
+        "Moves the joints by steps of 1 to 3 degrees at three postures.",
+        "The arm.",
+        KEY,
+        gain,
+    ),
+    Step("first_ramp", "First ramp, joint 1", "Moves joint 1 by 21.6 degrees in 0.65 s.", "The arm.", KEY, first_ramp),
+    Step("ramp", "Ramp, joints 1 to 3", "Moves joints 1 to 3 by 21.6 degrees in 0.65 s.", "The arm.", KEY, ramp),
+    Step("model", "The model", "Compares the ramp with the machine file.", "It only computes.", "Ctrl-C", model),
+)
+"""All steps, in order."""
+
+
+def sensor_line(found: Potentiometer) -> str:
+    """One sensor for people."""
+    degrees = math.degrees
+    return (
+        f"joint {found.joint}: reading {'rises' if found.direction > 0 else 'falls'} with the angle, range "
+        f"{degrees(found.range.value):.2f}° ± {degrees(found.range.half_width):.2f}°, "
+        f"zero {degrees(found.at_zero.value):.2f}° ± {degrees(found.at_zero.half_width):.2f}°, "
+        f"bend {100 * found.bend.value:.2f} % ± {100 * found.bend.half_width:.2f} %"
+    )
+
+
+def _sensor_data(found: Potentiometer) -> dict[str, Any]:
+    degrees = math.degrees
+    return {
+        "direction": found.direction,
+        "range_deg": [round(degrees(found.range.value), 3), round(degrees(found.range.half_width), 3)],
+        "at_zero_deg": [round(degrees(found.at_zero.value), 3), round(degrees(found.at_zero.half_width), 3)],
+        "bend_percent": [round(100 * found.bend.value, 3), round(100 * found.bend.half_width, 3)],
+        "counts": [round(value, 1) for value in found.counts],
+        "angles_deg": [round(degrees(value), 3) for value in found.angles],
+        "residuals_deg": [round(degrees(value), 3) for value in found.residuals],
+    }
+
+
+def _page(bench: Bench) -> Any:
+    from daq_cli.robot.memory_page import open_page
+
+    console().print(f"    {bench.call.port}")
+    return open_page(bench.call.port, bench.memory_map())
+
+
+def _controller(bench: Bench) -> Controller:
+    from daq.driver import Controller
+
+    return Controller.connect(bench.call.port, bench.memory_map())
+
+
+def _positions(page: LinkPage, memory_map: MemoryMap, count: int = 5) -> dict[int, float]:
+    """Positions (ADC counts) from a number of readings."""
+    return _typical(page, memory_map, "position", count)
+
+
+def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
+    """A register of each joint: the mean of its readings without the smallest and the largest, which may be torn."""
+    register = memory_map[name]
+    values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
+    for _ in range(count):
+        data = page.read().data
+        for joint, of_joint in values.items():
+            high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
+            of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
+    return {joint: float(np.mean(np.sort(one)[1:-1])) for joint, one in values.items()}
+
+
+def step_named(name: str) -> Step:
+    """A step by its name. Raises SpecError."""
+    for one in STEPS:
+        if one.name == name:
+            return one
+    raise SpecError(f"step {name!r}: there are {', '.join(one.name for one in STEPS)}")

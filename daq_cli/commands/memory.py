@@ -1,0 +1,276 @@
+"""`daq memory`: what lies where in the memory that the motor controller shares with its host."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.contracts.errors import ReachError
+from daq_cli.app.consent import ConsentPrompt
+from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
+
+if TYPE_CHECKING:
+    from daq.commissioning.memory.commands import CommandProof
+    from daq.commissioning.memory.findings import Findings
+    from daq.commissioning.memory.procedure import Operator
+    from daq.commissioning.memory.watch import WatchedByte
+    from daq_cli.robot.memory_page import LinkPage
+    from daq_cli.robot.mock_hand import ControlPortArm
+
+WINDOW = 200
+"""Number of readings that the live table looks back on."""
+ROW = 16
+
+app = typer.Typer(
+    add_completion=False, help="Watch the shared memory, and find out what lies where.", no_args_is_help=True
+)
+
+
+@app.command()
+def watch(
+    context: typer.Context,
+    seconds: Annotated[float | None, typer.Option(help="End after this time (default: Ctrl-C).", min=0.1)] = None,
+    once: Annotated[bool, typer.Option("--once", help="Read for a second, print one table, and end.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Show every byte live: what changes, how fast, and what changes with it. Only reads."""
+    from daq.commissioning.memory.watch import watched
+
+    call = invocation(context)
+    length = seconds if seconds is not None else 1.0 if once or json or not console().is_terminal else None
+    with _page(call) as page:
+        readings = deque([page.read()], maxlen=None if once or json else WINDOW)
+        begun = readings[0].time_s
+        live = console().is_terminal and not (once or json)
+        try:
+            with _screen(live) as show:
+                while length is None or readings[-1].time_s - begun < length:
+                    readings.append(page.read())
+                    if live:
+                        show(_watch_text(watched(page.base, list(readings))))
+        except KeyboardInterrupt:
+            if not live:
+                raise
+        found = watched(page.base, list(readings))
+    if json:
+        period = readings[-1].time_s - readings[0].time_s
+        print_json({"seconds": period, "readings": len(readings), "bytes": [one.as_data() for one in found]})
+    else:
+        print(_watch_text(found))
+
+
+@app.command()
+def find(
+    context: typer.Context,
+    output: Annotated[Path, typer.Option("--output", "-o", help="File for the memory map.")] = Path("memory_map.toml"),
+    findings: Annotated[Path, typer.Option(help="File for every finding with its evidence (.json).")] = Path(
+        "memory_findings.json"
+    ),
+    commands: Annotated[
+        bool, typer.Option("--commands/--no-commands", help="Prove set points by the smallest steps, at the end.")
+    ] = True,
+    inputs: Annotated[bool, typer.Option("--inputs/--no-inputs", help="Ask for process inputs to be switched.")] = True,
+    mock_control: Annotated[
+        str | None, typer.Option(help="Control port of a mock, which then stands in for the person at the arm.")
+    ] = None,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Find positions, set points, errors, powers, gains and inputs, with evidence. Asks you to move the arm by hand;
+    writes nothing but set points of which it is proved that they are, and these only at the end."""
+    from daq_cli.app.output_file import check_folder
+
+    for path, what in ((output, "memory map"), (findings, "findings")):
+        check_folder(path, what)
+    call = invocation(context)
+    with _page(call) as page, _operator(call, mock_control) as operator:
+        found, proofs = search(call, page, operator, ConsentPrompt(yes), findings, inputs=inputs, commands=commands)
+    written = keep_map(found, output)
+    if json:
+        print_json(findings_data(found, proofs) | {"memory_map": str(output) if written else None})
+        return
+    print(findings_text(found, proofs))
+    print(f"findings: {findings}")
+    print(f"memory map: {output}" if written else _why_no_map(found))
+
+
+def search(
+    call: Invocation,
+    page: LinkPage,
+    operator: Operator,
+    consent: ConsentPrompt,
+    keep: Path,
+    *,
+    inputs: bool,
+    commands: bool,
+) -> tuple[Findings, list[CommandProof]]:
+    """The whole search; the findings so far are written to `keep` after every stage that changes them."""
+    from daq.commissioning.memory.findings import judge
+    from daq.commissioning.memory.procedure import Finder
+    from daq_cli.app.output_file import replacing
+
+    def save(found: Findings, proofs: list[CommandProof]) -> None:
+        import json
+
+        with replacing(keep) as part:
+            part.write_text(json.dumps(findings_data(found, proofs), indent=2) + "\n", "utf-8")
+
+    found = Finder(page, operator, inputs=5 if inputs else 0, keep=lambda recording: save(judge(recording), [])).find()
+    save(found, [])
+    proofs = _prove(call, page, operator, consent, found) if commands else []
+    if not commands:
+        operator.show("The emergency stop stays pressed: release it only when every error is small, or the arm jumps.")
+    save(found, proofs)
+    return found, proofs
+
+
+def _prove(
+    call: Invocation, page: LinkPage, operator: Operator, consent: ConsentPrompt, found: Findings
+) -> list[CommandProof]:
+    """The proof by command, joint by joint, each with the person's word; nothing where the arm might jump."""
+    from daq.commissioning.memory.commands import prove_by_command
+    from daq.commissioning.memory.procedure import Task, errors_now, may_have_power
+
+    if against := may_have_power(errors_now(page, found.joints)):
+        operator.show(f"Nothing is moved, and the emergency stop stays pressed: {against}.")
+        return []
+    if not operator.begin(Task("release_emergency_stop")):
+        return []
+    page.wait(0.5)
+    if against := may_have_power(errors_now(page, found.joints)):
+        operator.show(f"Nothing is moved: {against}.")
+        return []
+    consent.require(call.port, page)
+    proofs = []
+    for joint in found.joints:
+        place = None if joint.set_point is None else joint.set_point.place
+        if place is None or not operator.begin(Task("command", joint=joint.joint)):
+            continue
+        page.prove([page.base + place.low])
+        proofs.append(prove_by_command(page, found.joints, joint.joint))
+        operator.show(proof_line(proofs[-1]))
+        if proofs[-1].problem:
+            operator.show("The proof ends here; the set point from before is written again.")
+            break
+    return proofs
+
+
+def keep_map(found: Findings, path: Path) -> bool:
+    """Writes the memory map; False where a register has no place."""
+    from daq.commissioning.memory.map_text import memory_map_text
+    from daq_cli.app.output_file import replacing
+
+    memory_map = found.memory_map("found at this arm")
+    if memory_map is None:
+        return False
+    remarks = ('Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with what was seen.',)
+    with replacing(path) as part:
+        part.write_text(memory_map_text(memory_map, remarks), "utf-8")
+    return True
+
+
+def _why_no_map(found: Findings) -> str:
+    names = sorted({one.register for one in found.missing()})
+    return f"no memory map is written, for these have no place: {', '.join(names)}"
+
+
+def findings_data(found: Findings, proofs: list[CommandProof]) -> dict[str, object]:
+    """Everything as plain data."""
+    from dataclasses import asdict
+
+    return {
+        "base": f"{found.base:04X}",
+        "size": found.size,
+        "findings": [one.as_data() for one in found.all],
+        "free_running": [f"{address:04X}" for address in found.free_running],
+        "proved_by_command": [asdict(proof) for proof in proofs],
+    }
+
+
+def findings_text(found: Findings, proofs: list[CommandProof]) -> str:
+    """Every register in one line, and what the commands have proved."""
+    lines = []
+    for one in found.all:
+        name = one.register if one.joint is None else f"{one.register} {one.joint}"
+        high = "" if one.high is None else f" {one.high:04X}"
+        where = "" if one.low is None else f"{one.low:04X}{high}"
+        lines.append(f"{name:<15} {one.verdict:<12} {where:<10} {one.evidence}")
+    lines += [proof_line(proof) for proof in proofs]
+    return "\n".join(lines)
+
+
+def proof_line(proof: CommandProof) -> str:
+    """One joint's proof for people."""
+    if proof.problem:
+        return f"joint {proof.joint}: NOT PROVED by command: {proof.problem}"
+    towards = {1: "towards it: the sign of its drive is right", 0: "not far enough to show the sign of its drive"}
+    return (
+        f"joint {proof.joint}: its set point moved by {proof.step} units, its error followed, "
+        f"the joint moved by {proof.moved:+.0f} counts {towards[proof.sign]}"
+    )
+
+
+def _watch_text(found: list[WatchedByte]) -> str:
+    """The page in rows of 16, then every byte that changes."""
+    values = {one.address: one for one in found}
+    first = found[0].address - found[0].address % ROW
+    lines = ["     " + " ".join(f" {column:X}" for column in range(ROW)) + "   columns that change"]
+    for start in range(first, found[-1].address + 1, ROW):
+        shown = [values.get(start + column) for column in range(ROW)]
+        row = "".join("   " if one is None else f" {one.value:02X}" for one in shown)
+        marks = "".join(" " if one is None or not one.changes else f"{one.address % ROW:X}" for one in shown)
+        lines.append(f"{start:04X} {row}   {marks}")
+    for one in found:
+        if one.changes:
+            together = ", ".join(f"{address:04X}" for address in one.together)
+            lines.append(
+                f"{one.address:04X}  {one.value:3d}  {one.lowest:3d} to {one.highest:3d}  {one.rate:5.1f} changes/s"
+                + (f"  with {together}" if together else "")
+            )
+    return "\n".join(lines)
+
+
+@contextmanager
+def _screen(live: bool) -> Iterator[Callable[[str], None]]:
+    """A function that shows text in place, in a terminal."""
+    if not live:
+        yield lambda _text: None
+        return
+    from rich.live import Live
+
+    with Live(console=console(), auto_refresh=False, screen=True) as display:
+        yield lambda text: display.update(text, refresh=True)
+
+
+@contextmanager
+def _page(call: Invocation) -> Iterator[LinkPage]:
+    """The memory of the configured robot. Raises ReachError when there is none."""
+    from daq.config.robot_files import load_memory_map
+    from daq_cli.robot.memory_page import open_page
+
+    if call.port_option is None and call.settings.robot.port is None:
+        raise ReachError("no robot is configured: give --port, or set robot.port in daq.toml (`daq config show`)")
+    with open_page(call.port, load_memory_map(call.settings.robot.memory_map)) as page:
+        yield page
+
+
+@contextmanager
+def _operator(call: Invocation, mock_control: str | None) -> Iterator[Operator]:
+    """The person at the terminal, or a mock's stand-in."""
+    if mock_control is None:
+        from daq_cli.robot.terminal_operator import TerminalOperator
+
+        yield TerminalOperator()
+        return
+    from daq_cli.robot.mock_hand import IN_REAL_TIME, ControlPortArm, MockOperator
+
+    arm: ControlPortArm = ControlPortArm(mock_control)
+    try:
+        yield MockOperator(arm, call.settings.machine(), IN_REAL_TIME, arm.postures())
+    finally:
+        arm.close()

@@ -1,0 +1,157 @@
+"""Watching the memory, copying files that ship, and a commissioning that goes on where it was ended."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+
+from daq.commissioning.memory.procedure import Task
+from daq.commissioning.potentiometer import Interval, Potentiometer
+from daq.config.robot_files import load_memory_map
+from daq.contracts.machine import load_machine, parse_machine
+from daq_cli.commands.commission.machine_text import measured_machine_text
+from daq_cli.commands.commission.sheet import memory_picture
+from daq_cli.robot.memory_page import UnprovedWriteError, open_page
+from daq_cli.robot.terminal_operator import TerminalOperator, words
+from firmware_protocol.memory_map import default_memory_map
+from tests.daq_cli.invoke import CommandLine
+
+MOCK = "mock://?lock_step=1&seed=3"
+
+
+def test_the_watched_memory_shows_what_changes_and_what_changes_with_it(daq: CommandLine) -> None:
+    said = daq("--port", MOCK + "&secret_map=5", "memory", "watch", "--json", "--seconds", "0.4")
+    found = json.loads(said.out)
+    assert said.code == 0
+    assert found["bytes"][0]["address"] == "FC00"
+    assert len(found["bytes"]) == default_memory_map().size
+    changing = [one for one in found["bytes"] if one["changes"]]
+    assert changing
+    assert any(one["together"] for one in changing)
+    assert all(one["lowest"] <= one["value"] <= one["highest"] for one in found["bytes"])
+
+
+def test_without_a_robot_nothing_is_watched(daq: CommandLine) -> None:
+    daq("memory", "watch", "--once").complains(3, "no robot is configured")
+
+
+def test_a_byte_of_which_nothing_is_proved_is_not_written() -> None:
+    with open_page(MOCK, default_memory_map()) as page:
+        before = page.read_byte(0xFC00)
+        with pytest.raises(UnprovedWriteError, match="FC00"):
+            page.write_byte(0xFC00, before)
+        page.prove([0xFC00])
+        page.write_byte(0xFC00, before)
+        with pytest.raises(UnprovedWriteError, match="FC01"):
+            page.write_byte(0xFC01, 0)
+
+
+def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: Path) -> None:
+    skipped = [word for name in SKIPPED for word in ("--skip", name)]
+    said = daq("--port", MOCK, "commission", "--folder", tmp_path, *skipped)
+    assert said.code == 0
+    record = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]
+    assert record["line"]["capabilities"] == ["sample", "lock_step", "simulated"]
+    assert record["memory"]["skipped"]
+    assert "Acceptance sheet" in (tmp_path / "acceptance.html").read_text("utf-8")
+    assert tomllib.loads((tmp_path / "daq.toml").read_text("utf-8"))["robot"]["port"] == MOCK
+    done = record["line"]["done"]
+    assert daq("--port", MOCK, "commission", "--folder", tmp_path).code == 0
+    again = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]
+    assert again["line"]["done"] == done
+
+
+SKIPPED = (
+    "memory",
+    "bridge",
+    "potentiometers",
+    "emergency_stop",
+    "stop",
+    "period",
+    "gain",
+    "first_ramp",
+    "ramp",
+    "model",
+)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [(("--only", "dance"), "step 'dance': there are line, memory"), (("--folder", "nowhere"), "make it first")],
+)
+def test_a_step_or_folder_that_is_not_there_is_one_line(daq: CommandLine, options: tuple[str, ...], says: str) -> None:
+    daq("--port", MOCK, "commission", *options).complains(2, says)
+
+
+def test_files_that_ship_are_copied_and_never_over_another(daq: CommandLine, tmp_path: Path) -> None:
+    target = tmp_path / "ours.toml"
+    assert daq("config", "copy", "memory-map", "-o", target).code == 0
+    assert load_memory_map(target) == default_memory_map()
+    daq("config", "copy", "memory-map", "-o", target).complains(2, "is there already")
+    daq("config", "copy", "gripper").complains(2, "memory-map, machine")
+
+
+def test_measured_sensors_stand_in_the_machine_file() -> None:
+    sensor = Potentiometer(2, -1, Interval(0.5, 0.01), Interval(4.7, 0.02), Interval(0.0, 0.0), 0.0, (), (), ())
+    machine = parse_machine(measured_machine_text([sensor]))
+    found, untouched = machine.joint(2).sensor, machine.joint(1).sensor
+    assert found is not None
+    assert (found.direction, found.range.value, found.at_zero.value) == (-1, 4.7, 0.5)
+    assert untouched == load_machine("ma2000").joint(1).sensor
+
+
+def operator(lines: list[str]) -> TerminalOperator:
+    answers: Iterator[str] = iter(lines)
+    return TerminalOperator(lambda: next(answers, ""))
+
+
+def test_a_person_begins_skips_or_ends_each_task() -> None:
+    person = operator(["\n", "s\n", "q\n"])
+    assert person.begin(Task("rest"))
+    assert not person.begin(Task("lead", joint=2))
+    with pytest.raises(typer.Abort):
+        person.begin(Task("switch_off_and_on"))
+    with pytest.raises(typer.Abort):  # the input has ended
+        operator([]).begin(Task("rest"))
+
+
+def test_an_angle_that_is_no_number_is_asked_for_again() -> None:
+    person = operator(["ninety\n", "90.5\n", "\n"])
+    assert person.read_angle(1, 1) == 90.5
+    assert person.read_angle(1, 2) is None
+
+
+def test_every_task_that_takes_the_drives_power_says_that_the_arm_may_sink() -> None:
+    assert "may sink" in words(Task("press_emergency_stop"))
+    assert "keep a hand at the emergency stop" in words(Task("release_emergency_stop"))
+    assert "once more: no byte follows it" in words(Task("lead", joint=1, again="no byte follows it"))
+
+
+@pytest.mark.parametrize("options", ["", "&no_sample=1"])
+def test_a_sound_controller_keeps_every_promise(daq: CommandLine, options: str) -> None:
+    said = daq("--port", MOCK + options, "robot", "check", "--json")
+    assert said.code == 0
+    assert all(one["kept"] for one in json.loads(said.out))
+
+
+def test_a_controller_whose_bridge_believes_in_a_wrong_map_breaks_some(daq: CommandLine) -> None:
+    said = daq("--port", MOCK + "&secret_map=3&documented=moved", "robot", "check")
+    assert said.code == 5
+    assert "BROKEN  position + error is the set point" in said.out
+
+
+def test_the_picture_of_the_memory_fills_what_is_found_and_outlines_what_is_assumed() -> None:
+    found = {"register": "position", "joint": 2, "verdict": "found", "low": "FC02", "high": "FC01"}
+    assumed = {"register": "gain_p", "joint": 1, "verdict": "assumed", "low": "FC03"}
+    svg = memory_picture({"base": "FC00", "size": 32, "findings": [found, assumed]})
+    assert svg.count("<rect") == 32
+    assert svg.count('fill-opacity="0.35"') == 2
+    assert svg.count('fill-opacity="0"') == 1
+    assert ">x2<" in svg
+    assert ">x2+<" in svg
+    assert ">P1<" in svg
