@@ -107,13 +107,13 @@ def _second_posture() -> list[Segment]:
 
 def _pseudo_random() -> list[Segment]:
     """A maximum-length sequence of 255 signs, each held for 80 ms, that all joints follow 85 signs apart: their set
-    points jump between ±3° and have next to no correlation with each other."""
+    points jump between ±2° and have next to no correlation with each other."""
     signs = _maximum_length()
     third = len(signs) // len(MAJOR)
     segments: list[Segment] = []
     now: tuple[float, ...] = (0.0, 0.0, 0.0)
     for k in range(len(signs) + 1):
-        wanted = tuple(3.0 * signs[(k + third * n) % len(signs)] if k < len(signs) else 0.0 for n in range(len(MAJOR)))
+        wanted = tuple(2.0 * signs[(k + third * n) % len(signs)] if k < len(signs) else 0.0 for n in range(len(MAJOR)))
         jumps = {j: math.radians(b - a) for j, a, b in zip(MAJOR, now, wanted, strict=True) if a != b}
         if jumps:
             segments.append(_segment(Step(amplitude=jumps), *jumps))
@@ -184,7 +184,7 @@ PRESETS: dict[str, Preset] = {
         for letter, (description, segments) in PARTS.items()
     },
     "pseudo-random": Preset(
-        "pseudo-random steps between ±3° for 20 s: what differs only in fast motion, as inductance and a delay",
+        "pseudo-random steps between ±2° for 20 s: what differs only in fast motion, as inductance and a delay",
         _sequence("pseudo-random", _pseudo_random()),
     ),
     "sweep": Preset(
