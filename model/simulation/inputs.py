@@ -92,7 +92,8 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
         raise TraceError(
             f"trace {trace.record.trace_id}: has no drive, and {machine.name} has no controller to form one"
         )
-    set_points = _held(measured if trace.set_point is None else trace.set_point[:, columns], rows, count)
+    wanted = measured if trace.set_point is None else trace.set_point[:, columns]
+    set_points = _held(wanted, _taken_from(trace, rows), count)
     drive = _held(np.zeros_like(measured) if trace.drive is None else trace.drive[:, columns], rows, count)
     initial = np.zeros((len(joints), 2))
     initial[:, 0] = _rest_posture(trace, measured, set_points[0], machine)
@@ -143,6 +144,12 @@ def _rows(trace: Trace, period: float) -> Floats:
     rows = (trace.time - trace.time[0]) / period
     whole = np.round(rows)
     return np.asarray(whole if np.abs(rows - whole).max() < 0.05 else rows)
+
+
+def _taken_from(trace: Trace, rows: Floats) -> Floats:
+    """From which period on each recorded set point was taken. On a slow line the host writes the next set point right after
+    a sampled period, so it was taken in all of the periods up to the next sample."""
+    return rows if trace.tick is None else rows - (trace.record.every - 1)
 
 
 def _held(samples: Floats, rows: Floats, count: int) -> Floats:

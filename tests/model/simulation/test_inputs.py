@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -49,6 +50,14 @@ def test_set_points_and_drive_are_held_over_a_gap_and_readings_are_missing_there
     assert len(found) == 6
     np.testing.assert_allclose(found.time, 5.0 + 0.02 * np.arange(6))
     assert found.first_drive.tolist() == [10, 10, 10]
+
+
+def test_on_a_slow_line_a_set_point_was_taken_right_after_the_sample_before() -> None:
+    wanted = np.array([0.0, 0.1, 0.2, 0.3])[:, None] * np.ones(3)
+    whole = trace_of([0, 2, 4, 8], wanted, None)
+    slow = replace(whole, record=whole.record.model_copy(update={"every": 2}))
+    found = inputs_of(slow, MACHINE).set_points[:, 0]
+    assert found.tolist() == [0.0, 0.1, 0.1, 0.2, 0.2, 0.2, 0.2, 0.3, 0.3], "held over the sample that is lost"
 
 
 def test_without_set_points_or_drive_the_reading_or_zero_is_held() -> None:
