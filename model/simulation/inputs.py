@@ -147,8 +147,8 @@ def _rows(trace: Trace, period: float) -> Floats:
 
 
 def _taken_from(trace: Trace, rows: Floats) -> Floats:
-    """From which period on each recorded set point was taken. On a slow line the host writes the next set point right after
-    a sampled period, so it was taken in all of the periods up to the next sample."""
+    """From which period on each recorded set point was taken. On a slow line the host writes the next set point right
+    after a sampled period, so it was taken in all of the periods up to the next sample."""
     return rows if trace.tick is None else rows - (trace.record.every - 1)
 
 
