@@ -15,6 +15,7 @@ import sys
 
 from benchmarks.figures import Figure, show
 from daq.driver import Controller, LineRate
+from daq.driver.line_rate import bound_ms
 
 URL = "mock://?pty=1"
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200)
@@ -43,7 +44,7 @@ def figure(baud: int, url: str, joints: tuple[int, ...], samples: int) -> Figure
     retries = controller.counters.retries
     turn = "one frame each way" if rate.compact else "two frames each way"
     found = f"{'even' if even else 'UNEVEN'}, {late} late, {retries} retries"
-    beside = f"{100 * rate.share:.0f} % of the line, {turn}; {found}; stop ≤ {rate.stop_s * 1e3:.0f} ms"
+    beside = f"{100 * rate.share:.0f} % of the line, {turn}; {found}; stop ≤ {bound_ms(rate.stop_s)} ms"
     named = f"{baud} baud, {len(joints)} joint{'s' * (len(joints) > 1)}"
     promised = rate.samples_per_second
     met = even and abs(per_second - promised) < 0.01 * promised

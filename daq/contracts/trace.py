@@ -164,10 +164,12 @@ class Trace:
 
     @property
     def missing(self) -> int:
-        """Number of samples that are not there between the first and the last."""
+        """Number of samples that are not there between the first and the last: in every gap one for each `record.every`
+        periods, or part of them, beyond the first. A sample that came early makes up for none of them."""
         if self.tick is None or len(self) == 0:
             return 0
-        return max(0, int(self.tick[-1] - self.tick[0]) // self.record.every + 1 - len(self))
+        steps = np.diff(self.tick.astype(np.int64))
+        return int((np.maximum(steps - 1, 0) // self.record.every).sum())
 
     def column(self, joint: int) -> int:
         """Column of joint `joint` (from 1). Raises TraceError when the trace has none."""

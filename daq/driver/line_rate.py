@@ -54,7 +54,7 @@ class LineRate:
         each = "every control period" if self.every == 1 else f"every {_ordinal(self.every)} control period"
         return (
             f"{self.samples_per_second:.3g} samples a second of {_counted(self.joints, 'joint')}, {each}, "
-            f"{100 * self.share:.0f} % of the line; a stop takes up to {self.stop_s * 1e3:.0f} ms"
+            f"{100 * self.share:.0f} % of the line; a stop takes up to {bound_ms(self.stop_s)} ms"
         )
 
 
@@ -97,6 +97,11 @@ def stop_latency_s(bytes_per_second: float) -> float:
     """Longest time (s) from the writing of a stop until the bridge has frozen the set points: a frame of the largest
     size that is already on its way, the stop itself, and the bridge's own time. No byte is lost."""
     return (MAX_PAYLOAD + 2 * FRAME_OVERHEAD) / bytes_per_second + STOP_ANSWER_S
+
+
+def bound_ms(longest_s: float) -> int:
+    """A longest time in whole milliseconds: rounded up, so that what is told still is a bound."""
+    return math.ceil(longest_s * 1e3 - 1e-6)
 
 
 TOLD = (1, 3, 6)

@@ -102,8 +102,9 @@ class Deliveries:
         every: int = 1,
     ) -> BoardSnapshot:
         """A snapshot, with everything counted that it shows. `times` are host time and tick time (s). It counts as late
-        after the time between two samples, `every` periods."""
-        missing = 0 if after is None else max(0, tick - after - 1)
+        after the time between two samples, `every` periods. What is missing is counted in samples, too: one for every
+        `every` periods, or part of them, by which the snapshot is too new."""
+        missing = 0 if after is None else max(0, -(-(tick - after - 1) // every))
         missed = self.watch.missed(tick, joints) or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
         snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed)
         tally = self.link.tally

@@ -27,7 +27,7 @@ class BoardSnapshot:
     flags: StatusFlag
     consistent_by: Consistency
     missing_before: int = 0
-    """Number of periods without a sample between the previous sample and this one."""
+    """Number of samples that were asked for and are not there, between the previous sample and this one."""
     set_points_missed: bool = False
     """The controller did not take what was in its memory when the period began."""
 

@@ -43,7 +43,7 @@ class LinkCounters:
     missed_set_points: int = 0
     """Periods in which the controller did not take the set points that were in its memory."""
     missing_samples: int = 0
-    """Periods for which no sample was delivered."""
+    """Samples that were asked for and not delivered: on a slow line one is asked for every n-th period."""
     late: int = 0
     """Samples that came more than one period after the tick they describe."""
     restarts: int = 0

@@ -48,8 +48,9 @@ class Follower:
     ended:        gives the reason of an external request to end; None while there is none
     every_period: True takes each period once, in order, as a record needs; False takes the newest, which is all that a
                   move needs
-    every:        control periods from one sample to the next, and from one set point to the next: more than one where
-                  the line is slow
+    every:        control periods from one sample to the next: more than one where the line is slow. A set point is at
+                  most so many periods of the plan from the one before, and never more than have passed on the board, so
+                  that a motion is never faster than its plan
     """
 
     def __init__(
@@ -83,8 +84,9 @@ class Follower:
         """Waits until `joints` are at their set points, at most so many periods; a joint that is not by then trips."""
         scale = {joint: abs(self._machine.calibration(joint).rad_per_count) for joint in joints}
         late: dict[int, float] = {}
+        until = self._tick_after(periods)
         try:
-            for _ in range(self._samples_in(periods)):
+            for _ in range(periods):
                 outside = self._ended()
                 if outside is not None:
                     return self._stopped(outside)
@@ -93,6 +95,8 @@ class Follower:
                 late = {j: errors[j] / scale[j] for j in joints if abs(errors[j]) > within_counts * scale[j]}
                 if not late:
                     return Ending("finished")
+                if until is not None and row.tick >= until:
+                    break
         except (LinkError, NoSampleError) as error:
             return self._halted(Event.LINK_LOST, "link_lost", "lost", str(error))
         except ControllerRestartedError as error:
@@ -102,10 +106,13 @@ class Follower:
 
     def observe(self, periods: int) -> None:
         """Records so many periods without sending anything, as far as the robot still answers."""
+        until = self._tick_after(periods)
         try:
-            for _ in range(self._samples_in(periods)):
+            for _ in range(periods):
                 row, _ = self._next({})
                 self._observer.row(row)
+                if until is not None and row.tick >= until:
+                    break
         except ControllerRestartedError as error:
             self.tell("restart", str(error))
         except (LinkError, NoSampleError) as error:
@@ -132,10 +139,10 @@ class Follower:
 
     def _play(self, plan: Plan, guards: RunningGuards, progress: Callable[[int], None]) -> Ending:
         # The first set point is where the arm's set points are already: sending it again makes row and plan agree.
-        index, hold, last = -1, False, len(plan) - 1
+        index, following, hold, last = -1, 0, False, len(plan) - 1
         while True:
             go_on = not hold and index < last
-            following = 0 if index < 0 else min(index + self._every, last)
+            before = self.last
             outside = self._ended()
             if outside is not None:
                 return self._stopped(outside)
@@ -151,7 +158,8 @@ class Follower:
                 index = following
                 progress(index)
             expected = self._set_points(plan, index) if snapshot.set_points_missed else None
-            verdict = guards.check(row, self._set_points(plan, index + self._every), expected)
+            following = min(index + self._step(before, row), last)
+            verdict = guards.check(row, self._set_points(plan, following), expected)
             verdict |= self._lag.check(row.tick, snapshot.jitter)
             ending = self._judge(verdict, row)
             if ending is not None:
@@ -160,9 +168,14 @@ class Follower:
             if index >= last and not hold:
                 return Ending("finished")
 
-    def _samples_in(self, periods: int) -> int:
-        """Number of samples in so many control periods."""
-        return -(-periods // self._every)
+    def _tick_after(self, periods: int) -> int | None:
+        """Number of the period that ends so many periods from the last sample; None before the first sample."""
+        return None if self.last is None else self.last.tick + periods
+
+    def _step(self, before: SampleRow | None, row: SampleRow) -> int:
+        """Periods of the plan from the set point sent last to the next one: those between the last two samples, each of
+        which a set point follows; at most `every`. Before the first set point the arm has waited for long enough."""
+        return self._every if before is None else max(0, min(self._every, row.tick - before.tick))
 
     def _set_points(self, plan: Plan, index: int) -> dict[int, int]:
         postures: list[int] = plan.postures[min(index, len(plan) - 1)].tolist()
@@ -172,8 +185,9 @@ class Follower:
         after = self.last.tick + self._every - 1 if self._every_period and self.last is not None else None
         snapshot = self._controller.next_snapshot(after, self._joints, sending)
         row = self._rows.row(snapshot)
+        before = row.tick - self._every if self.last is None else self.last.tick
         self.last = row
-        if row.tick // RETRIES_LOOKED_AT_EVERY != (row.tick - self._every) // RETRIES_LOOKED_AT_EVERY:
+        if row.tick // RETRIES_LOOKED_AT_EVERY != before // RETRIES_LOOKED_AT_EVERY:
             self._tell_retries()
         return row, snapshot
 

@@ -15,6 +15,12 @@ LONGEST_BEHIND = 1.0
 """Time (s) for which samples may stay too old before the run ends in a fault: an assumption."""
 
 
+def oldest_to_act_on(between: float) -> float:
+    """Age (s) of a sample beyond which nothing is done on the strength of it: on a slow line that of two samples, which
+    are `between` (s) apart."""
+    return max(OLDEST_TO_ACT_ON, 2 * between)
+
+
 @dataclass
 class Lag:
     """Judges the age of each sample. Time is the board's.
@@ -30,7 +36,7 @@ class Lag:
     def check(self, tick: int, age: float) -> Verdict:
         """`age` (s): by how much a sample came later than the quickest ones after their ticks."""
         between = self.every * self.period
-        if age <= max(OLDEST_TO_ACT_ON, 2 * between):
+        if age <= oldest_to_act_on(between):
             was, self.since = self.since, None
             if was is None:
                 return NOTHING

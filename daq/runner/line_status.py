@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from daq.contracts.service.robot import LinkStatus, RobotIdentity, SampleRate
-from daq.driver.line_rate import LineRate, stop_latency_s, told_rates
+from daq.driver.line_rate import LineRate, bound_ms, stop_latency_s, told_rates
 
 
 def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentity) -> LinkStatus:
@@ -23,7 +23,7 @@ def rates_line(link: LinkStatus) -> str:
     told = ", ".join(
         f"{rate.joints} joint{'s' * (rate.joints > 1)} {rate.samples_per_second:.3g}" for rate in link.rates
     )
-    return f"the line gives samples a second: {told}; a stop takes up to {link.stop_seconds * 1e3:.0f} ms"
+    return f"the line gives samples a second: {told}; a stop takes up to {bound_ms(link.stop_seconds)} ms"
 
 
 def _wire(rate: LineRate) -> SampleRate:

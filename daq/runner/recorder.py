@@ -35,14 +35,15 @@ class Recorder:
     listener: RunListener
     every: int = 1
     """Control periods from one sample to the next."""
-    first: int | None = None
-    last: int = 0
+    last: int | None = None
     samples: int = 0
+    missing: int = 0
+    """Number of samples that are not there between the first and the last, counted as `Trace.missing` counts them."""
 
     def row(self, row: SampleRow) -> None:
         """A control period. Raises TraceError."""
-        if self.first is None:
-            self.first = row.tick
+        if self.last is not None:
+            self.missing += max(0, row.tick - self.last - 1) // self.every
         self.last = row.tick
         self.samples += 1
         self.writer.sample(row)
@@ -53,11 +54,6 @@ class Recorder:
         event = TraceEvent(time=time, kind=kind, message=message, tick=tick, joint=joint)
         self.writer.event(event)
         self.listener.happened(event)
-
-    @property
-    def missing(self) -> int:
-        """Number of samples that are not there between the first and the last."""
-        return 0 if self.first is None else max(0, (self.last - self.first) // self.every + 1 - self.samples)
 
 
 @dataclass

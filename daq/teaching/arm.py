@@ -29,6 +29,11 @@ class TeachableArm(Protocol):
         ...
 
     @property
+    def every(self) -> int:
+        """Control periods from one sample to the next: more than one where the line to the arm is slow."""
+        ...
+
+    @property
     def lateness(self) -> float:
         """Time (s) by which the last sample came later than the quickest ones."""
         ...
@@ -39,7 +44,7 @@ class TeachableArm(Protocol):
         ...
 
     def next_sample(self) -> SampleRow:
-        """Waits for the next control period and returns it; every period comes once."""
+        """Waits for the next control period and returns it; every period comes once, or every n-th (`every`)."""
         ...
 
     def set_points(self, postures: Mapping[int, int]) -> None:

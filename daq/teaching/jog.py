@@ -114,8 +114,8 @@ def jog(
     Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped; it is frozen then.
     """
     jogger = Jogger(machine, limits, arm.joints)
-    guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints)
-    lag = Lag(control_period(machine))
+    guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints, every=arm.every)
+    lag = Lag(control_period(machine), arm.every)
     told: tuple[str, ...] = ()
     with arm.driven():
         while not ended():

@@ -10,7 +10,7 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.runner import StoppedError
-from daq.runner.lag import OLDEST_TO_ACT_ON
+from daq.runner.lag import oldest_to_act_on
 from daq.safety import RestGuards
 from daq.teaching.arm import TeachableArm, TeachingError
 from daq.teaching.recording import RecordedPath
@@ -24,8 +24,11 @@ STILL_FOR = 0.2
 """Time (s) for which the error must stay that small: an assumption. A hand that reverses is still for a moment."""
 SHORTEST = 2
 """Least number of samples of a path."""
+FEWEST_STILL = 3
+"""Least number of samples that show a led joint at rest, where a slow line gives few in that time: an assumption."""
 PATIENCE = 10.0
-"""Time (s) that a led arm has to come to rest before its gains come back: an assumption."""
+"""Time (s) that a led arm has to come to rest before its gains come back: an assumption. On a slow line, with
+every n-th sample, n times as long."""
 
 
 def lead_by_nose(
@@ -75,7 +78,7 @@ def _lead(
     limp: dict[int, Gain],
 ) -> None:
     """Fills `rows`; `limp` holds at every moment the joints without drive, with the gains that they had."""
-    guards = RestGuards(machine, limits, arm.joints, led=joints)
+    guards = RestGuards(machine, limits, arm.joints, led=joints, every=arm.every)
     before = arm.gains()
     _follow_the_hand(arm, machine, joints, arm.next_sample())
     for joint in joints:
@@ -124,25 +127,27 @@ def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict
     `limp` joint by joint."""
     joints = tuple(limp)
     period = control_period(machine)
+    between = arm.every * period
+    oldest = oldest_to_act_on(between)
     sent: dict[int, int] = {}
     calm: list[SampleRow] = []
     for _ in range(round(PATIENCE / period)):
         row = arm.next_sample()
         _require_calm(arm, guards, row)
-        if not (sent and arm.lateness <= OLDEST_TO_ACT_ON and _at_rest(arm, machine, row, sent)):
+        if not (sent and arm.lateness <= oldest and _at_rest(arm, machine, row, sent)):
             calm.clear()
         elif calm and not _where_it_was(arm, machine, calm[0], row, joints):
             calm = [row]
         else:
             calm.append(row)
-        if len(calm) * period >= STILL_FOR:
+        if len(calm) >= FEWEST_STILL and len(calm) * between >= STILL_FOR:
             for joint in joints:
                 arm.set_gains(joint, *limp[joint])
                 del limp[joint]
             return
         sent = _measured(arm, machine, joints, row)
         arm.set_points(sent)
-    raise arm.freeze_for_fault(f"the arm did not come to rest within {PATIENCE:g} s")
+    raise arm.freeze_for_fault(f"the arm did not come to rest within {PATIENCE * arm.every:g} s")
 
 
 def _at_rest(arm: TeachableArm, machine: Machine, row: SampleRow, sent: Mapping[int, int]) -> bool:

@@ -49,11 +49,19 @@ class FollowingPerformer:
         self._controller = controller
         self._control = control
         self._follower = Follower(
-            controller, control, machine, limits, EVERY_JOINT, _AlarmReporter(tell), ended, every_period=False
+            controller,
+            control,
+            machine,
+            limits,
+            EVERY_JOINT,
+            _AlarmReporter(tell),
+            ended,
+            every_period=False,
+            every=controller.line_rate(EVERY_JOINT, EVERY_JOINT).every,
         )
         self._ended = ended
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
-        self._guarded = partial(RunningGuards, machine, limits, self._arm.joints)
+        self._guarded = partial(RunningGuards, machine, limits, self._arm.joints, every=self._arm.every)
         self._guards = self._guarded(moving=self._arm.joints)
         """Guards for periods in which nothing is sent. Joints that moved last may still approach their set points."""
         self._step(Event.ARM)
@@ -74,12 +82,17 @@ class FollowingPerformer:
     def observe(self, periods: int) -> None:
         """Waits this many control periods under the guards. Raises StoppedError on a request to end, also in between,
         and TeachingError for a fault, a restart or a lost link; the arm is then frozen."""
+        until: int | None = None
         for _ in range(periods):
-            verdict = self._guards.check(self._arm.next_sample(), {})
+            row = self._arm.next_sample()
+            verdict = self._guards.check(row, {})
             if verdict.stop is not None:
                 raise self._arm.freeze_for_stop(verdict.stop)
             if verdict.trips:
                 raise self._arm.freeze_for_fault("; ".join(verdict.trips))
+            until = row.tick + periods - 1 if until is None else until
+            if row.tick >= until:
+                break
         self._require_going_on()
 
     def input_is_on(self, line: int) -> bool:

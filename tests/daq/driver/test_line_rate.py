@@ -64,7 +64,7 @@ def test_a_fast_line_is_used_as_before() -> None:
 def test_a_rate_is_told_with_its_joints_share_and_stop() -> None:
     words = line_rate(1920, PERIOD, 3, 3, can_be_compact=True).in_words
     assert words == (
-        "25 samples a second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 44 ms"
+        "25 samples a second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 45 ms"
     )
     assert line_rate(11520, PERIOD, 1, 1).in_words.startswith("50 samples a second of 1 joint, every control period")
 

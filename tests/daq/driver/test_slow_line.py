@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 
 from daq.driver import Controller
+from firmware_protocol.commands import Reply, Request, Sample
 
 JOINTS = (1, 2, 3)
 
@@ -34,6 +35,25 @@ def test_a_question_waits_until_the_periods_before_are_over() -> None:
     with Controller.connect("mock://?lock_step=1&seed=3") as controller:
         first = controller.next_snapshot()
         assert controller.next_snapshot(first.tick + 6).tick == first.tick + 7
+
+
+@pytest.mark.parametrize(("late", "missing"), [(0, 0), (1, 1), (3, 1), (4, 2)])
+def test_what_is_missing_is_counted_in_samples(late: int, missing: int) -> None:
+    with Controller.connect("mock://?lock_step=1&seed=3") as controller:
+        first, every = controller.next_snapshot(), 3
+        due = first.tick + every
+        reply = controller.link.exchange
+
+        def later(*requests: Request) -> tuple[Reply, ...]:
+            if not any(isinstance(one, Sample) for one in requests):
+                return reply(*requests)
+            controller.clock.sleep_until(controller.clock.now() + late * controller.period_s)
+            return reply(*(Sample(due + late - 1, one.mask) if isinstance(one, Sample) else one for one in requests))
+
+        controller.link.exchange = later  # type: ignore[method-assign]
+        found = controller.next_snapshot(due - 1)
+        assert (found.tick, found.missing_before) == (due + late, missing)
+        assert controller.counters.missing_samples == missing
 
 
 def test_what_a_compact_sample_says_is_what_a_whole_one_says() -> None:

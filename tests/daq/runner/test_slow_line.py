@@ -1,12 +1,109 @@
-"""A run over a slow line: every n-th period is recorded, and the trace says so."""
+"""A run over a slow line: every n-th period is recorded, the trace says so, and no motion is faster than its plan."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from tests.daq.runner.rig import rig
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import EventKind
+from daq.driver import EVERY_JOINT, Controller
+from daq.runner.follower import Follower
+from daq.safety import Event
+from daq.trajectories import Plan, make_plan
+from tests.daq.runner.rig import Rig, rig
+
+LINES = pytest.mark.parametrize(("baud", "every"), [(38400, 2), (19200, 3), (9600, 5)], ids=str)
+KINDS = pytest.mark.parametrize("every_period", [False, True], ids=["the newest", "every period"])
+
+
+@dataclass
+class Rows:
+    """Keeps the rows; events are ignored."""
+
+    ticks: list[int] = field(default_factory=list)
+
+    def row(self, row: SampleRow) -> None:
+        self.ticks.append(row.tick)
+
+    def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
+        return
+
+
+def follower_of(arm: Rig, rows: Rows, every: int, *, every_period: bool) -> Follower:
+    """A follower of an arm that may move."""
+    arm.control.handle(Event.ARM)
+    arm.control.handle(Event.START)
+    return Follower(
+        arm.controller,
+        arm.control,
+        arm.machine,
+        arm.machine.limits,
+        EVERY_JOINT,
+        rows,
+        lambda: arm.wants_end,
+        every_period=every_period,
+        every=every,
+    )
+
+
+def slow_plan(arm: Rig) -> Plan:
+    """A slow motion of every joint from where the arm is; too slow for its set points ever to wait."""
+    held = arm.controller.next_snapshot().set_points
+    here = np.array([arm.machine.calibration(joint).posture_to_rad(held[joint]) for joint in EVERY_JOINT])
+    return make_plan(arm.machine, EVERY_JOINT, here + np.linspace(0.0, 0.02, 61)[:, None])
+
+
+@LINES
+@KINDS
+def test_no_motion_is_faster_than_its_plan(tmp_path: Path, baud: int, every: int, every_period: bool) -> None:
+    with rig(tmp_path, f"seed=5&baud={baud}") as arm:
+        assert arm.controller.line_rate(EVERY_JOINT, EVERY_JOINT).every == every
+        plan, rows, sent = slow_plan(arm), Rows(), list[int]()
+        follower = follower_of(arm, rows, every, every_period=every_period)
+        assert follower.follow(plan, sent.append).kind == "finished"
+    passed = [later - earlier for earlier, later in pairwise(rows.ticks)]
+    steps = [later - earlier for earlier, later in pairwise(sent)]
+    assert sent[-1] == len(plan) - 1
+    assert len(sent) == len(rows.ticks), "nothing waited"
+    assert steps[0] <= every
+    assert steps[1:-1] == [min(every, ticks) for ticks in passed[: len(steps) - 2]]
+    if every_period:
+        assert set(passed) == {every}
+
+
+def test_a_sample_that_comes_early_does_not_make_the_motion_faster(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = Controller.next_snapshot
+
+    def early(controller: Controller, after: int | None, *others: object) -> object:
+        return asked(controller, None if after is None else after - 1, *others)  # type: ignore[arg-type]
+
+    with rig(tmp_path, "seed=5&baud=9600") as arm:
+        plan, rows, sent = slow_plan(arm), Rows(), list[int]()
+        follower = follower_of(arm, rows, 5, every_period=True)
+        monkeypatch.setattr(Controller, "next_snapshot", early)
+        assert follower.follow(plan, sent.append).kind == "finished"
+    assert {later - earlier for earlier, later in pairwise(rows.ticks)} == {4}
+    assert {later - earlier for earlier, later in pairwise(sent[1:-1])} == {4}
+
+
+@LINES
+@KINDS
+def test_an_arm_has_the_time_it_was_given_to_arrive(tmp_path: Path, baud: int, every: int, every_period: bool) -> None:
+    with rig(tmp_path, f"seed=5&baud={baud}") as arm:
+        plan, rows = slow_plan(arm), Rows()
+        follower = follower_of(arm, rows, every, every_period=every_period)
+        assert follower.follow(plan, lambda _index: None).kind == "finished"
+        assert follower.last is not None
+        begun = follower.last.tick
+        assert follower.arrive(EVERY_JOINT, -1.0, 50).kind == "fault"
+        assert 50 <= follower.last.tick - begun < 50 + every
 
 
 def test_a_run_on_a_slow_line_is_complete_and_says_at_what_rate(tmp_path: Path) -> None:

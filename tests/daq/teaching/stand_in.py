@@ -30,6 +30,7 @@ class StandIn:
     """All six joints; `hand` gives the angles to which limp joints are led at each tick."""
 
     joints = (1, 2, 3, 4, 5, 6)
+    every = 1
 
     def __init__(self, hand: Callable[[int], Mapping[int, float]] = lambda _: {}) -> None:
         self.tick = 0
