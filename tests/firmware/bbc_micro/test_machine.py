@@ -109,7 +109,7 @@ def test_a_request_is_answered_within_5_ms(bbc: BbcMicro, request_: c.Request) -
     assert working_time(bbc, request_) <= ANSWER_US
 
 
-def test_a_stop_is_answered_within_10_ms_while_the_phase_is_unknown() -> None:
+def test_a_stop_in_force_is_answered_within_10_ms_while_the_phase_is_unknown() -> None:
     bbc = machine()
     while "BREAK" not in bbc.screen:
         bbc.run_until(bbc.cycle + 100)
