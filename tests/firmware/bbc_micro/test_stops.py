@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import count
+from itertools import count, pairwise
 from typing import Any
 
 import pytest
@@ -146,3 +146,18 @@ def test_a_stop_of_a_board_without_supply_writes_nothing(host: Host) -> None:
     host.bbc.on_the_bus = lambda _at, _value: 0
     host.run(3 * PERIOD_US)
     assert host.stop() == (0,) * 6
+
+
+def test_a_period_that_cannot_be_read_costs_that_sample_and_no_other(host: Host) -> None:
+    seen = host.ask(c.Sample(c.AFTER_NEWEST, 1)).tick
+    host.run(6 * PERIOD_US)
+    host.bbc.on_the_bus = flickering(POWER_OF_JOINT_6)
+    host.run(2 * PERIOD_US)
+    host.bbc.on_the_bus = lambda _address, value: value
+    host.run(6 * PERIOD_US)
+    ticks = [seen]
+    while len(ticks) < 12:
+        ticks.append(host.ask(c.Sample(ticks[-1], 1)).tick)
+    gaps = sorted(later - earlier for earlier, later in pairwise(ticks))
+    assert gaps[:-1] == [1] * 10
+    assert gaps[-1] in (2, 3)
