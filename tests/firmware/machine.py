@@ -56,6 +56,8 @@ class Machine:
         self.whole: list[Results] = []
         """What was stored in each period, from tick 1 on."""
         self.misses_fetches = False
+        self.on_the_bus: Callable[[int, int], int] = lambda _address, value: value
+        """What the bridge gets of the value at an address."""
         self._period_us = PERIOD_US * (1 + drift)
         self._taken = [500] * JOINTS
         self._storing: list[tuple[float, int, int]] = []
@@ -132,7 +134,7 @@ class Machine:
     def _read(self, address: int) -> int:
         self.now_us += 1
         self._move_on()
-        return self.memory[address - MAP.base]
+        return self.on_the_bus(address, self.memory[address - MAP.base])
 
     def _write(self, address: int, value: int) -> None:
         self.now_us += 1

@@ -9,10 +9,10 @@
 .include "memory_map.inc"
 .include "long.inc"
 .importzp now, since, stored, looked, following, tick, unchanged, read_once, powered, has_looked, ring_count
-.importzp boots, restarted, begun, sample_after, written_tick, scratch
+.importzp boots, restarted, begun, sample_after, written_tick, scratch, unsure, product
 .import positions, fresh_reading, held, read_all, same_reading, end_session, keep_snapshot
 
-.export period_work, read_now, find_begun, wait_until_clear, wait_2_ms
+.export period_work, read_now, find_begun, wait_until_clear, begin_2_ms, end_2_ms
 
 SEARCHING = 0                   ; the phase is unknown
 EXPECTING = 1                   ; the next results are due a period after the last
@@ -25,6 +25,7 @@ BEGINS = PERIOD_US - STORED_AFTER
 CLEAR_FROM = BEGINS - 600       ; around the fetch the memory is left alone
 CLEAR_TO = BEGINS + 500
 STORING = 2000
+JUST_NOW = 1500                 ; a change was seen to happen if the look before it was no longer ago
 GIVE_UP = 8000                  ; a snapshot that is not whole by then is missing
 SEARCH_EVERY = 1000
 EXPECT_EVERY = 200
@@ -83,10 +84,14 @@ unfollowed:
         branch_if_least scratch, SEARCH_EVERY, search_now
         rts
 search_now:
+        lda #0
+        sta unsure
         jsr look
         bcs seen
         rts
-seen:   lda now
+seen:   lda #0
+        sta unchanged
+        lda now
         sta stored
         lda now+1
         sta stored+1
@@ -99,6 +104,13 @@ due:    jsr since_look
         branch_if_least scratch, EXPECT_EVERY, expect_now
         rts
 expect_now:
+        ldx #0
+        stx unsure
+        branch_if_least scratch, JUST_NOW, long_ago
+        bcc look_again
+long_ago:
+        inc unsure
+look_again:
         jsr look
         bcs changed
         lda following
@@ -111,6 +123,8 @@ overdue:
         lda unchanged
         cmp #MOST_UNCHANGED+1
         bcs stopped
+        lda #1
+        sta unsure
         jsr add_period
         jmp begin_settling
 stopped:
@@ -158,13 +172,27 @@ begin_settling:
 settle:
         branch_if_least since, STORING, stored_now
         rts
+; Where the change was not seen to happen, results may be stored at any moment: the second reading then begins when any
+; change that the first has met is complete.
 stored_now:
+        lda read_once
+        beq read_whole
+        lda unsure
+        beq read_whole
+        jsr since_look
+        branch_if_least scratch, STORING, read_whole
+        rts
+read_whole:
         jsr read_all
         lda read_once
         beq first
         jsr same_reading
         beq whole
 first:  inc read_once
+        lda now
+        sta looked
+        lda now+1
+        sta looked+1
         ldx #41
 copy:   lda fresh_reading,x
         sta held,x
@@ -307,20 +335,25 @@ near:   jsr read_now
         branch_if_least since, CLEAR_FROM, near
 clear:  rts
 
-wait_2_ms:
+; The 2 ms begin; in `product`: when they end.
+begin_2_ms:
         jsr read_now
         lda now
         clc
         adc #<STORING
-        sta scratch
+        sta product
         lda now+1
         adc #>STORING
-        sta scratch+1
-wait:   jsr read_now
+        sta product+1
+        rts
+
+; Waits until they have ended.
+end_2_ms:
+        jsr read_now
         lda now
         sec
-        sbc scratch
+        sbc product
         lda now+1
-        sbc scratch+1
-        bmi wait
+        sbc product+1
+        bmi end_2_ms
         rts

@@ -9,6 +9,7 @@
 
 .export keep_snapshot, ring_place, sample, move_and_sample, sample_work
 
+MISSING = $80                   ; status of a place whose period has no snapshot; no flag has this value
 PATIENCE = 25                   ; periods after which a Sample has waited in vain
 
 .code
@@ -32,20 +33,14 @@ ring_place:
 ; Puts the whole reading in `fresh_reading` into the ring, under the tick of the period that it shows.
 keep_snapshot:
         jsr put_in_taken
-        copy_long ring_newest, begun
-        increment_long begun
-        equal_long begun, tick
+        lda ring_count
         beq follows
-        lda #0                  ; ticks in the ring are consecutive
-        sta ring_count
+        jsr mark_missing
 follows:
         copy_long tick, ring_newest
         copy_long tick, begun
-        lda ring_count
-        cmp #RING_DEPTH
-        beq full
-        inc ring_count
-full:   jsr ring_place
+        jsr take_place
+        jsr ring_place
         ldy #42
 store:  lda fresh_reading-1,y
         sta (ring_pointer),y
@@ -60,6 +55,50 @@ none_missed:
         ldy #0
         sta (ring_pointer),y
         rts
+
+; One more place of the ring is taken.
+take_place:
+        lda ring_count
+        cmp #RING_DEPTH
+        beq full
+        inc ring_count
+full:   rts
+
+; Periods between the newest in the ring and this one have no snapshot, but places. Where they are more than the ring
+; has, it is emptied.
+mark_missing:
+        sec
+        lda tick
+        sbc ring_newest
+        sta scratch
+        lda tick+1
+        sbc ring_newest+1
+        sta scratch+1
+        lda tick+2
+        sbc ring_newest+2
+        ora scratch+1
+        sta scratch+1
+        lda tick+3
+        sbc ring_newest+3
+        ora scratch+1
+        bne empty
+        lda scratch
+        beq empty
+        cmp #RING_DEPTH+1
+        bcs empty
+        copy_long ring_newest, begun
+mark:   increment_long begun
+        dec scratch
+        beq marked
+        jsr ring_place
+        ldy #0
+        lda #MISSING
+        sta (ring_pointer),y
+        jsr take_place
+        jmp mark
+empty:  lda #0
+        sta ring_count
+marked: rts
 
 ; The set points that the controller took are what position + error come to. They are not those in the memory where it
 ; has missed some, or where others were written since.
@@ -207,7 +246,13 @@ some:
         bcs in_ring
         copy_long oldest, begun
 in_ring:
-        jmp answer
+        jsr ring_place
+        ldy #0
+        lda (ring_pointer),y
+        bpl there
+        increment_long begun    ; the newest is never missing
+        jmp in_ring
+there:  jmp answer
 
 wait:   jsr read_now
         lda now

@@ -85,7 +85,9 @@ end_session:
         rts
 
 ; Counts `fresh` up, to a number that no session and no stop has had. The first one comes from the moment at which
-; somebody has started the bridge, in microseconds since the machine was switched on, mixed by the CRC.
+; somebody has started the bridge, in microseconds since the machine was switched on, mixed by two CRCs. They have
+; polynomials without a common factor, so together they are as good as one of 32 bits; with one polynomial, the second
+; would differ from the first by a constant.
 next_number:
         lda seeded
         bne counted
@@ -96,11 +98,6 @@ next_number:
         sta fresh
         lda crc_high
         sta fresh+1
-        jsr mix
-        lda crc_low
-        sta fresh+2
-        lda crc_high
-        sta fresh+3
 counted:
         increment_long fresh
         test_long fresh
@@ -109,12 +106,32 @@ counted:
 
 mix:    ldx #4
 tick:   lda CLOCK,x
-        jsr crc_add
+        jsr add_to_both
         dex
         bpl tick
         lda SYSTEM_VIA_T1
-        jsr crc_add
+        jsr add_to_both
         lda SYSTEM_VIA_T1+1
-        jsr crc_add
+        jsr add_to_both
         lda USER_VIA_T1_LOW
-        jmp crc_add
+
+; Adds the byte in A to the CRC, and to that with the polynomial 8BB7 in the high half of `fresh`. Keeps X.
+add_to_both:
+        pha
+        jsr crc_add
+        pla
+        eor fresh+3
+        sta fresh+3
+        ldy #8
+bit_:   asl fresh+2
+        rol fresh+3
+        bcc even
+        lda fresh+2
+        eor #$B7
+        sta fresh+2
+        lda fresh+3
+        eor #$8B
+        sta fresh+3
+even:   dey
+        bne bit_
+        rts

@@ -4,13 +4,14 @@
 .include "memory_map.inc"
 .include "long.inc"
 .importzp frozen, frozen_tick, fresh, stop, begun, count, scratch, product, joint, following, ring_count, ring_newest
-.importzp ring_pointer, written_tick, now
+.importzp ring_pointer, written_tick, now, tick, mask, read_once
 .import body, put, put_long, next_number, frozen_postures, fresh_reading, held, read_all, wait_until_clear, find_begun
-.import ring_place, wait_2_ms, to_posture
+.import ring_place, begin_2_ms, end_2_ms, to_posture
 
 .export stop_arm, release, begin_frozen, same_reading
 
 STAMPED = body+12
+MOST_READINGS = 4
 
 .code
 
@@ -73,13 +74,23 @@ note:   lda fresh_reading,x
         bne note
         rts
 
-; Puts whole positions into `fresh_reading`: of the newest complete period, else of two readings that agree, 2 ms apart.
+; Puts positions into `fresh_reading`: of the newest snapshot, if it is of the latest complete period or, while that is
+; being read, of the one before; an older one would drive the arm back. Else of readings 2 ms apart, until all joints
+; agree in two that follow each other. That takes four in a sound memory; after four, whatever they say, each joint has
+; what two readings in a row agreed on last, or the newest.
 measure:
         lda following
         beq read_anew
         lda ring_count
         beq read_anew
         copy_long ring_newest, begun
+        equal_long begun, tick
+        beq current
+        increment_long begun
+        equal_long begun, tick
+        bne read_anew
+        copy_long ring_newest, begun
+current:
         jsr ring_place          ; of the tick in `begun`
         ldy #42
 copy:   lda (ring_pointer),y
@@ -87,17 +98,103 @@ copy:   lda (ring_pointer),y
         dey
         bne copy
         rts
+
 read_anew:
-        jsr read_all
+        lda #0
+        sta read_once           ; `held` is not the first reading of a snapshot any more
+        sta mask                ; joints on which two readings in a row have agreed
+        lda #MOST_READINGS-1
+        sta count
+        jsr begin_2_ms
+        jsr read_positions
 again:  ldx #41
 keep:   lda fresh_reading,x
         sta held,x
         dex
         bpl keep
-        jsr wait_2_ms
-        jsr read_all
-        jsr same_reading
+        jsr end_2_ms
+        jsr wait_until_clear
+        jsr begin_2_ms
+        jsr read_positions
+        jsr compare_positions
+        beq agreed
+        dec count
         bne again
+agreed: ldx #0
+        ldy #0
+take:   lda frozen_postures,y
+        sta fresh_reading+2,x
+        lda frozen_postures+1,y
+        sta fresh_reading+3,x
+        iny
+        iny
+        txa
+        clc
+        adc #7
+        tax
+        cpx #7 * JOINTS
+        bne take
+        rts
+
+; Reads the positions alone into `fresh_reading`.
+read_positions:
+        ldx #0
+        ldy #0
+position:
+        lda POSITION_LOW,x
+        sta fresh_reading+2,y
+        lda POSITION_HIGH,x
+        and #$0F
+        sta fresh_reading+3,y
+        tya
+        clc
+        adc #7
+        tay
+        inx
+        cpx #JOINTS
+        bne position
+        rts
+
+; Zero flag: the positions in `fresh_reading` and `held` agree. Notes in `frozen_postures` what to freeze by now.
+compare_positions:
+        lda #0
+        sta scratch             ; joints that differ
+        tax
+        tay
+        lda #1
+        sta joint               ; its bit in the mask
+each_joint:
+        lda fresh_reading+2,x
+        cmp held+2,x
+        bne differs
+        lda fresh_reading+3,x
+        cmp held+3,x
+        bne differs
+        lda mask
+        ora joint
+        sta mask
+        bne note_position
+differs:
+        inc scratch
+        lda mask
+        and joint
+        bne next_joint
+note_position:
+        lda fresh_reading+2,x
+        sta frozen_postures,y
+        lda fresh_reading+3,x
+        sta frozen_postures+1,y
+next_joint:
+        asl joint
+        iny
+        iny
+        txa
+        clc
+        adc #7
+        tax
+        cpx #7 * JOINTS
+        bne each_joint
+        lda scratch
         rts
 
 ; Zero flag: the positions, errors and powers of `fresh_reading` and `held` agree, and the set points as well.
@@ -160,4 +257,5 @@ write:  lda frozen_postures,y
         bne write
         rts
 no_supply:
+        jsr read_all
         jmp note_postures

@@ -10,7 +10,7 @@
 .exportzp session, nonce, newest, stop, fresh, seeded, boots, restarted, frozen, missed, written_tick
 .exportzp ring_newest, ring_count, sampling, sample_sequence, sample_after, sample_mask, sample_begun
 .exportzp product, mask, joint, ring_pointer, begun, oldest, sample_mark, frozen_tick, missed_one
-.exportzp sample_opcode, taken
+.exportzp sample_opcode, taken, unsure
 
 ; the line
 rx_in:          .res 1          ; next free place; the interrupt moves it
@@ -42,6 +42,7 @@ following:      .res 1
 tick:           .res 4          ; number of the period whose results were stored last
 unchanged:      .res 1          ; periods in a row in which no position changed
 read_once:      .res 1
+unsure:         .res 1          ; the change of the positions was not seen to happen
 powered:        .res 1
 has_looked:     .res 1
 

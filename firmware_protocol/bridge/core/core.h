@@ -42,13 +42,16 @@ void bridge_start(const struct bridge_settings *settings);
 /* Does what time asks for. Call it as often as possible, at least every 250 microseconds. */
 void bridge_work(void);
 
-/* Whether the bridge can take a byte of the host's now. While it cannot, the board keeps the bytes. */
+/* Whether the bridge can take a byte of the host's now. While it cannot, the board keeps the
+ * bytes: as many as come in 15 ms. */
 bool bridge_wants_byte(void);
 
 /* Takes one byte of the host's. A byte that comes when none is wanted is lost. */
 void bridge_take_byte(uint8_t byte);
 
-/* The next byte for the host, or -1 when there is none. */
+/* The next byte for the host, or -1 when there is none. No byte of the host's is wanted until all have been fetched. So
+ * the board has a buffer of at least 57 bytes, a largest frame, from which it sends; otherwise a stop might wait for as
+ * long as the line takes for the reply before it. */
 int16_t bridge_next_byte(void);
 
 /* ---- what the board says when it happens */

@@ -5,6 +5,7 @@
  * around the moment when the next results are due, and counts periods by its own clock where nothing changes. */
 #include "period.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "moments.h"
@@ -31,6 +32,9 @@
 #define JUST_NOW_US 1500u
 /* A snapshot that has not become whole by then, after its results began to be stored, is missing. */
 #define GIVE_UP_US 8000u
+
+/* A snapshot so old is not of the newest period: the signal for periods has failed, or no reading has become whole. */
+#define OLD_AFTER_US (2u * PERIOD_US)
 
 /* A look is a reading of all positions. While nothing is known, one a millisecond: each may cost the controller a
  * fetch. Around the due moment, more often. Where periods are not followed, only a loss of supply is looked for. */
@@ -65,6 +69,8 @@ static bool is_read_once;
 static uint16_t read_again_us;
 static uint32_t written_tick; /* period_tick() when set points were written last */
 static uint32_t missed;
+static uint32_t kept_us; /* when the newest snapshot was put into the ring */
+static bool kept_lately;
 
 void period_start(enum period_source period_source)
 {
@@ -77,12 +83,20 @@ void period_start(enum period_source period_source)
     is_read_once = false;
     written_tick = 0;
     missed = 0;
+    kept_lately = false;
     ring_clear();
 }
 
-bool period_is_followed(void)
+/* Whether the newest snapshot was kept less than so long ago. Asked at every turn, so that the clock may wrap. */
+static bool was_kept_lately(void)
 {
-    return source == PERIOD_TOLD || following != SEARCHING;
+    kept_lately = kept_lately && us_since(&kept_us) < OLD_AFTER_US;
+    return kept_lately;
+}
+
+bool period_newest_is_current(void)
+{
+    return was_kept_lately() && ring_newest() != NULL && tick - ring_newest_tick() <= 1u;
 }
 
 /* Whether so much time has passed since the latest results began to be stored. */
@@ -193,6 +207,8 @@ static void keep_snapshot(struct snapshot *snapshot)
     snapshot->status = (uint8_t)((stop_is_in_force() ? STATUS_FROZEN : 0) | (missed_one ? STATUS_SET_POINT_MISSED : 0));
     missed += missed_one;
     ring_add(tick, snapshot);
+    kept_us = present_us();
+    kept_lately = true;
 }
 
 /* ---- following */
@@ -268,6 +284,7 @@ static void settle(void)
 
 void period_work(void)
 {
+    (void)was_kept_lately();
     if (source != PERIOD_WATCHED) {
         if (look_is_due(has_supply ? SUPPLY_EVERY_US : SEARCH_EVERY_US)) {
             (void)look();

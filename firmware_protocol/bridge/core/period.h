@@ -15,8 +15,8 @@ void period_work(void);
 /* The controller has stored a period's results. */
 void period_ended(void);
 
-/* Whether periods are seen at present, so that the newest snapshot is of the latest complete period. */
-bool period_is_followed(void);
+/* Whether the newest snapshot is of the latest complete period, or of the one before while that is being read. */
+bool period_newest_is_current(void);
 
 /* Periods begun since the board's last reset; always 0 where periods are not seen. */
 uint32_t period_tick(void);

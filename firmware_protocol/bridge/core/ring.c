@@ -2,6 +2,9 @@
 
 #include <stddef.h>
 
+/* The status of a place whose period has no snapshot. No flag has this value. */
+#define MISSING 0x80u
+
 static struct snapshot kept[RING_DEPTH];
 static uint8_t count;
 static uint8_t next; /* where the next snapshot goes */
@@ -33,17 +36,28 @@ void ring_clear(void)
     newest_tick = 0;
 }
 
-void ring_add(uint32_t tick, const struct snapshot *snapshot)
+/* The next place becomes the newest. */
+static void take_place(void)
 {
-    if (tick != newest_tick + 1u) {
-        ring_clear();
-    }
-    newest_tick = tick;
-    kept[next] = *snapshot;
     next = (uint8_t)((next + 1u) % RING_DEPTH);
     if (count < RING_DEPTH) {
         ++count;
     }
+}
+
+void ring_add(uint32_t tick, const struct snapshot *snapshot)
+{
+    if (tick <= newest_tick || tick - newest_tick > RING_DEPTH) {
+        ring_clear();
+    } else if (count > 0) {
+        while (++newest_tick != tick) {
+            kept[next].status = MISSING;
+            take_place();
+        }
+    }
+    newest_tick = tick;
+    kept[next] = *snapshot;
+    take_place();
 }
 
 uint32_t ring_newest_tick(void)
@@ -68,7 +82,10 @@ const struct snapshot *ring_oldest_after(uint32_t *after)
         return NULL;
     }
     const uint32_t later = newest_tick - *after;
-    const uint8_t age = (uint8_t)((later < count ? later : count) - 1u);
+    uint8_t age = (uint8_t)((later < count ? later : count) - 1u);
+    while (snapshot_of_age(age)->status == MISSING) { /* the newest never is */
+        --age;
+    }
     *after = newest_tick - age;
     return snapshot_of_age(age);
 }

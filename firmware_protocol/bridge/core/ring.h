@@ -1,4 +1,4 @@
-/* The last snapshots of the controller's periods, with consecutive ticks. */
+/* The snapshots of the controller's last periods. */
 #ifndef BRIDGE_RING_H
 #define BRIDGE_RING_H
 
@@ -19,7 +19,7 @@ void unpack(const uint8_t packed[PACKED_BYTES], struct reading *reading);
 
 void ring_clear(void);
 
-/* Adds the snapshot of a period. A tick that does not follow the newest one empties the ring first. */
+/* Adds the snapshot of a period. Periods left out since the newest one have no snapshot; they take places nevertheless. */
 void ring_add(uint32_t tick, const struct snapshot *snapshot);
 
 /* The newest tick, 0 when the ring is empty. */

@@ -1,10 +1,10 @@
 #include "stop.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #include "framing.h"
 #include "moments.h"
+#include "numbers.h"
 #include "period.h"
 #include "registers.h"
 #include "ring.h"
@@ -12,6 +12,8 @@
 
 /* Between two readings of the positions: longer than the controller takes to store a period's results. */
 #define READ_AGAIN_US 2000u
+/* In a sound memory two of so many readings in a row agree, since results are stored at most once meanwhile. */
+#define MOST_READINGS 4u
 
 static bool frozen;
 static bool reading_posture;
@@ -19,7 +21,10 @@ static uint32_t number;
 static uint32_t frozen_tick;
 static uint16_t sequence;
 static uint32_t read_us;
-static uint8_t positions[POSITION_BYTES];
+static uint8_t readings;
+static uint8_t positions[POSITION_BYTES]; /* the newest reading */
+static uint16_t counts_read[JOINTS];      /* of each joint what two readings in a row agreed on last, else the newest */
+static uint8_t joints_agreed;             /* a mask: two readings in a row have agreed on them */
 
 void stop_start(bool begin_frozen)
 {
@@ -63,14 +68,12 @@ static void freeze_newest_posture(void)
 /* Of positions that are all zero nothing is written: the board has no supply. */
 static void freeze_posture_read(void)
 {
-    uint16_t counts[JOINTS];
     uint16_t any = 0;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        counts[joint] = position_in(positions, joint);
-        any |= counts[joint];
+        any |= counts_read[joint];
     }
     if (any != 0) {
-        freeze(counts);
+        freeze(counts_read);
     }
 }
 
@@ -89,27 +92,48 @@ void stop_request(uint16_t request_sequence)
         return;
     }
     frozen = true;
-    if (period_is_followed() && ring_newest() != NULL) {
+    if (period_newest_is_current()) {
         freeze_newest_posture();
         answer_frozen();
     } else {
         reading_posture = true;
+        readings = 1;
+        joints_agreed = 0;
         read_us = present_us();
         read_positions(positions);
     }
 }
 
-void stop_work(void)
+/* Reads the positions again. True when every joint reads as before. */
+static bool read_again(void)
 {
-    if (!reading_posture || us_since(&read_us) < READ_AGAIN_US) {
-        return;
-    }
     uint8_t again[POSITION_BYTES];
+    bool all_agree = true;
     read_us = present_us();
     read_positions(again);
-    const bool agree = memcmp(again, positions, POSITION_BYTES) == 0;
+    ++readings;
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        const uint16_t counts = position_in(again, joint);
+        if (counts == position_in(positions, joint)) {
+            joints_agreed = (uint8_t)(joints_agreed | (1u << joint));
+            counts_read[joint] = counts;
+        } else {
+            all_agree = false;
+            if (!has_joint(joints_agreed, joint)) {
+                counts_read[joint] = counts;
+            }
+        }
+    }
     memcpy(positions, again, POSITION_BYTES);
-    if (agree) {
+    return all_agree;
+}
+
+void stop_work(void)
+{
+    if (!reading_posture || us_since(&read_us) < READ_AGAIN_US || period_wants_memory()) {
+        return;
+    }
+    if (read_again() || readings == MOST_READINGS) {
         reading_posture = false;
         freeze_posture_read();
         answer_frozen();

@@ -13,7 +13,7 @@ void stop_request(uint16_t sequence);
 /* Goes on with a stop whose posture is still being read. Only while no reply is being sent. */
 void stop_work(void);
 
-/* Whether a stop's reply is still owed. Other requests wait meanwhile, 8 ms at most in a sound memory. */
+/* Whether a stop's reply is still owed. Other requests wait meanwhile, 10 ms at most. */
 bool stop_is_reading(void);
 
 /* Ends the freeze if `number` is that of the newest stop; false if it is not. */

@@ -7,7 +7,7 @@
 /* With double speed, rounded to the nearest: 117,647 baud at 115200, as every Mega has, its USB adapter too. */
 #define DIVISOR ((F_CPU + 4ul * BAUD) / (8ul * BAUD) - 1ul)
 
-/* Both are 256 bytes, so that places wrap by themselves: more than comes while a stop reads the posture (8 ms). */
+/* Both are 256 bytes, so that places wrap by themselves: more than comes while a stop reads the posture (10 ms). */
 static volatile uint8_t received[256];
 static volatile uint8_t received_end;
 static uint8_t received_begin;

@@ -8,6 +8,7 @@ speed.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ class BbcMicro:
         self.board = board
         self.screen = ""
         self.shared_accesses = 0
+        self.on_the_bus: Callable[[int, int], int] = lambda _address, value: value
+        """What the bridge gets of the value at an address of the shared memory."""
         self.labels = {
             name: int(address, 16)
             for address, name in re.findall(r"^al (\w+) \.(\w+)$", Path(f"{image}.labels").read_text(), re.MULTILINE)
@@ -109,7 +112,7 @@ class BbcMicro:
 
     def _read(self, address: int) -> int:
         if address < 0xFD00:
-            return self._at_the_board(lambda: self.board.read(address, 1)[0])
+            return self.on_the_bus(address, self._at_the_board(lambda: self.board.read(address, 1)[0]))
         match address:
             case 0xFE08 | 0xFE09:
                 self.serial.run_until(self.cycle)

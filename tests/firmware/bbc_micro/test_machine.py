@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from random import Random
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ needs.require()
 from firmware_protocol import commands as c  # noqa: E402
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame  # noqa: E402
 from firmware_protocol.units import counts_to_posture  # noqa: E402
-from tests.firmware.bbc_micro.built import images, machine  # noqa: E402
+from tests.firmware.bbc_micro.built import board, images, machine  # noqa: E402
 from tests.firmware.bbc_micro.machine import BbcMicro  # noqa: E402
 from tests.protocol.make_vectors import FILE  # noqa: E402
 
@@ -109,7 +110,7 @@ def test_a_request_is_answered_within_5_ms(bbc: BbcMicro, request_: c.Request) -
     assert working_time(bbc, request_) <= ANSWER_US
 
 
-def test_a_stop_is_answered_within_10_ms_while_the_phase_is_unknown() -> None:
+def test_a_stop_in_force_is_answered_within_10_ms_while_the_phase_is_unknown() -> None:
     bbc = machine()
     while "BREAK" not in bbc.screen:
         bbc.run_until(bbc.cycle + 100)
@@ -131,3 +132,31 @@ def test_the_stack_and_the_image_stay_small(bbc: BbcMicro) -> None:
     assert 0xFF - bbc.deepest <= 32
     assert (images() / "BRIDGE").stat().st_size <= 6 * 1024
     assert bbc.board.counters.set_points_missed == 0
+
+
+def first_number(switched_on_us: int) -> int:
+    """The number that the image takes first when it is started at a moment."""
+    bbc = BbcMicro(images() / "BRIDGE", board(), switched_on_us)
+    bbc.memory[0:0x90] = bytes(0x90)
+    bbc.cpu.pc = bbc.labels["make_crc_table"]
+    bbc.cpu.stPushWord(0x02FF)  # where RTS goes on, less one
+    while bbc.cpu.pc != 0x0300:
+        bbc.cpu.step()
+    bbc.cpu.pc = bbc.labels["next_number"]
+    bbc.cpu.stPushWord(0x02FF)
+    while bbc.cpu.pc != 0x0300:
+        bbc.run_until(bbc.cycle + 1)
+    return bbc.variable("fresh", 4)
+
+
+def test_first_numbers_have_32_bits_that_do_not_follow_from_each_other() -> None:
+    chance = Random(1)
+    numbers = [first_number(chance.getrandbits(36)) - 1 for _ in range(60)]
+    basis: list[int] = []
+    for number in numbers:
+        left = number ^ numbers[0]
+        for other in basis:
+            left = min(left, left ^ other)
+        if left:
+            basis.append(left)
+    assert len(basis) == 32
