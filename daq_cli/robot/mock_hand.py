@@ -71,6 +71,9 @@ class MockOperator:
             self.arm.emergency_stop(pressed=False)
         elif task.kind == "switch_off_and_on":
             self.arm.switch_off_and_on()
+        elif task.kind == "start_as_usual":
+            self.arm.emergency_stop(pressed=False)
+            self.arm.switch_off_and_on()
         elif task.kind == "set_inputs":
             self.arm.inputs(task.inputs)
         elif task.kind == "lead" and task.joint is not None:

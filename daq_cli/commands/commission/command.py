@@ -15,7 +15,7 @@ from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import write_sheet
-from daq_cli.commands.commission.steps import STEPS, Bench, Commissioner, Step, step_named
+from daq_cli.commands.commission.steps import MAP, STEPS, Bench, Commissioner, Step, release_if_pressed, step_named
 
 app = typer.Typer(add_completion=False)
 
@@ -44,6 +44,10 @@ def commission(
         raise SpecError(f"folder {folder}: there is none; make it first")
     record = Record.of(folder)
     left_out = {step_named(name).name for name in skip or ()}
+    if only and only in left_out:
+        raise SpecError(f"--only {only} --skip {only}: nothing would be done")
+    if "memory" in left_out and not (folder / MAP).exists():
+        raise SpecError(f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map")
     chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
     with _person(call, mock_control) as person:
         bench = Bench(call, folder, person, ConsentPrompt(yes), record, parse_joints(joints), postures)
@@ -64,6 +68,7 @@ def _carry_out(bench: Bench, step: Step) -> None:
     number = 1 + [one.name for one in STEPS].index(step.name)
     console().print(f"\n{number} of {len(STEPS)}: {step.title}")
     console().print(f"    {step.does} Watch: {step.watch} To stop: {step.stop}.")
+    release_if_pressed(bench)
     result = step.run(bench)
     bench.record.keep(step.name, result)
     for name, value in result.items():

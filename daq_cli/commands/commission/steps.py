@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -17,11 +17,15 @@ from daq.contracts.errors import DaqError, SafetyError, SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.commands.commission.record import Record
+from firmware_protocol.units import POSTURE_UNITS
 
 if TYPE_CHECKING:
+    from daq.commissioning.memory.commands import CommandProof
+    from daq.commissioning.memory.findings import Findings
     from daq.commissioning.potentiometer import Potentiometer
     from daq.driver import Controller
     from daq_cli.robot.memory_page import LinkPage
+    from daq_cli.robot.pressed import EmergencyStop
     from firmware_protocol.memory_map import MemoryMap
 
 ROUND_TRIPS = 200
@@ -133,20 +137,36 @@ def memory(bench: Bench) -> dict[str, Any]:
     """The memory map, by `daq memory find`."""
     from daq_cli.commands.memory import findings_text, keep_map, search
 
+    def when_found(found: Findings) -> None:
+        if keep_map(found, bench.folder / MAP):
+            bench.configure()
+            bench.record.keep("memory", _memory_result(found, []))
+
     with _page(bench) as page:
         found, proofs = search(
-            bench.call, page, bench.operator, bench.consent, bench.folder / FINDINGS, inputs=True, commands=True
+            bench.call,
+            page,
+            bench.operator,
+            bench.consent,
+            bench.folder / FINDINGS,
+            inputs=True,
+            commands=True,
+            when_found=when_found,
+            pressed=bench.record.note_stop,
         )
     bench.operator.show(findings_text(found, proofs))
-    verdicts = [one.verdict for one in found.all]
-    written = keep_map(found, bench.folder / MAP)
     bench.configure()
-    if not written:
+    if found.memory_map("") is None:
         names = ", ".join(sorted({one.register for one in found.missing()}))
         raise NotCommissionedError(
             f"no memory map, for these have no place: {names}; {FINDINGS} has what was found. Complete a map by "
             f"hand as {MAP} (`daq config copy memory-map` gives one to start from), then go on with --skip memory"
         )
+    return _memory_result(found, proofs)
+
+
+def _memory_result(found: Findings, proofs: Sequence[CommandProof]) -> dict[str, Any]:
+    verdicts = [one.verdict for one in found.all]
     set_points = [found.of("set_point", joint).is_found for joint in range(1, 7)]
     return {
         "map": MAP,
@@ -192,7 +212,8 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
 
     memory_map = bench.memory_map()
     sensors: list[Potentiometer] = []
-    with open_page(bench.call.port, memory_map) as page:
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
         if not bench.operator.begin(Task("press_emergency_stop")):
             raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
         for joint in bench.joints:
@@ -208,6 +229,7 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
             with replacing(bench.folder / MACHINE) as part:
                 part.write_text(measured_machine_text(sensors), "utf-8")
         _give_power_back(bench, page, memory_map)
+        stop.tell(False)
     bench.configure()
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
@@ -215,16 +237,58 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
 def _give_power_back(bench: Bench, page: LinkPage, memory_map: MemoryMap) -> None:
     """Makes the posture the set points by switching off and on, and has the emergency stop released. Raises SafetyError
     where the arm would jump."""
-    bench.operator.begin(Task("switch_off_and_on"))
-    page.wait(1.0)
-    page.reconnect()
-    errors = _typical(page, memory_map, "error", 5)
-    far = [joint for joint, error in errors.items() if abs(error) > SAME_READING]
-    if far:
-        raise SafetyError(
-            f"joints {far} are away from their set points and would jump: keep the emergency stop pressed"
-        )
-    bench.operator.begin(Task("release_emergency_stop"))
+    from daq.commissioning.memory.procedure import release, switched_off_and_on
+
+    if not switched_off_and_on(page, bench.operator):
+        raise SafetyError("the controller was not switched off and on: its set points are not where the arm is")
+    if why := release(page, bench.operator, lambda: _against_power(page, memory_map)):
+        raise SafetyError(why)
+
+
+def _against_power(page: LinkPage, memory_map: MemoryMap) -> str:
+    """Why the drives may not have power; empty if the memory is alive, error + position is each joint's set point by
+    this map, and every error is small."""
+    from daq.commissioning.memory.procedure import SAFE_ERROR, is_alive
+    from firmware_protocol.units import posture_to_counts
+
+    if not is_alive(page.read().data):
+        return "the memory is not alive"
+    told = {name: _typical(page, memory_map, name, 5) for name in ("set_point", "position", "error")}
+    for joint, error in told["error"].items():
+        if abs(error) > SAFE_ERROR:
+            return f"joint {joint} is {error:.0f} counts from its set point and would jump"
+        set_point = posture_to_counts(min(max(round(told["set_point"][joint]), 0), POSTURE_UNITS - 1))
+        if abs(told["position"][joint] + error - set_point) > SAFE_ERROR:
+            return f"joint {joint}: error + position is not its set point, so the memory map is wrong"
+    return ""
+
+
+def release_if_pressed(bench: Bench) -> None:
+    """The safe release of an emergency stop that was pressed when the last call ended. Without a memory map no error
+    can be read: then it is released while the controller is off."""
+    from daq.commissioning.memory.procedure import switched_off_and_on
+    from daq_cli.robot.memory_page import open_page
+
+    if not bench.record.stop_pressed:
+        return
+    bench.operator.show("The emergency stop was pressed and not released safely. Keep it pressed; this comes first.")
+    memory_map = bench.memory_map()
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.pressed = True
+        if not (bench.folder / MAP).exists():
+            if not switched_off_and_on(page, bench.operator, "start_as_usual"):
+                raise SafetyError("the controller was not switched off and on: keep the emergency stop pressed")
+        else:
+            if not bench.operator.begin(Task("press_emergency_stop")):
+                raise SafetyError("the emergency stop must be pressed before the controller is switched off and on")
+            _give_power_back(bench, page, memory_map)
+        stop.tell(False)
+
+
+def _emergency_stop(bench: Bench) -> EmergencyStop:
+    from daq_cli.robot.pressed import EmergencyStop
+
+    return EmergencyStop(bench.operator, bench.record.note_stop)
 
 
 def emergency_stop(bench: Bench) -> dict[str, Any]:
@@ -232,10 +296,12 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
     from daq_cli.robot.memory_page import open_page
 
     memory_map, joint = bench.memory_map(), bench.joints[0]
-    with open_page(bench.call.port, memory_map) as page:
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
         if not bench.operator.begin(Task("press_emergency_stop")):
             raise SafetyError("the emergency stop was not pressed, so nothing is known about it")
-        bench.operator.begin(Task("push", joint=joint))
+        if not bench.operator.begin(Task("push", joint=joint)):
+            raise SafetyError("no joint was pushed, so nothing is known about the emergency stop")
         while not bench.operator.finished():
             page.read()
         page.wait(0.5)
@@ -248,6 +314,7 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
                 f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
             )
         _give_power_back(bench, page, memory_map)
+        stop.tell(False)
     return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
 
 

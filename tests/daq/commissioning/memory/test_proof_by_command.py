@@ -51,8 +51,8 @@ class Arm:
             assert address == BASE + 4
             self.posture = self.posture & 0x300 | value
 
-    def reconnect(self) -> None:
-        """Nothing to do."""
+    def reconnect(self) -> bool:
+        return False
 
     def wait(self, seconds: float) -> None:
         self.time += seconds
