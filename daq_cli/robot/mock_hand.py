@@ -62,6 +62,11 @@ class MockOperator:
     _path: list[tuple[dict[int, float], float]] = field(default_factory=list)
     _until: float = 0.0
 
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """It always may."""
+        del at_the_arm, yes
+        return True
+
     def begin(self, task: Task) -> bool:
         """Begins a task; everything can be done."""
         self._path, self._until = [], self.arm.now()

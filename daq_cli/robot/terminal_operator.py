@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import typer
 
 from daq.commissioning.memory.procedure import Task
+from daq_cli.app.consent import can_be_asked
 from daq_cli.app.context import console
 
 NO_PAUSE = ("press_emergency_stop", "hold_for_release", "set_inputs", "rest", "command")
@@ -98,6 +99,15 @@ class TerminalOperator:
     step: int = 0
     _waits: bool = field(default=False, repr=False)
     _shown: str = field(default="", repr=False)
+
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """Asks before a step. One at the arm is always asked for, be it of a script that answers; another one only of
+        a person. Raises Abort for `q` and where the input has ended."""
+        if not at_the_arm and (yes or not can_be_asked()):
+            return True
+        self.lines.forget()
+        console().print("    Enter to begin, s to leave it open, q to end: ", end="")
+        return self._answer() != "s"
 
     def begin(self, task: Task) -> bool:
         """Asks. Raises Abort for `q` and where the input has ended."""

@@ -19,7 +19,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine, parse_machine
 from daq_cli.commands.commission.machine_text import measured_machine_text
 from daq_cli.commands.commission.record import Record
-from daq_cli.commands.commission.sheet import memory_picture
+from daq_cli.commands.commission.sheet import acceptance_sheet, memory_picture
+from daq_cli.commands.commission.steps import STEPS, lacking, resting_on, step_named
 from daq_cli.robot.memory_page import UnprovedWriteError, open_page
 from daq_cli.robot.pressed import KEEP_PRESSED, EmergencyStop
 from daq_cli.robot.terminal_operator import Lines, TerminalOperator, words
@@ -152,9 +153,10 @@ def test_leaving_while_the_emergency_stop_is_pressed_says_so_and_a_resume_begins
     tmp_path: Path,
 ) -> None:
     record, hand = Record.of(tmp_path), Hand()
+    stop = EmergencyStop(hand, record.note_stop)
+    stop.tell(True)
     for raised in (KeyboardInterrupt, typer.Abort, SpecError):
-        with pytest.raises(raised), EmergencyStop(hand, record.note_stop) as stop:
-            stop.tell(True)
+        with pytest.raises(raised), stop:
             raise raised
     assert hand.told == [KEEP_PRESSED] * 3
     assert Record.of(tmp_path).stop_pressed
@@ -179,6 +181,55 @@ def test_a_controller_that_was_not_seen_without_supply_is_to_be_switched_off_aga
         hand = Hand(times=2)
         assert not switched_off_and_on(page, hand)
         assert hand.tasks == ["switch_off_and_on"] * 3
+
+
+def test_a_step_at_the_arm_is_asked_for_even_with_yes() -> None:
+    assert operator(["\n"]).may_begin(at_the_arm=True, yes=True)
+    assert not operator(["s\n"]).may_begin(at_the_arm=True, yes=True)
+    with pytest.raises(typer.Abort):
+        operator(["q\n"]).may_begin(at_the_arm=True, yes=True)
+    with pytest.raises(typer.Abort):
+        operator([]).may_begin(at_the_arm=True, yes=True)
+    assert {one.name for one in STEPS if not one.at_the_arm} == {"line", "bridge", "period", "model"}
+
+
+def test_the_steps_that_move_need_the_bridge_and_go_when_it_is_done_again(tmp_path: Path) -> None:
+    record = Record.of(tmp_path)
+    moving = {"stop", "gain", "first_ramp", "ramp"}
+    for name in SKIPPED:
+        record.keep(name, {"skipped": True})
+    assert all("bridge" in lacking(step_named(name), record) for name in moving)
+    record.keep("bridge", {})
+    assert not any(lacking(step_named(name), record) for name in moving)
+    assert moving < resting_on(["bridge"])
+    assert {"bridge", *moving} < resting_on(["memory"])
+    assert set(record.drop(resting_on(["bridge"]))) == {*moving, "period", "model"}
+    assert "stop" not in Record.of(tmp_path).steps
+
+
+def test_a_result_of_another_memory_map_is_done_again(daq: CommandLine, tmp_path: Path) -> None:
+    record = Record.of(tmp_path)
+    record.keep("bridge", {"basis": {"port": MOCK, "memory_map": "of another one"}})
+    record.keep("period", {})
+    (tmp_path / "memory_map.toml").write_text("another", "utf-8")
+    options = [word for step in STEPS for word in ("--skip", step.name)]
+    assert "To be done again" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
+    assert Record.of(tmp_path).steps["bridge"]["skipped"]
+    daq("--port", MOCK, "commission", "--only", "line", "--skip", "line").complains(2, "nothing would be done")
+
+
+def test_what_is_missing_or_damaged_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
+    daq("--port", MOCK, "commission", "--folder", tmp_path, "--only", "model").complains(2, "first do ramp")
+    record = Record.of(tmp_path)
+    record.keep("potentiometers", {"joint_1": {"direction": 1}})
+    with pytest.raises(SpecError, match="joint_1"):
+        acceptance_sheet(record)
+    record.drop(["potentiometers"])
+    record.keep("memory", {})
+    for damaged in ("{", "[]", "{}"):
+        (tmp_path / "memory_findings.json").write_text(damaged, "utf-8")
+        with pytest.raises(SpecError, match="damaged"):
+            acceptance_sheet(record)
 
 
 def test_a_dead_memory_is_not_alive() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -38,6 +39,14 @@ class Record:
         """Adds the result of a step, and writes the file at once."""
         self.steps[name] = {"done": datetime.now(UTC).isoformat(timespec="seconds"), **result}
         self._write()
+
+    def drop(self, names: Collection[str]) -> list[str]:
+        """Forgets these steps; the names of those that there were."""
+        gone = [name for name in self.steps if name in names]
+        if gone:
+            self.steps = {name: one for name, one in self.steps.items() if name not in names}
+            self._write()
+        return gone
 
     def note_stop(self, pressed: bool) -> None:
         """Notes that the emergency stop is about to be pressed, or was released safely."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -42,6 +43,20 @@ CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings
 TO_GAIN = (1, 2, 3)
 
 
+NOT_TO_BE_SKIPPED = ("bridge", "ramp")
+"""Steps whose result the steps after them rely on."""
+RESTS_ON = {
+    "bridge": ("port", "memory_map"),
+    "potentiometers": ("memory_map",),
+    "emergency_stop": ("port", "memory_map"),
+    "gain": ("machine",),
+    "first_ramp": ("machine",),
+    "ramp": ("machine",),
+    "model": ("machine",),
+}
+"""What a step's result rests on directly; it also rests on the steps that it needs."""
+
+
 class NotCommissionedError(DaqError):
     """A step whose result does not permit the next one."""
 
@@ -50,6 +65,9 @@ class NotCommissionedError(DaqError):
 
 class Commissioner(Operator, Protocol):
     """The person at the arm, who also reads a protractor."""
+
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
 
     def read_angle(self, joint: int, number: int) -> float | None:
         """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more."""
@@ -79,6 +97,14 @@ class Bench:
         path = self.folder / MAP
         return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
 
+    def basis(self) -> dict[str, str]:
+        """What a result rests on: the port, and the memory map and machine file that there are."""
+        files = {"memory_map": self.folder / MAP, "machine": self.folder / MACHINE}
+        return {"port": self.call.port} | {
+            name: sha256(path.read_bytes()).hexdigest()[:16] if path.exists() else "none"
+            for name, path in files.items()
+        }
+
     def configure(self) -> None:
         """Writes daq.toml with the files that there are."""
         from daq.config.toml_text import settings_text
@@ -105,6 +131,10 @@ class Step(NamedTuple):
     watch: str
     stop: str
     run: Callable[[Bench], dict[str, Any]]
+    needs: tuple[str, ...] = ()
+    """Steps that have to be done, or left out on purpose where that is safe, before this one."""
+    at_the_arm: bool = True
+    """Whether a person at the arm has to say that it may begin, even with --yes."""
 
 
 def line(bench: Bench) -> dict[str, Any]:
@@ -386,6 +416,8 @@ def model(bench: Bench) -> dict[str, Any]:
     from model.comparison.compare import compare
     from model.machine_model.model import base_model
 
+    if "trace" not in bench.record.steps.get("ramp", {}):
+        raise SpecError("the step ramp has left no trace: do it first (--only ramp)")
     trace = read_trace(Path(bench.record.steps["ramp"]["trace"]))
     machine = bench.configured.settings.machine()
     compared = compare([("machine file", base_model(machine))], [trace])
@@ -414,8 +446,9 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
 
 SEE = "It only reads; nothing moves."
 KEY = "Ctrl-C, `daq stop` in another terminal, or the emergency stop"
+BEFORE_MOVING = ("bridge", "potentiometers", "emergency_stop", "stop")
 STEPS = (
-    Step("line", "Port and line", "Reads one byte 200 times.", SEE, "Ctrl-C", line),
+    Step("line", "Port and line", "Reads one byte 200 times.", SEE, "Ctrl-C", line, at_the_arm=False),
     Step(
         "memory",
         "Memory map",
@@ -431,6 +464,8 @@ STEPS = (
         SEE,
         "Ctrl-C",
         bridge,
+        ("memory",),
+        at_the_arm=False,
     ),
     Step(
         "potentiometers",
@@ -439,6 +474,7 @@ STEPS = (
         "The arm, which may sink while the emergency stop is pressed.",
         "the emergency stop stays pressed throughout",
         potentiometers,
+        ("memory",),
     ),
     Step(
         "emergency_stop",
@@ -447,6 +483,7 @@ STEPS = (
         "The arm, which may sink while the emergency stop is pressed.",
         "the emergency stop stays pressed",
         emergency_stop,
+        ("memory",),
     ),
     Step(
         "stop",
@@ -455,8 +492,11 @@ STEPS = (
         "The arm stays where it is.",
         KEY,
         stop,
+        ("bridge",),
     ),
-    Step("period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period),
+    Step(
+        "period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period, ("bridge",), at_the_arm=False
+    ),
     Step(
         "gain",
         "Gain of each joint",
@@ -464,10 +504,36 @@ STEPS = (
         "The arm.",
         KEY,
         gain,
+        BEFORE_MOVING,
     ),
-    Step("first_ramp", "First ramp, joint 1", "Moves joint 1 by 21.6 degrees in 0.65 s.", "The arm.", KEY, first_ramp),
-    Step("ramp", "Ramp, joints 1 to 3", "Moves joints 1 to 3 by 21.6 degrees in 0.65 s.", "The arm.", KEY, ramp),
-    Step("model", "The model", "Compares the ramp with the machine file.", "It only computes.", "Ctrl-C", model),
+    Step(
+        "first_ramp",
+        "First ramp, joint 1",
+        "Moves joint 1 by 21.6 degrees in 0.65 s.",
+        "The arm.",
+        KEY,
+        first_ramp,
+        BEFORE_MOVING,
+    ),
+    Step(
+        "ramp",
+        "Ramp, joints 1 to 3",
+        "Moves joints 1 to 3 by 21.6 degrees in 0.65 s.",
+        "The arm.",
+        KEY,
+        ramp,
+        (*BEFORE_MOVING, "first_ramp"),
+    ),
+    Step(
+        "model",
+        "The model",
+        "Compares the ramp with the machine file.",
+        "It only computes.",
+        "Ctrl-C",
+        model,
+        ("ramp",),
+        at_the_arm=False,
+    ),
 )
 """All steps, in order."""
 
@@ -524,6 +590,37 @@ def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> di
             high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
             of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
     return {joint: float(np.mean(np.sort(one)[1:-1])) for joint, one in values.items()}
+
+
+def lacking(step: Step, record: Record) -> list[str]:
+    """The steps that have to be done before this one. Some may be left out with --skip."""
+    return [
+        name
+        for name in step.needs
+        if name not in record.steps or (name in NOT_TO_BE_SKIPPED and record.steps[name].get("skipped"))
+    ]
+
+
+def resting_on(names: Collection[str]) -> set[str]:
+    """The steps whose results rest on these steps, directly or not."""
+    found: set[str] = set()
+    for step in STEPS:  # in order, so that one pass is enough
+        if {*names, *found} & set(step.needs):
+            found.add(step.name)
+    return found
+
+
+def stale(bench: Bench) -> set[str]:
+    """The steps whose results were found at another port, or with another memory map or machine file, and those that
+    rest on them."""
+    now = bench.basis()
+    changed = {
+        name
+        for name, of in RESTS_ON.items()
+        if name in bench.record.steps and not bench.record.steps[name].get("skipped")
+        if any(bench.record.steps[name].get("basis", {}).get(what) != now[what] for what in of)
+    }
+    return changed | {name for name in resting_on(changed) if not bench.record.steps.get(name, {}).get("skipped")}
 
 
 def step_named(name: str) -> Step:
