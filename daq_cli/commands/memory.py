@@ -189,7 +189,7 @@ def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandP
         proofs.append(prove_by_command(page, found.joints, joint.joint))
         operator.show(proof_line(proofs[-1]))
         if proofs[-1].problem:
-            operator.show("The proof ends here; the set point from before is written again.")
+            operator.show("The proof ends here. Keep a hand at the emergency stop.")
             break
     return proofs
 
