@@ -28,7 +28,7 @@ def words(task: Task) -> str:
         "must stay switched on. It stays pressed until you are told otherwise.",
         "lead": f"Move joint {task.joint} by hand, and no other: first a few degrees to and fro around where it is, "
         "slowly (some 10 s), then evenly to one end of its range, to the other end, and back to where it was.",
-        "push": f"Move joint {task.joint} by hand by about 3 degrees, and leave it there.",
+        "push": f"Move joint {task.joint} by hand by about 3 degrees, leave it there, and let go of it.",
         "place": "Bring the joints to about these postures (0 to 999 over a joint's range), and hold them there: "
         + ", ".join(f"joint {joint}: {posture}" for joint, posture in task.targets.items()),
         "switch_off_and_on": "With the emergency stop still pressed, switch the controller off and on again. The arm "

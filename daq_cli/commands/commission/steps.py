@@ -34,7 +34,7 @@ ROUND_TRIPS = 200
 PERIODS = 150
 """Number of control periods over which the period is measured."""
 AVERAGED = 12
-"""Number of readings averaged at each posture of a protractor."""
+"""Number of readings of which the median is taken at each posture of a protractor."""
 SAME_READING = 12
 """Largest difference (ADC counts) between a position by the bridge's memory map and by the one that was found."""
 PUSHED, STAYS = 25, 5
@@ -581,7 +581,7 @@ def _positions(page: LinkPage, memory_map: MemoryMap, count: int = 5) -> dict[in
 
 
 def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
-    """A register of each joint: the mean of its readings without the smallest and the largest, which may be torn."""
+    """A register of each joint: the median of its readings, of which some may be torn."""
     register = memory_map[name]
     values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
     for _ in range(count):
@@ -589,7 +589,7 @@ def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> di
         for joint, of_joint in values.items():
             high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
             of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
-    return {joint: float(np.mean(np.sort(one)[1:-1])) for joint, one in values.items()}
+    return {joint: float(np.median(one)) for joint, one in values.items()}
 
 
 def lacking(step: Step, record: Record) -> list[str]:
