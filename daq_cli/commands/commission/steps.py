@@ -43,6 +43,7 @@ CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings
 TO_GAIN = (1, 2, 3)
 
 
+GAINS, SIGNALS = ("gain_p", "gain_i", "gain_d"), ("process_inputs", "process_outputs")
 NOT_TO_BE_SKIPPED = ("bridge", "ramp")
 """Steps whose result the steps after them rely on."""
 RESTS_ON = {
@@ -217,14 +218,24 @@ def bridge(bench: Bench) -> dict[str, Any]:
     memory_map = bench.memory_map()
     with open_page(bench.call.port, memory_map) as page:
         own = {name: _typical(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
+        still = {name: _typical(page, memory_map, name, 5) for name in (*GAINS, *SIGNALS)}
     with _controller(bench) as controller:
         told = controller.errors_positions_powers()
+        gains, process = controller.gains(), controller.process()
     far = [
         f"{name.replace('_', ' ')} {joint}"
         for name, values in own.items()
         for joint, value in values.items()
         if abs(getattr(told[joint], name) - value) > (SAME_READING if name != "set_point" else 0)
     ]
+    far += [
+        f"{name.replace('_', ' ')} {joint}"
+        for index, name in enumerate(GAINS)
+        for joint, value in still[name].items()
+        if gains[joint][index] != value
+    ]
+    signals = (process.inputs, process.outputs)
+    far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
     if far:
         raise NotCommissionedError(
             f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
