@@ -141,6 +141,7 @@ class TerminalOperator:
     def read_angle(self, joint: int, number: int) -> float | None:
         """Asks for the angle of a joint that was moved by hand."""
         while True:
+            self.lines.forget()
             console().print(
                 f"    joint {joint}, posture {number}: move and hold it, type its angle in degrees (Enter: no more): ",
                 end="",

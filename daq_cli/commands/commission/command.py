@@ -63,6 +63,7 @@ def commission(
         step_named(only)
     with _person(call, mock_control) as person:
         bench = Bench(call, folder, person, ConsentPrompt(yes), record, parse_joints(joints), postures)
+        release_if_pressed(bench)
         if gone := record.drop(stale(bench)):
             _say_dropped(gone, "the port, the memory map or the machine file has changed")
         chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
