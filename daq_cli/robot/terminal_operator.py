@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import sys
@@ -58,9 +59,10 @@ class Lines:
         """Forgets what was typed ahead at a terminal; the lines of a script stay."""
         descriptor = self._open()
         if os.isatty(descriptor):
-            import termios
+            with contextlib.suppress(ImportError):  # Windows has none
+                import termios
 
-            termios.tcflush(descriptor, termios.TCIFLUSH)
+                termios.tcflush(descriptor, termios.TCIFLUSH)
             self._held = b""
 
     def ready(self) -> bool:
