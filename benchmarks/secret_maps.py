@@ -81,8 +81,9 @@ class BoardPage:
         self.writes.append(address)
         self.board.write(address, bytes((value,)))
 
-    def reconnect(self) -> None:
-        """Nothing to do without a line."""
+    def reconnect(self) -> bool:
+        """Nothing to do without a line; the readings show an interruption."""
+        return False
 
     def wait(self, seconds: float) -> None:
         self.board.run_until(self.board.time_us + round(seconds * 1e6))

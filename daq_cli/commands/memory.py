@@ -89,8 +89,17 @@ def find(
         check_folder(path, what)
     call = invocation(context)
     with _page(call) as page, _operator(call, mock_control) as operator:
-        found, proofs = search(call, page, operator, ConsentPrompt(yes), findings, inputs=inputs, commands=commands)
-    written = keep_map(found, output)
+        found, proofs = search(
+            call,
+            page,
+            operator,
+            ConsentPrompt(yes),
+            findings,
+            inputs=inputs,
+            commands=commands,
+            when_found=lambda found: keep_map(found, output),
+        )
+    written = found.memory_map("") is not None
     if json:
         print_json(findings_data(found, proofs) | {"memory_map": str(output) if written else None})
         return
@@ -108,11 +117,18 @@ def search(
     *,
     inputs: bool,
     commands: bool,
+    when_found: Callable[[Findings], object],
+    pressed: Callable[[bool], None] = lambda _pressed: None,
 ) -> tuple[Findings, list[CommandProof]]:
-    """The whole search; the findings so far are written to `keep` after every stage that changes them."""
+    """The whole search; the findings so far are written to `keep` after every stage that changes them.
+
+    when_found: called with the findings before anything is moved
+    pressed:    told that the emergency stop is about to be pressed, and that it was released safely
+    """
     from daq.commissioning.memory.findings import judge
     from daq.commissioning.memory.procedure import Finder
     from daq_cli.app.output_file import replacing
+    from daq_cli.robot.pressed import EmergencyStop
 
     def save(found: Findings, proofs: list[CommandProof]) -> None:
         import json
@@ -120,42 +136,60 @@ def search(
         with replacing(keep) as part:
             part.write_text(json.dumps(findings_data(found, proofs), indent=2) + "\n", "utf-8")
 
-    found = Finder(page, operator, inputs=5 if inputs else 0, keep=lambda recording: save(judge(recording), [])).find()
-    save(found, [])
-    proofs = _prove(call, page, operator, consent, found) if commands else []
-    if not commands:
-        operator.show("The emergency stop stays pressed: release it only when every error is small, or the arm jumps.")
+    proofs: list[CommandProof] = []
+    with EmergencyStop(operator, pressed) as stop:
+        finder = Finder(
+            page,
+            operator,
+            inputs=5 if inputs else 0,
+            keep=lambda recording: save(judge(recording), []),
+            pressed=stop.tell,
+        )
+        found = finder.find()
+        save(found, [])
+        when_found(found)
+        if commands:
+            consent.require(call.port, page)
+            if stop.pressed and _released(page, operator, found):
+                stop.tell(False)
+            if not stop.pressed:
+                proofs = _prove(page, operator, found)
     save(found, proofs)
     return found, proofs
 
 
-def _prove(
-    call: Invocation, page: LinkPage, operator: Operator, consent: ConsentPrompt, found: Findings
-) -> list[CommandProof]:
+def _released(page: LinkPage, operator: Operator, found: Findings) -> bool:
+    """Whether the emergency stop was released, and the arm has stayed where it was."""
+    from daq.commissioning.memory.procedure import errors_now, is_alive, may_have_power, release
+
+    def against() -> str:
+        if not is_alive(page.read().data):
+            return "the memory is not alive"
+        return may_have_power(errors_now(page, found.joints))
+
+    if why := release(page, operator, against):
+        operator.show(f"Nothing is moved: {why}.")
+    return not why
+
+
+def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandProof]:
     """The proof by command, joint by joint, each with the person's word; nothing where the arm might jump."""
     from daq.commissioning.memory.commands import prove_by_command
     from daq.commissioning.memory.procedure import Task, errors_now, may_have_power
 
-    if against := may_have_power(errors_now(page, found.joints)):
-        operator.show(f"Nothing is moved, and the emergency stop stays pressed: {against}.")
-        return []
-    if not operator.begin(Task("release_emergency_stop")):
-        return []
-    page.wait(0.5)
-    if against := may_have_power(errors_now(page, found.joints)):
-        operator.show(f"Nothing is moved: {against}.")
-        return []
-    consent.require(call.port, page)
-    proofs = []
+    proofs: list[CommandProof] = []
     for joint in found.joints:
         place = None if joint.set_point is None else joint.set_point.place
         if place is None or not operator.begin(Task("command", joint=joint.joint)):
             continue
+        if against := may_have_power(errors_now(page, found.joints)):
+            operator.show(f"Nothing more is moved, use the emergency stop: {against}.")
+            break
         page.prove([page.base + place.low])
         proofs.append(prove_by_command(page, found.joints, joint.joint))
         operator.show(proof_line(proofs[-1]))
         if proofs[-1].problem:
-            operator.show("The proof ends here; the set point from before is written again.")
+            operator.show("The proof ends here. Keep a hand at the emergency stop.")
             break
     return proofs
 

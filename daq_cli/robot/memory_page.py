@@ -81,11 +81,13 @@ class LinkPage:
             raise UnprovedWriteError(f"{address:04X}: it is not proved what this byte is; nothing was written")
         self.link.request(WriteBlock(address, bytes((value,))), BlockWritten)
 
-    def reconnect(self) -> None:
-        """Greets the controller again."""
+    def reconnect(self) -> bool:
+        """Greets the controller again; whether it has been reset since."""
+        before = self.hello.boots
         self.hello = self._greet()
         if isinstance(self.clock, LockStepClock):
             self.clock.synchronise()
+        return self.hello.boots != before
 
     def wait(self, seconds: float) -> None:
         """Sleeps, or lets the mock's time pass."""

@@ -62,6 +62,11 @@ class MockOperator:
     _path: list[tuple[dict[int, float], float]] = field(default_factory=list)
     _until: float = 0.0
 
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """It always may."""
+        del at_the_arm, yes
+        return True
+
     def begin(self, task: Task) -> bool:
         """Begins a task; everything can be done."""
         self._path, self._until = [], self.arm.now()
@@ -70,6 +75,9 @@ class MockOperator:
         elif task.kind == "release_emergency_stop":
             self.arm.emergency_stop(pressed=False)
         elif task.kind == "switch_off_and_on":
+            self.arm.switch_off_and_on()
+        elif task.kind == "start_as_usual":
+            self.arm.emergency_stop(pressed=False)
             self.arm.switch_off_and_on()
         elif task.kind == "set_inputs":
             self.arm.inputs(task.inputs)

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 import typer
 
-from daq.commissioning.memory.procedure import Task
+from daq.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
 from daq.commissioning.potentiometer import Interval, Potentiometer
 from daq.config.robot_files import load_memory_map
+from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine, parse_machine
 from daq_cli.commands.commission.machine_text import measured_machine_text
-from daq_cli.commands.commission.sheet import memory_picture
+from daq_cli.commands.commission.record import Record
+from daq_cli.commands.commission.sheet import acceptance_sheet, memory_picture
+from daq_cli.commands.commission.steps import STEPS, lacking, resting_on, step_named
 from daq_cli.robot.memory_page import UnprovedWriteError, open_page
-from daq_cli.robot.terminal_operator import TerminalOperator, words
+from daq_cli.robot.pressed import KEEP_PRESSED, EmergencyStop
+from daq_cli.robot.terminal_operator import Lines, TerminalOperator, words
 from firmware_protocol.memory_map import default_memory_map
 from tests.daq_cli.invoke import CommandLine
 
@@ -52,11 +58,12 @@ def test_a_byte_of_which_nothing_is_proved_is_not_written() -> None:
 
 
 def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: Path) -> None:
+    daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
     skipped = [word for name in SKIPPED for word in ("--skip", name)]
     said = daq("--port", MOCK, "commission", "--folder", tmp_path, *skipped)
     assert said.code == 0
     record = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]
-    assert record["line"]["capabilities"] == ["sample", "lock_step", "simulated"]
+    assert record["line"]["capabilities"] == ["sample", "lock_step", "simulated", "compact"]
     assert record["memory"]["skipped"]
     assert "Acceptance sheet" in (tmp_path / "acceptance.html").read_text("utf-8")
     assert tomllib.loads((tmp_path / "daq.toml").read_text("utf-8"))["robot"]["port"] == MOCK
@@ -105,6 +112,28 @@ def test_measured_sensors_stand_in_the_machine_file() -> None:
     assert untouched == load_machine("ma2000").joint(1).sensor
 
 
+@dataclass
+class Hand:
+    """A person who does `times` of each task, and nothing of it."""
+
+    times: int = 1000
+    tasks: list[str] = field(default_factory=list)
+    told: list[str] = field(default_factory=list)
+
+    def begin(self, task: Task) -> bool:
+        self.tasks.append(task.kind)
+        return len(self.tasks) <= self.times
+
+    def finished(self) -> bool:
+        return True
+
+    def show(self, text: str) -> None:
+        self.told.append(text)
+
+    def watch(self, postures: Mapping[int, int]) -> None:
+        """Nobody looks."""
+
+
 def operator(lines: list[str]) -> TerminalOperator:
     answers: Iterator[str] = iter(lines)
     return TerminalOperator(lambda: next(answers, ""))
@@ -118,6 +147,114 @@ def test_a_person_begins_skips_or_ends_each_task() -> None:
         person.begin(Task("switch_off_and_on"))
     with pytest.raises(typer.Abort):  # the input has ended
         operator([]).begin(Task("rest"))
+
+
+def test_leaving_while_the_emergency_stop_is_pressed_says_so_and_a_resume_begins_with_the_safe_release(
+    tmp_path: Path,
+) -> None:
+    record, hand = Record.of(tmp_path), Hand()
+    stop = EmergencyStop(hand, record.note_stop)
+    stop.tell(True)
+    for raised in (KeyboardInterrupt, typer.Abort, SpecError):
+        with pytest.raises(raised), stop:
+            raise raised
+    assert hand.told == [KEEP_PRESSED] * 3
+    assert Record.of(tmp_path).stop_pressed
+    with EmergencyStop(hand, record.note_stop) as stop:
+        stop.tell(True)
+        stop.tell(False)
+    assert len(hand.told) == 3
+    assert not Record.of(tmp_path).stop_pressed
+
+
+def test_the_errors_are_read_again_after_the_prompt_and_while_the_emergency_stop_is_released() -> None:
+    with open_page(MOCK, default_memory_map()) as page:
+        for clean, tasks in ((0, 0), (1, 1), (2, 2)):
+            hand, reasons = Hand(), iter([""] * clean + ["joint 2 would jump"])
+            assert "joint 2 would jump" in release(page, hand, lambda reasons=reasons: next(reasons))
+            assert hand.tasks == ["hold_for_release", "release_emergency_stop"][:tasks]
+        assert release(page, Hand(), lambda: "") == ""
+
+
+def test_a_controller_that_was_not_seen_without_supply_is_to_be_switched_off_again() -> None:
+    with open_page(MOCK, default_memory_map()) as page:
+        hand = Hand(times=2)
+        assert not switched_off_and_on(page, hand)
+        assert hand.tasks == ["switch_off_and_on"] * 3
+
+
+def test_a_step_at_the_arm_is_asked_for_even_with_yes() -> None:
+    assert operator(["\n"]).may_begin(at_the_arm=True, yes=True)
+    assert not operator(["s\n"]).may_begin(at_the_arm=True, yes=True)
+    with pytest.raises(typer.Abort):
+        operator(["q\n"]).may_begin(at_the_arm=True, yes=True)
+    with pytest.raises(typer.Abort):
+        operator([]).may_begin(at_the_arm=True, yes=True)
+    assert {one.name for one in STEPS if not one.at_the_arm} == {"line", "bridge", "period", "model"}
+
+
+def test_the_steps_that_move_need_the_bridge_and_go_when_it_is_done_again(tmp_path: Path) -> None:
+    record = Record.of(tmp_path)
+    moving = {"stop", "gain", "first_ramp", "ramp"}
+    for name in SKIPPED:
+        record.keep(name, {"skipped": True})
+    assert all("bridge" in lacking(step_named(name), record) for name in moving)
+    record.keep("bridge", {})
+    assert not any(lacking(step_named(name), record) for name in moving)
+    assert moving < resting_on(["bridge"])
+    assert {"bridge", *moving} < resting_on(["memory"])
+    assert set(record.drop(resting_on(["bridge"]))) == {*moving, "period", "model"}
+    assert "stop" not in Record.of(tmp_path).steps
+
+
+def test_a_result_of_another_memory_map_is_done_again(daq: CommandLine, tmp_path: Path) -> None:
+    record = Record.of(tmp_path)
+    record.keep("bridge", {"basis": {"port": MOCK, "memory_map": "of another one"}})
+    record.keep("period", {})
+    (tmp_path / "memory_map.toml").write_text("another", "utf-8")
+    options = [word for step in STEPS for word in ("--skip", step.name)]
+    assert "To be done again" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
+    assert Record.of(tmp_path).steps["bridge"]["skipped"]
+    daq("--port", MOCK, "commission", "--only", "line", "--skip", "line").complains(2, "nothing would be done")
+
+
+def test_what_is_missing_or_damaged_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
+    daq("--port", MOCK, "commission", "--folder", tmp_path, "--only", "model").complains(2, "first do ramp")
+    record = Record.of(tmp_path)
+    record.keep("potentiometers", {"joint_1": {"direction": 1}})
+    with pytest.raises(SpecError, match="joint_1"):
+        acceptance_sheet(record)
+    record.drop(["potentiometers"])
+    record.keep("memory", {})
+    for damaged in ("{", "[]", "{}"):
+        (tmp_path / "memory_findings.json").write_text(damaged, "utf-8")
+        with pytest.raises(SpecError, match="damaged"):
+            acceptance_sheet(record)
+
+
+def test_a_dead_memory_is_not_alive() -> None:
+    assert not is_alive(bytes(128))
+    assert not is_alive(b"\xff" * 128)
+    assert is_alive(bytes(range(128)))
+
+
+def test_an_assumed_memory_map_is_relied_on_by_nothing(daq: CommandLine, tmp_path: Path) -> None:
+    daq("--port", MOCK, "commission", "--folder", tmp_path, "--skip", "memory").complains(2, "--skip memory")
+
+
+def test_lines_of_a_script_that_come_together_are_all_read() -> None:
+    reading, writing = os.pipe()
+    lines = Lines(reading)
+    assert not lines.ready()
+    os.write(writing, b"one\ntwo\n")
+    assert lines.ready()
+    assert lines.read() == "one\n"
+    assert lines.ready()
+    assert lines.read() == "two\n"
+    os.close(writing)
+    assert lines.ready()
+    assert lines.read() == ""
+    os.close(reading)
 
 
 def test_an_angle_that_is_no_number_is_asked_for_again() -> None:

@@ -3,19 +3,21 @@
 Only the low byte of a set point that readings have proved is written. The first value written is the one that is
 there; then one posture unit more or less, in the direction in which the high byte stays. After each write the byte
 must hold the value, the error must have moved by what a unit is, the other joints must have stayed, and every error
-must be small. Otherwise the value from before is written again, and the search ends there.
+must be small, but for the step itself. Otherwise the value from before is written again, and the search ends there. It
+is not written where the high byte has changed meanwhile or the low byte is none that was written: the emergency stop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from daq.commissioning.memory.joint import JointEvidence
-from daq.commissioning.memory.procedure import Page
+from daq.commissioning.memory.procedure import SAFE_ERROR, Page
 from daq.commissioning.memory.relations import position_of, signed_of
+from daq.contracts.errors import DaqError, SafetyError
 from firmware_protocol.units import POSTURE_UNITS, posture_to_counts
 
 LONGEST_STEP = 4
@@ -70,18 +72,38 @@ def prove_by_command(page: Page, joints: Sequence[JointEvidence], joint: int) ->
         )
     result = CommandProof(joint, False, 0, 0.0, 0)
     direction = 1 if (there & 0xFF) + LONGEST_STEP <= 0xFF and there + LONGEST_STEP < POSTURE_UNITS else -1
+    wrote = {there & 0xFF}
     try:
         for step in range(LONGEST_STEP + 1):
             wanted = there + direction * step
+            wrote.add(wanted & 0xFF)
             page.write_byte(low, wanted & 0xFF)
             page.wait(SETTLING_S)
             result = _judge(page, joints, joint, before, (wanted, low, high), direction * step)
             if result.problem or result.sign:
                 break
-    finally:
-        page.write_byte(low, there & 0xFF)
+    except BaseException as error:
+        if problem := _restored(page, low, high, there, wrote):
+            raise SafetyError(f"joint {joint}: {problem} ({error or type(error).__name__})") from error
+        raise
+    if problem := _restored(page, low, high, there, wrote):
+        both = f"{result.problem}; {problem}" if result.problem else problem
+        return replace(result, proved=False, problem=both)
     page.wait(SETTLING_S)
     return result
+
+
+def _restored(page: Page, low: int, high: int, there: int, wrote: Collection[int]) -> str:
+    """Writes the old low byte again, but only under the high byte that was there, and over a byte that was written
+    here: another one would be another posture, far away. Why it was not written; empty if it was."""
+    try:
+        high_now, low_now = page.read_byte(high), page.read_byte(low)
+        if high_now == there >> 8 and low_now in wrote:
+            page.write_byte(low, there & 0xFF)
+            return ""
+    except DaqError as error:
+        return f"the set point from before could not be written again, press the emergency stop: {error}"
+    return f"the set point now reads {low_now | high_now << 8}, and nothing more is written: press the emergency stop"
 
 
 def _judge(
@@ -96,6 +118,11 @@ def _judge(
     others = [j for j in now.positions if j != joint and abs(now.positions[j] - before.positions[j]) > OTHERS]
     if others:
         return CommandProof(joint, False, step, moved, 0, f"joint {others[0]} moved with it")
+    allowed = {j: SAFE_ERROR + (abs(posture_to_counts(abs(step))) if j == joint else 0) for j in now.errors}
+    far = [j for j, error in now.errors.items() if abs(error) > allowed[j]]
+    if far:
+        problem = f"the error of joint {far[0]} is {now.errors[far[0]]:.0f}: press the emergency stop"
+        return CommandProof(joint, False, step, moved, 0, problem)
     target = now.positions[joint] + now.errors[joint]
     if abs(target - posture_to_counts(wanted)) > MOVED:
         problem = f"wrote {wanted}, which is {posture_to_counts(wanted)} counts; error + position is {target:.0f}"

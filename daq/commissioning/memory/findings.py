@@ -184,6 +184,7 @@ def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[
     measured = [None if joint.power is None else round(joint.power.gain) for joint in joints]
     patterns = gain_columns(held, measured)
     shipped = _shipped_gains(recording)
+    several = len(patterns)
     if shipped in patterns:
         patterns = [shipped]
     if len(patterns) != 1:
@@ -191,7 +192,8 @@ def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[
         if patterns:
             why = f"{len(patterns)} patterns of bytes hold the gains that were measured"
         return [Finding(f"gain_{g}", joint, "unknown", evidence=why) for g in "pid" for joint in range(1, JOINTS + 1)]
-    why = f"the only pattern of bytes that holds P = {', '.join(map(str, measured))} and small I and D; not proved"
+    which = "the only pattern" if several == 1 else f"where the shipped map assumes them, one of {several} patterns"
+    why = f"{which} of bytes that holds P = {', '.join(map(str, measured))} and small I and D; not proved"
     return [
         Finding(f"gain_{g}", joint, "assumed", recording.base + column[joint - 1], None, why)
         for g, column in zip("pid", patterns[0], strict=True)

@@ -7,6 +7,7 @@ small: a controller whose set points are elsewhere would move the arm there.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -17,6 +18,7 @@ from daq.commissioning.memory.findings import Findings, judge
 from daq.commissioning.memory.joint import JointEvidence, joint_evidence, set_point_bytes
 from daq.commissioning.memory.recording import PageReading, Recording, Stage, StageKind
 from daq.commissioning.memory.relations import position_of, signed_of
+from daq.contracts.errors import DaqError
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 
@@ -25,8 +27,10 @@ AT_REST = 150
 at rest may."""
 AFTER_POWER_UP = 30
 """Number of readings after switching on."""
-MOST_READINGS = 4000
-"""Largest number of readings of one movement."""
+ALIVE_VALUES = 5
+"""Least number of different bytes in a memory that is alive: without supply it reads the same everywhere."""
+POWER_UP_S = 20.0
+"""Time (s) that a controller may take until its memory is alive after the person says that it is switched on."""
 ATTEMPTS = 3
 """How often a joint is led before it is given up."""
 MOST_EPOCHS = 8
@@ -45,6 +49,8 @@ TaskKind = Literal[
     "push",
     "place",
     "switch_off_and_on",
+    "start_as_usual",
+    "hold_for_release",
     "release_emergency_stop",
     "set_inputs",
     "command",
@@ -101,8 +107,8 @@ class Page(Protocol):
     def write_byte(self, address: int, value: int) -> None:
         """Writes one byte. Only for addresses of which it is proved what they are."""
 
-    def reconnect(self) -> None:
-        """Takes the control again after the controller was switched on again."""
+    def reconnect(self) -> bool:
+        """Takes the control again after the controller was switched on again; whether it says that it restarted."""
 
     def wait(self, seconds: float) -> None:
         """Lets time pass."""
@@ -117,6 +123,8 @@ class Finder:
     inputs: int = 0
     keep: Callable[[Recording], None] = lambda _recording: None
     """Called after every stage, so that nothing is lost."""
+    pressed: Callable[[bool], None] = lambda _pressed: None
+    """Told that the emergency stop is about to be pressed, or was not."""
     recording: Recording = field(init=False)
     epoch: int = 0
 
@@ -128,7 +136,10 @@ class Finder:
         if not self._do(Task("rest")):
             return judge(self.recording)
         self._read("rest", None, AT_REST)
-        if self._do(Task("press_emergency_stop")):
+        self.pressed(True)
+        if not self._do(Task("press_emergency_stop")):
+            self.pressed(False)
+        else:
             joints = self._lead_all()
             self._switch_inputs()
             self._switch_on(joints)
@@ -164,9 +175,8 @@ class Finder:
             if not self._do(Task("place", targets=targets, again=again)):
                 return
             self._watch_until_finished(known)
-            if not self._do(Task("switch_off_and_on")):
+            if not switched_off_and_on(self.page, self.operator):
                 return
-            self._wait_for_power()
             self.epoch += 1
             self._read("power_up", None, AFTER_POWER_UP)
             open_joints = [joint for joint, one in known.items() if not self._has_set_point(one)]
@@ -178,20 +188,10 @@ class Finder:
         found = None if one.pair is None else set_point_bytes(self.recording, one.joint, one.pair)
         return found is not None and found.place is not None
 
-    def _wait_for_power(self) -> None:
-        """Waits until the memory, which reads the same everywhere without supply, is alive again."""
-        for _ in range(MOST_READINGS):
-            if len(set(self.page.read().data)) > 4:
-                break
-            self.page.wait(0.1)
-        self.page.wait(0.5)
-        self.page.reconnect()
-
     def _watch_until_finished(self, known: Mapping[int, JointEvidence]) -> None:
-        for _ in range(MOST_READINGS):
+        self.operator.watch(self.postures(known))
+        while not self.operator.finished():
             self.operator.watch(self.postures(known))
-            if self.operator.finished():
-                return
 
     def postures(self, known: Mapping[int, JointEvidence]) -> dict[int, int]:
         """Where the joints are (posture units)."""
@@ -207,11 +207,9 @@ class Finder:
 
     def _read(self, kind: StageKind, joint: int | None, count: int | None = None) -> None:
         """Reads `count` times, or until the person has finished."""
-        readings = []
-        for _ in range(count or MOST_READINGS):
+        readings = [self.page.read()]
+        while len(readings) < count if count else not self.operator.finished():
             readings.append(self.page.read())
-            if count is None and self.operator.finished():
-                break
         self.recording.stages.append(Stage.of(kind, joint, self.epoch, readings))
         self.keep(self.recording)
 
@@ -236,3 +234,67 @@ def may_have_power(errors: Mapping[int, int]) -> str:
     if far:
         return f"errors above {SAFE_ERROR} ADC counts, the arm would jump: {'; '.join(far)}"
     return ""
+
+
+def is_alive(data: bytes) -> bool:
+    """Whether a memory has supply: without it, it reads 00 or FF everywhere."""
+    return len(set(data)) >= ALIVE_VALUES
+
+
+def switched_off_and_on(page: Page, operator: Operator, kind: TaskKind = "switch_off_and_on") -> bool:
+    """Has the controller switched off and on, and reads meanwhile. It is asked for again until the memory was seen
+    without supply, or the controller says that it restarted, and the memory is alive. False: the person cannot."""
+    again = ""
+    while operator.begin(Task(kind, again=again)):
+        was_off = not _reads_alive(page)
+        while not operator.finished():
+            was_off |= not _reads_alive(page)
+        page.wait(0.1)
+        for _ in range(round(POWER_UP_S / 0.1)):
+            if _reads_alive(page):
+                break
+            was_off = True
+            page.wait(0.1)
+        page.wait(0.5)
+        try:
+            restarted = page.reconnect()
+            alive = is_alive(page.read().data)
+        except DaqError:
+            restarted = alive = False
+        if alive and (was_off or restarted):
+            return True
+        again = "the memory is not alive" if not alive else "no interruption of the supply was seen"
+    return False
+
+
+def _reads_alive(page: Page) -> bool:
+    """Whether the memory can be read, and is alive. A bridge that hangs on the same supply does not answer."""
+    try:
+        return is_alive(page.read().data)
+    except DaqError:
+        page.wait(0.1)
+        with contextlib.suppress(DaqError):
+            page.reconnect()
+        return False
+
+
+def release(page: Page, operator: Operator, against: Callable[[], str]) -> str:
+    """Has the emergency stop released while `against`, asked again and again, has nothing against it. Why it may still
+    be pressed, or has to be pressed again; empty after a release that went well."""
+    if why := against():
+        return f"the emergency stop stays pressed: {why}"
+    if not operator.begin(Task("hold_for_release")):
+        return "the emergency stop stays pressed, as you wished"
+    if why := against():
+        return f"the emergency stop stays pressed: {why}"
+    if not operator.begin(Task("release_emergency_stop")):
+        return "the emergency stop stays pressed, as you wished"
+    while True:
+        finished = operator.finished()
+        if finished:
+            page.wait(0.5)
+        if why := against():
+            operator.show(f"PRESS THE EMERGENCY STOP: {why}")
+            return f"press the emergency stop: {why}"
+        if finished:
+            return ""

@@ -15,7 +15,18 @@ from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import write_sheet
-from daq_cli.commands.commission.steps import STEPS, Bench, Commissioner, Step, step_named
+from daq_cli.commands.commission.steps import (
+    MAP,
+    STEPS,
+    Bench,
+    Commissioner,
+    Step,
+    lacking,
+    release_if_pressed,
+    resting_on,
+    stale,
+    step_named,
+)
 
 app = typer.Typer(add_completion=False)
 
@@ -44,13 +55,24 @@ def commission(
         raise SpecError(f"folder {folder}: there is none; make it first")
     record = Record.of(folder)
     left_out = {step_named(name).name for name in skip or ()}
-    chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
+    if only and only in left_out:
+        raise SpecError(f"--only {only} --skip {only}: nothing would be done")
+    if "memory" in left_out and not (folder / MAP).exists():
+        raise SpecError(f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map")
+    if only:
+        step_named(only)
     with _person(call, mock_control) as person:
         bench = Bench(call, folder, person, ConsentPrompt(yes), record, parse_joints(joints), postures)
+        release_if_pressed(bench)
+        if gone := record.drop(stale(bench)):
+            _say_dropped(gone, "the port, the memory map or the machine file has changed")
+        chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
         for step in chosen:
             if step.name in left_out:
                 record.keep(step.name, {"skipped": True})
                 continue
+            if missing := lacking(step, record):
+                raise SpecError(f"step {step.name}: first do {', '.join(missing)}")
             _carry_out(bench, step)
     page = write_sheet(record)
     if json:
@@ -64,12 +86,22 @@ def _carry_out(bench: Bench, step: Step) -> None:
     number = 1 + [one.name for one in STEPS].index(step.name)
     console().print(f"\n{number} of {len(STEPS)}: {step.title}")
     console().print(f"    {step.does} Watch: {step.watch} To stop: {step.stop}.")
+    if not bench.operator.may_begin(at_the_arm=step.at_the_arm, yes=bench.consent.given):
+        return
+    release_if_pressed(bench)
+    bench.record.drop([step.name])
+    if gone := bench.record.drop(resting_on([step.name])):
+        _say_dropped(gone, f"{step.name} is done again")
     result = step.run(bench)
-    bench.record.keep(step.name, result)
+    bench.record.keep(step.name, {**result, "basis": bench.basis()})
     for name, value in result.items():
         if not isinstance(value, dict):
             console().print(f"    {name.replace('_', ' ')}: {value}")
     write_sheet(bench.record)
+
+
+def _say_dropped(names: list[str], why: str) -> None:
+    console().print(f"To be done again, for {why}: {', '.join(names)}")
 
 
 @contextmanager

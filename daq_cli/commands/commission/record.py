@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,8 @@ class Record:
 
     folder: Path
     steps: dict[str, dict[str, Any]] = field(default_factory=dict)
+    stop_pressed: bool = False
+    """Whether the emergency stop was pressed and not yet released safely."""
 
     @staticmethod
     def of(folder: Path) -> Record:
@@ -26,16 +29,34 @@ class Record:
         path = folder / FILE
         if not path.exists():
             return Record(folder)
-        steps = parse_toml(read_text(path, FILE), str(path)).get("step", {})
+        data = parse_toml(read_text(path, FILE), str(path))
+        steps = data.get("step", {})
         if not isinstance(steps, dict) or not all(isinstance(one, dict) and "done" in one for one in steps.values()):
             raise SpecError(f"{path}: not a record of a commissioning: each [step.NAME] needs `done`")
-        return Record(folder, steps)
+        return Record(folder, steps, data.get("stop_pressed", False) is not False)
 
     def keep(self, name: str, result: dict[str, Any]) -> None:
         """Adds the result of a step, and writes the file at once."""
+        self.steps[name] = {"done": datetime.now(UTC).isoformat(timespec="seconds"), **result}
+        self._write()
+
+    def drop(self, names: Collection[str]) -> list[str]:
+        """Forgets these steps; the names of those that there were."""
+        gone = [name for name in self.steps if name in names]
+        if gone:
+            self.steps = {name: one for name, one in self.steps.items() if name not in names}
+            self._write()
+        return gone
+
+    def note_stop(self, pressed: bool) -> None:
+        """Notes that the emergency stop is about to be pressed, or was released safely."""
+        self.stop_pressed = pressed
+        self._write()
+
+    def _write(self) -> None:
         from daq.config.toml_text import tables_text
         from daq_cli.app.output_file import replacing
 
-        self.steps[name] = {"done": datetime.now(UTC).isoformat(timespec="seconds"), **result}
+        data = {"version": 1, "stop_pressed": self.stop_pressed, "step": self.steps}
         with replacing(self.folder / FILE) as part:
-            part.write_text(tables_text({"version": 1, "step": self.steps}), "utf-8")
+            part.write_text(tables_text(data), "utf-8")

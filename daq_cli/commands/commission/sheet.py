@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daq_cli.commands.commission.record import Record
+from daq.contracts.errors import SpecError
+from daq_cli.commands.commission.record import FILE, Record
 from daq_cli.commands.commission.steps import FINDINGS, STEPS
 
 if TYPE_CHECKING:
@@ -103,10 +104,17 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
     from model.reports.page import Picture
 
     if name == "memory" and (record.folder / FINDINGS).exists():
-        findings = json.loads((record.folder / FINDINGS).read_text("utf-8"))
-        return [Picture(memory_picture(findings), LEGEND)]
+        try:
+            picture = memory_picture(json.loads((record.folder / FINDINGS).read_text("utf-8")))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise SpecError(f"{record.folder / FINDINGS}: damaged ({type(error).__name__}): move it away") from error
+        return [Picture(picture, LEGEND)]
     sensors = {key: value for key, value in result.items() if key.startswith("joint_") and isinstance(value, dict)}
     if name == "potentiometers" and sensors:
+        for joint, sensor in sensors.items():
+            counts, left = sensor.get("counts"), sensor.get("residuals_deg")
+            if not (isinstance(counts, list) and isinstance(left, list) and len(counts) == len(left)):
+                raise SpecError(f"{record.folder / FILE}: {joint} of potentiometers needs counts and residuals_deg")
         return [
             Picture(_sensor_picture(sensors), "Departure of the protractor's angles from each joint's straight line.")
         ]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -17,11 +18,15 @@ from daq.contracts.errors import DaqError, SafetyError, SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.commands.commission.record import Record
+from firmware_protocol.units import POSTURE_UNITS
 
 if TYPE_CHECKING:
+    from daq.commissioning.memory.commands import CommandProof
+    from daq.commissioning.memory.findings import Findings
     from daq.commissioning.potentiometer import Potentiometer
     from daq.driver import Controller
     from daq_cli.robot.memory_page import LinkPage
+    from daq_cli.robot.pressed import EmergencyStop
     from firmware_protocol.memory_map import MemoryMap
 
 ROUND_TRIPS = 200
@@ -29,13 +34,28 @@ ROUND_TRIPS = 200
 PERIODS = 150
 """Number of control periods over which the period is measured."""
 AVERAGED = 12
-"""Number of readings averaged at each posture of a protractor."""
+"""Number of readings of which the median is taken at each posture of a protractor."""
 SAME_READING = 12
 """Largest difference (ADC counts) between a position by the bridge's memory map and by the one that was found."""
 PUSHED, STAYS = 25, 5
 """ADC counts by which a joint is to be pushed off its set point, and by which it may still move then."""
 CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings.json", "machine.toml"
 TO_GAIN = (1, 2, 3)
+
+
+GAINS, SIGNALS = ("gain_p", "gain_i", "gain_d"), ("process_inputs", "process_outputs")
+NOT_TO_BE_SKIPPED = ("bridge", "ramp")
+"""Steps whose result the steps after them rely on."""
+RESTS_ON = {
+    "bridge": ("port", "memory_map"),
+    "potentiometers": ("memory_map",),
+    "emergency_stop": ("port", "memory_map"),
+    "gain": ("machine",),
+    "first_ramp": ("machine",),
+    "ramp": ("machine",),
+    "model": ("machine",),
+}
+"""What a step's result rests on directly; it also rests on the steps that it needs."""
 
 
 class NotCommissionedError(DaqError):
@@ -46,6 +66,9 @@ class NotCommissionedError(DaqError):
 
 class Commissioner(Operator, Protocol):
     """The person at the arm, who also reads a protractor."""
+
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
 
     def read_angle(self, joint: int, number: int) -> float | None:
         """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more."""
@@ -75,6 +98,14 @@ class Bench:
         path = self.folder / MAP
         return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
 
+    def basis(self) -> dict[str, str]:
+        """What a result rests on: the port, and the memory map and machine file that there are."""
+        files = {"memory_map": self.folder / MAP, "machine": self.folder / MACHINE}
+        return {"port": self.call.port} | {
+            name: sha256(path.read_bytes()).hexdigest()[:16] if path.exists() else "none"
+            for name, path in files.items()
+        }
+
     def configure(self) -> None:
         """Writes daq.toml with the files that there are."""
         from daq.config.toml_text import settings_text
@@ -101,6 +132,10 @@ class Step(NamedTuple):
     watch: str
     stop: str
     run: Callable[[Bench], dict[str, Any]]
+    needs: tuple[str, ...] = ()
+    """Steps that have to be done, or left out on purpose where that is safe, before this one."""
+    at_the_arm: bool = True
+    """Whether a person at the arm has to say that it may begin, even with --yes."""
 
 
 def line(bench: Bench) -> dict[str, Any]:
@@ -133,20 +168,36 @@ def memory(bench: Bench) -> dict[str, Any]:
     """The memory map, by `daq memory find`."""
     from daq_cli.commands.memory import findings_text, keep_map, search
 
+    def when_found(found: Findings) -> None:
+        if keep_map(found, bench.folder / MAP):
+            bench.configure()
+            bench.record.keep("memory", _memory_result(found, []))
+
     with _page(bench) as page:
         found, proofs = search(
-            bench.call, page, bench.operator, bench.consent, bench.folder / FINDINGS, inputs=True, commands=True
+            bench.call,
+            page,
+            bench.operator,
+            bench.consent,
+            bench.folder / FINDINGS,
+            inputs=True,
+            commands=True,
+            when_found=when_found,
+            pressed=bench.record.note_stop,
         )
     bench.operator.show(findings_text(found, proofs))
-    verdicts = [one.verdict for one in found.all]
-    written = keep_map(found, bench.folder / MAP)
     bench.configure()
-    if not written:
+    if found.memory_map("") is None:
         names = ", ".join(sorted({one.register for one in found.missing()}))
         raise NotCommissionedError(
             f"no memory map, for these have no place: {names}; {FINDINGS} has what was found. Complete a map by "
             f"hand as {MAP} (`daq config copy memory-map` gives one to start from), then go on with --skip memory"
         )
+    return _memory_result(found, proofs)
+
+
+def _memory_result(found: Findings, proofs: Sequence[CommandProof]) -> dict[str, Any]:
+    verdicts = [one.verdict for one in found.all]
     set_points = [found.of("set_point", joint).is_found for joint in range(1, 7)]
     return {
         "map": MAP,
@@ -167,14 +218,24 @@ def bridge(bench: Bench) -> dict[str, Any]:
     memory_map = bench.memory_map()
     with open_page(bench.call.port, memory_map) as page:
         own = {name: _typical(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
+        still = {name: _typical(page, memory_map, name, 5) for name in (*GAINS, *SIGNALS)}
     with _controller(bench) as controller:
         told = controller.errors_positions_powers()
+        gains, process = controller.gains(), controller.process()
     far = [
         f"{name.replace('_', ' ')} {joint}"
         for name, values in own.items()
         for joint, value in values.items()
         if abs(getattr(told[joint], name) - value) > (SAME_READING if name != "set_point" else 0)
     ]
+    far += [
+        f"{name.replace('_', ' ')} {joint}"
+        for index, name in enumerate(GAINS)
+        for joint, value in still[name].items()
+        if gains[joint][index] != value
+    ]
+    signals = (process.inputs, process.outputs)
+    far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
     if far:
         raise NotCommissionedError(
             f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
@@ -192,7 +253,8 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
 
     memory_map = bench.memory_map()
     sensors: list[Potentiometer] = []
-    with open_page(bench.call.port, memory_map) as page:
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
         if not bench.operator.begin(Task("press_emergency_stop")):
             raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
         for joint in bench.joints:
@@ -208,6 +270,7 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
             with replacing(bench.folder / MACHINE) as part:
                 part.write_text(measured_machine_text(sensors), "utf-8")
         _give_power_back(bench, page, memory_map)
+        stop.tell(False)
     bench.configure()
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
@@ -215,16 +278,58 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
 def _give_power_back(bench: Bench, page: LinkPage, memory_map: MemoryMap) -> None:
     """Makes the posture the set points by switching off and on, and has the emergency stop released. Raises SafetyError
     where the arm would jump."""
-    bench.operator.begin(Task("switch_off_and_on"))
-    page.wait(1.0)
-    page.reconnect()
-    errors = _typical(page, memory_map, "error", 5)
-    far = [joint for joint, error in errors.items() if abs(error) > SAME_READING]
-    if far:
-        raise SafetyError(
-            f"joints {far} are away from their set points and would jump: keep the emergency stop pressed"
-        )
-    bench.operator.begin(Task("release_emergency_stop"))
+    from daq.commissioning.memory.procedure import release, switched_off_and_on
+
+    if not switched_off_and_on(page, bench.operator):
+        raise SafetyError("the controller was not switched off and on: its set points are not where the arm is")
+    if why := release(page, bench.operator, lambda: _against_power(page, memory_map)):
+        raise SafetyError(why)
+
+
+def _against_power(page: LinkPage, memory_map: MemoryMap) -> str:
+    """Why the drives may not have power; empty if the memory is alive, error + position is each joint's set point by
+    this map, and every error is small."""
+    from daq.commissioning.memory.procedure import SAFE_ERROR, is_alive
+    from firmware_protocol.units import posture_to_counts
+
+    if not is_alive(page.read().data):
+        return "the memory is not alive"
+    told = {name: _typical(page, memory_map, name, 5) for name in ("set_point", "position", "error")}
+    for joint, error in told["error"].items():
+        if abs(error) > SAFE_ERROR:
+            return f"joint {joint} is {error:.0f} counts from its set point and would jump"
+        set_point = posture_to_counts(min(max(round(told["set_point"][joint]), 0), POSTURE_UNITS - 1))
+        if abs(told["position"][joint] + error - set_point) > SAFE_ERROR:
+            return f"joint {joint}: error + position is not its set point, so the memory map is wrong"
+    return ""
+
+
+def release_if_pressed(bench: Bench) -> None:
+    """The safe release of an emergency stop that was pressed when the last call ended. Without a memory map no error
+    can be read: then it is released while the controller is off."""
+    from daq.commissioning.memory.procedure import switched_off_and_on
+    from daq_cli.robot.memory_page import open_page
+
+    if not bench.record.stop_pressed:
+        return
+    bench.operator.show("The emergency stop was pressed and not released safely. Keep it pressed; this comes first.")
+    memory_map = bench.memory_map()
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.pressed = True
+        if not (bench.folder / MAP).exists():
+            if not switched_off_and_on(page, bench.operator, "start_as_usual"):
+                raise SafetyError("the controller was not switched off and on: keep the emergency stop pressed")
+        else:
+            if not bench.operator.begin(Task("press_emergency_stop")):
+                raise SafetyError("the emergency stop must be pressed before the controller is switched off and on")
+            _give_power_back(bench, page, memory_map)
+        stop.tell(False)
+
+
+def _emergency_stop(bench: Bench) -> EmergencyStop:
+    from daq_cli.robot.pressed import EmergencyStop
+
+    return EmergencyStop(bench.operator, bench.record.note_stop)
 
 
 def emergency_stop(bench: Bench) -> dict[str, Any]:
@@ -232,10 +337,12 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
     from daq_cli.robot.memory_page import open_page
 
     memory_map, joint = bench.memory_map(), bench.joints[0]
-    with open_page(bench.call.port, memory_map) as page:
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
         if not bench.operator.begin(Task("press_emergency_stop")):
             raise SafetyError("the emergency stop was not pressed, so nothing is known about it")
-        bench.operator.begin(Task("push", joint=joint))
+        if not bench.operator.begin(Task("push", joint=joint)):
+            raise SafetyError("no joint was pushed, so nothing is known about the emergency stop")
         while not bench.operator.finished():
             page.read()
         page.wait(0.5)
@@ -248,6 +355,7 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
                 f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
             )
         _give_power_back(bench, page, memory_map)
+        stop.tell(False)
     return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
 
 
@@ -319,6 +427,8 @@ def model(bench: Bench) -> dict[str, Any]:
     from model.comparison.compare import compare
     from model.machine_model.model import base_model
 
+    if "trace" not in bench.record.steps.get("ramp", {}):
+        raise SpecError("the step ramp has left no trace: do it first (--only ramp)")
     trace = read_trace(Path(bench.record.steps["ramp"]["trace"]))
     machine = bench.configured.settings.machine()
     compared = compare([("machine file", base_model(machine))], [trace])
@@ -347,8 +457,9 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
 
 SEE = "It only reads; nothing moves."
 KEY = "Ctrl-C, `daq stop` in another terminal, or the emergency stop"
+BEFORE_MOVING = ("bridge", "potentiometers", "emergency_stop", "stop")
 STEPS = (
-    Step("line", "Port and line", "Reads one byte 200 times.", SEE, "Ctrl-C", line),
+    Step("line", "Port and line", "Reads one byte 200 times.", SEE, "Ctrl-C", line, at_the_arm=False),
     Step(
         "memory",
         "Memory map",
@@ -364,6 +475,8 @@ STEPS = (
         SEE,
         "Ctrl-C",
         bridge,
+        ("memory",),
+        at_the_arm=False,
     ),
     Step(
         "potentiometers",
@@ -372,6 +485,7 @@ STEPS = (
         "The arm, which may sink while the emergency stop is pressed.",
         "the emergency stop stays pressed throughout",
         potentiometers,
+        ("memory",),
     ),
     Step(
         "emergency_stop",
@@ -380,6 +494,7 @@ STEPS = (
         "The arm, which may sink while the emergency stop is pressed.",
         "the emergency stop stays pressed",
         emergency_stop,
+        ("memory",),
     ),
     Step(
         "stop",
@@ -388,8 +503,11 @@ STEPS = (
         "The arm stays where it is.",
         KEY,
         stop,
+        ("bridge",),
     ),
-    Step("period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period),
+    Step(
+        "period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period, ("bridge",), at_the_arm=False
+    ),
     Step(
         "gain",
         "Gain of each joint",
@@ -397,10 +515,36 @@ STEPS = (
         "The arm.",
         KEY,
         gain,
+        BEFORE_MOVING,
     ),
-    Step("first_ramp", "First ramp, joint 1", "Moves joint 1 by 21.6 degrees in 0.65 s.", "The arm.", KEY, first_ramp),
-    Step("ramp", "Ramp, joints 1 to 3", "Moves joints 1 to 3 by 21.6 degrees in 0.65 s.", "The arm.", KEY, ramp),
-    Step("model", "The model", "Compares the ramp with the machine file.", "It only computes.", "Ctrl-C", model),
+    Step(
+        "first_ramp",
+        "First ramp, joint 1",
+        "Moves joint 1 by 21.6 degrees in 0.65 s.",
+        "The arm.",
+        KEY,
+        first_ramp,
+        BEFORE_MOVING,
+    ),
+    Step(
+        "ramp",
+        "Ramp, joints 1 to 3",
+        "Moves joints 1 to 3 by 21.6 degrees in 0.65 s.",
+        "The arm.",
+        KEY,
+        ramp,
+        (*BEFORE_MOVING, "first_ramp"),
+    ),
+    Step(
+        "model",
+        "The model",
+        "Compares the ramp with the machine file.",
+        "It only computes.",
+        "Ctrl-C",
+        model,
+        ("ramp",),
+        at_the_arm=False,
+    ),
 )
 """All steps, in order."""
 
@@ -448,7 +592,7 @@ def _positions(page: LinkPage, memory_map: MemoryMap, count: int = 5) -> dict[in
 
 
 def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
-    """A register of each joint: the mean of its readings without the smallest and the largest, which may be torn."""
+    """A register of each joint: the median of its readings, of which some may be torn."""
     register = memory_map[name]
     values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
     for _ in range(count):
@@ -456,7 +600,38 @@ def _typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> di
         for joint, of_joint in values.items():
             high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
             of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
-    return {joint: float(np.mean(np.sort(one)[1:-1])) for joint, one in values.items()}
+    return {joint: float(np.median(one)) for joint, one in values.items()}
+
+
+def lacking(step: Step, record: Record) -> list[str]:
+    """The steps that have to be done before this one. Some may be left out with --skip."""
+    return [
+        name
+        for name in step.needs
+        if name not in record.steps or (name in NOT_TO_BE_SKIPPED and record.steps[name].get("skipped"))
+    ]
+
+
+def resting_on(names: Collection[str]) -> set[str]:
+    """The steps whose results rest on these steps, directly or not."""
+    found: set[str] = set()
+    for step in STEPS:  # in order, so that one pass is enough
+        if {*names, *found} & set(step.needs):
+            found.add(step.name)
+    return found
+
+
+def stale(bench: Bench) -> set[str]:
+    """The steps whose results were found at another port, or with another memory map or machine file, and those that
+    rest on them."""
+    now = bench.basis()
+    changed = {
+        name
+        for name, of in RESTS_ON.items()
+        if name in bench.record.steps and not bench.record.steps[name].get("skipped")
+        if any(bench.record.steps[name].get("basis", {}).get(what) != now[what] for what in of)
+    }
+    return changed | {name for name in resting_on(changed) if not bench.record.steps.get(name, {}).get("skipped")}
 
 
 def step_named(name: str) -> Step:

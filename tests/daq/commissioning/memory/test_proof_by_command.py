@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import pytest
+
 from daq.commissioning.memory.commands import prove_by_command
 from daq.commissioning.memory.joint import JointEvidence, SetPointBytes
 from daq.commissioning.memory.procedure import may_have_power
@@ -51,8 +53,8 @@ class Arm:
             assert address == BASE + 4
             self.posture = self.posture & 0x300 | value
 
-    def reconnect(self) -> None:
-        """Nothing to do."""
+    def reconnect(self) -> bool:
+        return False
 
     def wait(self, seconds: float) -> None:
         self.time += seconds
@@ -89,6 +91,33 @@ def test_a_byte_that_does_not_keep_what_is_written_is_no_set_point() -> None:
     assert not proof.proved
     assert "stands there" in proof.problem
     assert len(arm.writes) <= 3
+
+
+@pytest.mark.parametrize("changed", [0x2F4, 0x177])
+def test_the_old_low_byte_is_not_written_under_another_high_byte_nor_over_a_byte_of_another(changed: int) -> None:
+    @dataclass
+    class Changing(Arm):
+        def wait(self, seconds: float) -> None:
+            super().wait(seconds)
+            self.posture = changed
+
+    arm = Changing(500)
+    proof = prove_by_command(arm, [evidence()], 1)
+    assert "press the emergency stop" in proof.problem
+    assert not proof.proved
+    assert arm.writes == [(BASE + 4, 0xF4)]
+
+
+def test_a_large_error_after_a_write_ends_the_proof() -> None:
+    @dataclass
+    class Stuck(Arm):
+        def bytes(self) -> bytes:
+            self.sign = 0
+            self.start = posture_to_counts(500) - 30
+            return super().bytes()
+
+    proof = prove_by_command(Stuck(500), [evidence()], 1)
+    assert "the error of joint 1 is 30" in proof.problem
 
 
 def test_nothing_is_written_where_the_place_of_the_set_point_is_not_proved() -> None:
