@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from daq.config.robot_files import load_memory_map
 from daq.contracts.experiment import ExperimentSpec, Gain
 from daq.contracts.machine import Machine, load_machine
+from daq.contracts.progress import Progress, silent
 from daq.driver import Controller
 from daq.driver.stop import StopConfirmation
 from daq.transport import MockPort, parse_port_url
@@ -54,9 +54,24 @@ class Arm:
             tick=status.tick,
         )
 
-    def run(self, experiment: ExperimentSpec | str = "ramp", **options: Any) -> Run:
-        """Runs an experiment on this arm: `ma2000.run` with this port and machine."""
-        return run(experiment, self.port, machine=self.machine, memory_map=self.memory_map, **options)
+    def run(
+        self,
+        experiment: ExperimentSpec | str = "ramp",
+        *,
+        folder: Path | str = "traces",
+        moves_real_arm: bool = False,
+        progress: Progress = silent,
+    ) -> Run:
+        """Runs an experiment on this arm: `ma2000.run` with this port, machine and memory map."""
+        return run(
+            experiment,
+            self.port,
+            folder=folder,
+            machine=self.machine,
+            memory_map=self.memory_map,
+            moves_real_arm=moves_real_arm,
+            progress=progress,
+        )
 
     def stop(self) -> StopConfirmation:
         """Freezes the arm at its measured posture. Raises LinkError if the port cannot be opened."""

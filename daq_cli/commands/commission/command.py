@@ -13,20 +13,11 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import parse_joints
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
+from daq_cli.commands.commission.bench import MAP, Bench, Commissioner
+from daq_cli.commands.commission.by_hand import release_if_pressed
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import write_sheet
-from daq_cli.commands.commission.steps import (
-    MAP,
-    STEPS,
-    Bench,
-    Commissioner,
-    Step,
-    lacking,
-    release_if_pressed,
-    resting_on,
-    stale,
-    step_named,
-)
+from daq_cli.commands.commission.steps import STEPS, Step, lacking, resting_on, stale, step_named
 
 app = typer.Typer(add_completion=False)
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import SpecError
+from daq_cli.commands.commission.bench import FINDINGS
 from daq_cli.commands.commission.record import FILE, Record
-from daq_cli.commands.commission.steps import FINDINGS, STEPS
+from daq_cli.commands.commission.steps import STEPS
 
 if TYPE_CHECKING:
     from model.reports.page import Block, Report

@@ -1,0 +1,107 @@
+"""What the steps of a commissioning share: the folder, the port, the person, and how registers are read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from daq.commissioning.memory.procedure import Operator
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError
+from daq_cli.app.consent import ConsentPrompt
+from daq_cli.app.context import Invocation
+from daq_cli.commands.commission.record import Record
+
+if TYPE_CHECKING:
+    from daq.driver import Controller
+    from daq_cli.robot.memory_page import LinkPage
+    from firmware_protocol.memory_map import MemoryMap
+
+CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings.json", "machine.toml"
+
+
+class NotCommissionedError(DaqError):
+    """A step whose result does not permit the next one."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+class Commissioner(Operator, Protocol):
+    """The person at the arm, who also reads a protractor."""
+
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
+
+    def read_angle(self, joint: int, number: int) -> float | None:
+        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more."""
+
+
+@dataclass
+class Bench:
+    """What the steps share: the folder of the arm, the port, the person, and what has been found."""
+
+    call: Invocation
+    folder: Path
+    operator: Commissioner
+    consent: ConsentPrompt
+    record: Record
+    joints: tuple[int, ...] = (1, 2, 3)
+    postures: int = 6
+
+    @property
+    def configured(self) -> Invocation:
+        """An invocation that uses the files which the steps have written."""
+        return Invocation(config_file=self.folder / CONFIG, port_option=self.call.port)
+
+    def memory_map(self) -> MemoryMap:
+        """The memory map that was found, or the configured one."""
+        from daq.config.robot_files import load_memory_map
+
+        path = self.folder / MAP
+        return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
+
+    def basis(self) -> dict[str, str]:
+        """What a result rests on: the port, and the memory map and machine file that there are."""
+        files = {"memory_map": self.folder / MAP, "machine": self.folder / MACHINE}
+        return {"port": self.call.port} | {
+            name: sha256(path.read_bytes()).hexdigest()[:16] if path.exists() else "none"
+            for name, path in files.items()
+        }
+
+    def configure(self) -> None:
+        """Writes daq.toml with the files that there are."""
+        from daq.config.toml_text import settings_text
+        from daq_cli.app.output_file import replacing
+
+        settings = self.call.settings
+        changes: dict[str, Any] = {"port": self.call.port}
+        if (self.folder / MAP).exists():
+            changes["memory_map"] = (self.folder / MAP).absolute()
+        if (self.folder / MACHINE).exists():
+            changes["machine"] = str((self.folder / MACHINE).absolute())
+        robot = settings.robot.model_copy(update=changes)
+        traces = settings.traces.model_copy(update={"folder": (self.folder / "traces").absolute()})
+        with replacing(self.folder / CONFIG) as part:
+            part.write_text(settings_text(settings.model_copy(update={"robot": robot, "traces": traces})), "utf-8")
+
+
+def connected(bench: Bench) -> Controller:
+    from daq.driver import Controller
+
+    return Controller.connect(bench.call.port, bench.memory_map())
+
+
+def typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
+    """A register of each joint: the median of its readings, of which some may be torn."""
+    register = memory_map[name]
+    values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
+    for _ in range(count):
+        data = page.read().data
+        for joint, of_joint in values.items():
+            high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
+            of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
+    return {joint: float(np.median(one)) for joint, one in values.items()}

@@ -1,0 +1,135 @@
+"""Steps that find out what line, memory and bridge are like; only the memory's search asks for a hand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from daq_cli.app.context import console
+from daq_cli.commands.commission.bench import FINDINGS, MAP, Bench, NotCommissionedError, connected, typical
+
+if TYPE_CHECKING:
+    from daq.commissioning.memory.commands import CommandProof
+    from daq.commissioning.memory.findings import Findings
+
+ROUND_TRIPS = 200
+"""Number of single bytes read to judge the line."""
+SAME_READING = 12
+"""Largest difference (ADC counts) between a position by the bridge's memory map and by the one that was found."""
+GAINS, SIGNALS = ("gain_p", "gain_i", "gain_d"), ("process_inputs", "process_outputs")
+
+
+def line(bench: Bench) -> dict[str, Any]:
+    """Round trips, repeats and damage of the line, and what the bridge says about itself."""
+    from firmware_protocol.commands import Capability
+
+    with _page(bench) as page:
+        times = []
+        for _ in range(ROUND_TRIPS):
+            begun = time.perf_counter()
+            page.read_byte(page.base)
+            times.append(1e3 * (time.perf_counter() - begun))
+        counters = page.link.counters.numbers()
+        hello = page.hello
+    bench.configure()
+    capabilities = [flag.name.lower() for flag in Capability(hello.capabilities) if flag.name]
+    return {
+        "port": bench.call.port,
+        "protocol": hello.version,
+        "capabilities": capabilities,
+        "period_stated_ms": hello.period_us / 1e3,
+        "round_trip_median_ms": round(float(np.median(times)), 3),
+        "round_trip_worst_ms": round(max(times), 3),
+        "repeated": int(counters.get("retries", 0)),
+        "damaged": int(counters.get("damaged", 0)),
+    }
+
+
+def memory(bench: Bench) -> dict[str, Any]:
+    """The memory map, by `daq memory find`."""
+    from daq_cli.commands.memory import findings_text, keep_map, search
+
+    def when_found(found: Findings) -> None:
+        if keep_map(found, bench.folder / MAP):
+            bench.configure()
+            bench.record.keep("memory", _memory_result(found, []))
+
+    with _page(bench) as page:
+        found, proofs = search(
+            bench.call,
+            page,
+            bench.operator,
+            bench.consent,
+            bench.folder / FINDINGS,
+            inputs=True,
+            commands=True,
+            when_found=when_found,
+            pressed=bench.record.note_stop,
+        )
+    bench.operator.show(findings_text(found, proofs))
+    bench.configure()
+    if found.memory_map("") is None:
+        names = ", ".join(sorted({one.register for one in found.missing()}))
+        raise NotCommissionedError(
+            f"no memory map, for these have no place: {names}; {FINDINGS} has what was found. Complete a map by "
+            f"hand as {MAP} (`daq config copy memory-map` gives one to start from), then go on with --skip memory"
+        )
+    return _memory_result(found, proofs)
+
+
+def _memory_result(found: Findings, proofs: Sequence[CommandProof]) -> dict[str, Any]:
+    verdicts = [one.verdict for one in found.all]
+    set_points = [found.of("set_point", joint).is_found for joint in range(1, 7)]
+    return {
+        "map": MAP,
+        "findings": FINDINGS,
+        "found": sum(one.is_found for one in found.all),
+        "assumed": verdicts.count("assumed"),
+        "contradicts_the_documented": verdicts.count("contradicts"),
+        "set_points_at_power_up": "the measured posture" if all(set_points) else "not seen",
+        "proved_by_command": [proof.joint for proof in proofs if proof.proved and not proof.problem],
+        "drive_signs": [proof.sign for proof in proofs],
+    }
+
+
+def bridge(bench: Bench) -> dict[str, Any]:
+    """Whether the bridge works by the memory map that was found."""
+    from daq_cli.robot.memory_page import open_page
+
+    memory_map = bench.memory_map()
+    with open_page(bench.call.port, memory_map) as page:
+        own = {name: typical(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
+        still = {name: typical(page, memory_map, name, 5) for name in (*GAINS, *SIGNALS)}
+    with connected(bench) as controller:
+        told = controller.errors_positions_powers()
+        gains, process = controller.gains(), controller.process()
+    far = [
+        f"{name.replace('_', ' ')} {joint}"
+        for name, values in own.items()
+        for joint, value in values.items()
+        if abs(getattr(told[joint], name) - value) > (SAME_READING if name != "set_point" else 0)
+    ]
+    far += [
+        f"{name.replace('_', ' ')} {joint}"
+        for index, name in enumerate(GAINS)
+        for joint, value in still[name].items()
+        if gains[joint][index] != value
+    ]
+    signals = (process.inputs, process.outputs)
+    far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
+    if far:
+        raise NotCommissionedError(
+            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
+            "Give it this one (a mock: --memory-map; a board: docs/hardware.md), then run `daq commission` again"
+        )
+    return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
+
+
+def _page(bench: Bench) -> Any:
+    from daq_cli.robot.memory_page import open_page
+
+    console().print(f"    {bench.call.port}")
+    return open_page(bench.call.port, bench.memory_map())
