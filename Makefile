@@ -124,5 +124,5 @@ COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 
 requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
 	@$(COMPILE) --group installer --output-file requirements-installer.txt
 	@$(COMPILE) pyproject.toml --group build --output-file requirements.txt
-	@$(COMPILE) pyproject.toml --group build --group dev --constraint requirements.txt --output-file requirements-dev.txt
+	@$(COMPILE) pyproject.toml --all-extras --group build --group dev --constraint requirements.txt --output-file requirements-dev.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)
