@@ -18,8 +18,9 @@ from daq.contracts.machine import Machine
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-TRACE_FORMAT = 1
-"""Version of the trace's metadata; a reader refuses newer ones."""
+TRACE_FORMAT = 2
+"""Version of the trace's metadata and topics; a reader refuses newer ones. Format 1 had events and joint states in
+JSON."""
 
 Outcome = Literal["complete", "stopped", "fault", "interrupted"]
 EventKind = Literal[
