@@ -175,7 +175,7 @@ def event_of(message: bytes) -> TraceEvent:
     reader = CdrReader(message)
     reader.number("i")
     reader.number("I")  # the stamp, which follows from the time
-    found = {"time": reader.number("d"), "kind": reader.text(), "message": reader.text()}
+    found: dict[str, object] = {"time": reader.number("d"), "kind": reader.text(), "message": reader.text()}
     found |= {"tick": reader.optional("q"), "joint": reader.optional("i")}
     reader.end()
     return TraceEvent.model_validate(found)
