@@ -166,16 +166,18 @@ def export(
     context: typer.Context,
     trace: TraceArgument = "last",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The .csv file to write; a .toml file is put beside it.")
+        Path | None, typer.Option("--output", "-o", help="A .csv file (a .toml is put beside it), .parquet or .nc.")
     ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a trace as plain CSV, with a TOML file for the data that have no column."""
+    """Write a trace as plain CSV, with a TOML file for the data that have no column, or as Parquet or netCDF."""
+    from daq.traces.tables import NETCDF, PARQUET, export_table
     from daq_cli.app.csv_output import write_csv
 
     path, found = _read(context, trace, folder)
-    _print_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
+    write = export_table if output is not None and output.suffix in (PARQUET, NETCDF) else write_csv
+    _print_file(path, write(found, output or path.with_suffix(".csv")), as_json=json)
 
 
 def _print_file(made_from: Path, file: Path, *, as_json: bool) -> None:
