@@ -38,11 +38,15 @@ if TYPE_CHECKING:
     from ma2000.running import run as run
     from ma2000.studies import design as design
     from ma2000.studies import diagnose as diagnose
+    from ma2000.studies import feedforward as feedforward
+    from ma2000.studies import followed as followed
+    from ma2000.studies import learn as learn
     from ma2000.studies import validate as validate
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
+    from model.feedforward.tracking import Followed as Followed
     from model.fitting.fit import fit as fit
     from model.fitting.options import FitOptions as FitOptions
     from model.fitting.result import FitResult as FitResult
@@ -64,6 +68,7 @@ _HOME = {
     "Diagnosis": "model.discrepancy.diagnosis",
     "DiagnosisOptions": "model.discrepancy.options",
     "ExperimentSpec": "daq.contracts.experiment",
+    "Followed": "model.feedforward.tracking",
     "Fidelity": "model.validation.criterion",
     "FitOptions": "model.fitting.options",
     "FitResult": "model.fitting.result",
@@ -77,7 +82,10 @@ _HOME = {
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
+    "feedforward": "ma2000.studies",
     "fit": "model.fitting.fit",
+    "followed": "ma2000.studies",
+    "learn": "ma2000.studies",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
     "plot": "ma2000.pictures",
