@@ -119,8 +119,7 @@ def learn(
     spec = trace.record.spec
     if spec is None or own is None:
         raise TraceError(f"trace {trace.record.trace_id}: does not say which experiment it is of")
-    asked = spec if spec.feedforward is None else spec.feedforward.asked
-    return learning.learn(trace, asked, own, lambda one: planned(one, own), model, share)
+    return learning.learn(trace, spec.plain, own, lambda one: planned(one, own), model, share)
 
 
 def followed(trace: Trace) -> Followed | None:

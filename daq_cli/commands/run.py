@@ -178,6 +178,8 @@ def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operat
 
 def _carry_out(context: typer.Context, spec: ExperimentSpec, options: RunOptions, computation: Computation) -> None:
     robot = robot_of(context)
+    if computation.learn_from is None and computation.share != 1.0:
+        raise SpecError("--learn-share: is for --learn-from; leave it out")
     if computation.wanted:
         from daq_cli.models.feedforward import with_computed_set_points
 

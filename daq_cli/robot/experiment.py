@@ -92,7 +92,9 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
     shown = motion.preview()
     violations = check_plan(motion, machine, machine.limits)
     if as_json:
-        print_json({"preview": shown.as_data(), "violations": [str(v) for v in violations]})
+        found = {"preview": shown.as_data(), "violations": [str(v) for v in violations]}
+        computed = {} if spec.feedforward is None else {"experiment": spec.model_dump(mode="json")}
+        print_json(found | computed)
     else:
         every = f"every {shown.period * 1e3:g} ms"
         print(f"{spec.trajectory.kind}: {shown.duration:.2f} s, {shown.set_points} set points {every}")

@@ -50,7 +50,7 @@ def feedforward(
     arm = arm_in_loop(model, motion.wanted[0], len(motion), gains)
     found = inverted(arm, motion, progress)
     expected, before = (errors_of(motion.joints, motion.miss(_shown(arm, one))) for one in (found, motion.wanted))
-    source = Feedforward(asked=asked, model=model.identity, expected=expected, before=before)
+    source = Feedforward(asked=asked.as_asked, model=model.identity, expected=expected, before=before)
     return computed_experiment(motion, found, gains, source)
 
 

@@ -76,7 +76,7 @@ def learn(
         found[:, column] = rounded_set_points(best, response, allowed, motion.effective[column])
         predicted[:, column] += response.applied(found[:, column] - sent[:, column])
     source = Feedforward(
-        asked=asked,
+        asked=asked.as_asked,
         model=None if model is None else model.identity,
         learned_from=trace.record.trace_id,
         expected=errors_of(motion.joints, motion.miss(predicted)),
@@ -106,8 +106,7 @@ def require_attempt(trace: Trace, asked: ExperimentSpec, machine: Machine) -> No
     record, called = trace.record, _called(trace)
     if record.spec is None or record.machine is None:
         raise TraceError(f"{called}: does not say which experiment it is of: learn from one that `daq run` recorded")
-    own = record.spec if record.spec.feedforward is None else record.spec.feedforward.asked
-    if different := _difference(own, asked):
+    if different := _difference(record.spec.plain, asked):
         raise TraceError(f"{called}: is of another motion: its {different} differs; learn from one of the same motion")
     if record.machine.name != machine.name or record.machine.controller != machine.controller:
         raise TraceError(f"{called}: is of {record.machine.name}, or of another controller than that of {machine.name}")

@@ -47,8 +47,7 @@ def followed(trace: Trace, plan: Planner) -> Followed | None:
     spec = trace.record.spec
     if spec is None or trace.record.machine is None or len(trace) == 0:
         return None
-    asked = spec if spec.feedforward is None else spec.feedforward.asked
-    motion = plan(asked)
+    motion = plan(spec.plain)
     rows = periods_of(trace)
     inside = rows < len(motion)
     rows = rows[inside]
