@@ -10,6 +10,7 @@ carries a hidden load, and one joint has a hidden friction, of a kind and size t
 mock's, which shares no code with the model. Each of three motions, on all joints at once, is run
 
 - with plain set points;
+- with set points computed from the machine file, nothing fitted;
 - with set points computed from the model that `daq fit` makes of two other records of the arm;
 - the same after `daq diagnose` has looked for the missing effect in these records;
 - with set points learned from the trace before, several times, without any model: from plain ones;
@@ -33,6 +34,7 @@ import numpy as np
 
 from benchmarks.figures import Figure, at_most, show
 from benchmarks.mock_arm import hidden_parameters, plant_text, recorded
+from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Feedforward, parse_spec
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Floats, Trace
@@ -47,14 +49,15 @@ from model.machine_model.model import Model, base_model
 
 MACHINE = load_machine("ma2000")
 FRICTION: dict[str, tuple[tuple[float, float], ...]] = {
-    "coulomb_friction": ((1.0, 5.0), (2.0, 9.0), (0.4, 1.8)),
-    "viscous_friction": ((20.0, 60.0), (30.0, 80.0), (8.0, 30.0)),
-    "stribeck_friction": ((1.5, 5.0), (2.5, 10.0), (0.6, 2.5)),
-    "direction_dependent_friction": ((1.0, 3.0), (3.0, 12.0), (0.6, 3.0)),
+    "coulomb_friction": ((2.0, 5.0), (4.0, 9.0), (0.8, 1.8)),
+    "viscous_friction": ((35.0, 60.0), (50.0, 80.0), (15.0, 30.0)),
+    "stribeck_friction": ((2.0, 5.0), (4.0, 10.0), (1.0, 2.5)),
+    "direction_dependent_friction": ((1.2, 3.0), (5.0, 12.0), (1.2, 3.0)),
+    "stiction": ((5.0, 12.0), (7.0, 16.0), (2.5, 6.0)),
 }
-"""Hidden frictions, and for joints 1 to 3 the sizes between which one is drawn (N·m, or N·m·s/rad): the upper part of
-what a secret arm may have, where it shows in the motion."""
-SIZES = {"viscous_friction": "coefficient"}
+"""Hidden frictions, and for joints 1 to 3 the sizes between which one is drawn (N·m, or N·m·s/rad): the upper half of
+what a secret arm of the mock may have."""
+SIZES = {"viscous_friction": "coefficient", "stiction": "breakaway"}
 """Name of the size, where it is not `torque`."""
 PAYLOAD = (0.25, 0.8)
 """Hidden load, kg, beside the stated 1.25 kg."""
@@ -96,7 +99,7 @@ def hidden_effects(seed: int) -> tuple[str, ...]:
     size = low * (high / low) ** rng.random()
     sign = -1 if kind == "direction_dependent_friction" and rng.random() < 0.5 else 1
     mass = rng.uniform(*PAYLOAD)
-    extra = ",speed=0.2" if kind == "stribeck_friction" else ""
+    extra = {"stribeck_friction": ",speed=0.2", "stiction": ",speed=0.02"}.get(kind, "")
     friction = f"{kind}:joint={joint},{SIZES.get(kind, 'torque')}={sign * size:.3f}{extra}"
     return friction, f"payload:mass={mass:.3f}"
 
@@ -113,7 +116,7 @@ def study(seed: int) -> dict[str, Any]:
     fitted = fit(base_model(MACHINE), records).model
     answer = diagnose(base_model(MACHINE), records[:1], records[1:])
     runs: dict[str, dict[str, Any]] = {}
-    models = {"fitted": fitted, "diagnosed": answer.model_after}
+    models = {"nominal": base_model(MACHINE), "fitted": fitted, "diagnosed": answer.model_after}
     for name, spec in MOTIONS.items():
         plain = run([spec])[0]
         computed = {label: _computed(model, spec) for label, model in models.items()}
@@ -122,7 +125,7 @@ def study(seed: int) -> dict[str, Any]:
         traces["diagnosed, learned once"] = run([corrected])[0]
         last = plain
         for attempt in range(1, LEARNED + 1):
-            last = traces[f"learned {attempt}"] = run([learn(last, spec, MACHINE, _plan)])[0]
+            last = traces[f"learned {attempt}"] = run([_learned(last, spec)])[0]
         runs[name] = {label: _judged(trace) for label, trace in traces.items()}
     named = [f"{step.effect} on {list(step.joints)}" for step in answer.steps if step.adopted]
     return {"seed": seed, "hidden": effects, "verdict": answer.verdict, "named": named, "runs": runs}
@@ -134,6 +137,16 @@ def _plan(spec: ExperimentSpec) -> Floats:
 
 def _computed(model: Model, spec: ExperimentSpec) -> ExperimentSpec:
     return feedforward(model, spec, MACHINE, _plan)
+
+
+def _learned(trace: Trace, asked: ExperimentSpec) -> ExperimentSpec:
+    """The next attempt; where learning is said to diverge, the set points of this one once more."""
+    try:
+        return learn(trace, asked, MACHINE, _plan)
+    except TraceError as error:
+        print(f"  {error}", file=sys.stderr)
+        assert trace.record.spec is not None
+        return trace.record.spec
 
 
 def _judged(trace: Trace) -> dict[str, Any]:

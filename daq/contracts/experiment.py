@@ -198,12 +198,7 @@ Trajectory = Annotated[
 
 
 class PlainExperiment(FrozenRecord):
-    """One experiment whose trajectory is the motion that is wanted.
-
-    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
-    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
-    record; None means every joint that the line has room for.
-    """
+    """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
 
     trajectory: Trajectory = Ramp()
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)] = (1, 2, 3)
@@ -265,7 +260,10 @@ class Feedforward(FrozenRecord):
 class ExperimentSpec(PlainExperiment):
     """One experiment. The same model serves the command line, the service and the trace's metadata.
 
-    Its fields are those of PlainExperiment. `feedforward` says for which motion a path's set points were computed.
+    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
+    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
+    record; None means every joint that the line has room for. `feedforward` says for which motion a path's set points
+    were computed.
     """
 
     feedforward: Annotated[Feedforward | None, Field(exclude_if=lambda one: one is None)] = None

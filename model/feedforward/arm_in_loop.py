@@ -112,7 +112,7 @@ def arm_in_loop(model: Model, begin: Floats, count: int, gains: Mapping[int, Gai
     inputs = RunInputs(
         joints=joints,
         period=period,
-        time=period * np.arange(whole),
+        time=period * np.arange(float(whole)),
         set_points=angles,
         drive=np.zeros_like(angles),
         readings=angles,

@@ -11,7 +11,7 @@ from model.arrays import Floats
 from model.feedforward.posture_units import Allowed
 from model.feedforward.response import Response
 
-ROUGHNESS = 1e-3
+ROUGHNESS = 0.01
 """Weight of the squared second difference of a correction beside the squared error: keeps set points smooth at
 frequencies that hardly reach the arm, where a model is least certain."""
 RELAXATION = 1.6

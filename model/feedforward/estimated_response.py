@@ -6,6 +6,7 @@ delay. Three numbers are determined by almost any motion, where a free response 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +36,7 @@ class SecondOrderLoop:
 
     def response(self, count: int, period: float) -> Response:
         """The same response in each of `count` periods."""
-        pulse = _pulse_response(self.frequency, self.damping, self.delay, min(REACH, count), period)
+        pulse = _pulse_response((self.frequency, self.damping, self.delay), min(REACH, count), period)
         return response_of(np.tile(pulse, (count, 1)))
 
 
@@ -48,7 +49,7 @@ def estimated_loop(set_points: Floats, readings: Floats, period: float) -> Secon
     count = len(moved)
 
     def left(values: Floats) -> Floats:
-        pulse = _pulse_response(*values, count, period)
+        pulse = _pulse_response(values, count, period)
         difference = fftconvolve(moved, pulse)[:count] - readings
         return np.asarray(difference - difference.mean())
 
@@ -56,11 +57,13 @@ def estimated_loop(set_points: Floats, readings: Floats, period: float) -> Secon
     found = min((least_squares(left, start, bounds=(low, high)) for start in STARTS), key=lambda one: one.cost)
     spread = float(np.square(readings - readings.mean()).sum())
     explained = 1.0 - 2.0 * found.cost / spread if spread else 0.0
-    return SecondOrderLoop(*map(float, found.x), explained)
+    frequency, damping, delay = found.x.tolist()
+    return SecondOrderLoop(frequency, damping, delay, explained)
 
 
-def _pulse_response(frequency: float, damping: float, delay: float, count: int, period: float) -> Floats:
+def _pulse_response(loop: Sequence[float] | Floats, count: int, period: float) -> Floats:
     """(count,) readings after a set point that is one for one period and else zero, at the beginnings of periods."""
+    frequency, damping, delay = loop
     edges = period * (np.arange(count + 1) - 1.0 - delay)
     return np.diff(_step_response(frequency, damping, np.maximum(edges, 0.0)))
 

@@ -36,7 +36,8 @@ MOST_MISSING = 0.02
 WORSE = 1.1
 """Ratio to the error of the attempt before from which learning counts as diverging; less is noise."""
 FINEST = 0.3
-"""Error, in posture units, below which it is that of their rounding, and its growth is no divergence."""
+"""Error (rms), in posture units, below which it is that of their rounding: nothing is left to be learned. An error of
+up to twice that may grow by chance, which is no divergence."""
 
 
 def learn(
@@ -69,7 +70,9 @@ def learn(
     _require_converging(trace, before, motion)
     responses = _responses(motion, inputs, sent, reached, trace, model)
     found, predicted = sent.copy(), reached.copy()
-    for column in motion.columns:
+    for column, joint in zip(motion.columns, motion.joints, strict=True):
+        if before[joint].rms <= FINEST * abs(motion.scale.unit[column]):
+            continue
         response, allowed, wanted = responses[column], motion.allowed[column], motion.wanted[:, column]
         task = Task(wanted, wanted, sent[:, column], reached[:, column], CAUTION)
         best = sent[:, column] + share * (best_set_points(task, response, allowed) - sent[:, column])
@@ -92,7 +95,7 @@ def _require_converging(trace: Trace, reached: Mapping[int, TrackingError], moti
         return
     for column, joint in zip(motion.columns, motion.joints, strict=True):
         before, now = spec.feedforward.before.get(joint), reached[joint].rms
-        if before is None or now <= FINEST * abs(motion.scale.unit[column]) or now <= WORSE * before.rms:
+        if before is None or now <= 2 * FINEST * abs(motion.scale.unit[column]) or now <= WORSE * before.rms:
             continue
         raise TraceError(
             f"{_called(trace)}: learning does not converge: the error of joint {joint} grew from "

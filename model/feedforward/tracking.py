@@ -51,8 +51,8 @@ def followed(trace: Trace, plan: Planner) -> Followed | None:
     rows = periods_of(trace)
     inside = rows < len(motion)
     rows = rows[inside]
-    wanted = motion[np.ix_(rows, [joint - 1 for joint in spec.joints])]
-    reached = trace.position[np.ix_(np.flatnonzero(inside), [trace.column(joint) for joint in spec.joints])]
+    wanted = motion[rows][:, [joint - 1 for joint in spec.joints]]
+    reached = trace.position[inside][:, [trace.column(joint) for joint in spec.joints]]
     return Followed(spec.joints, trace.time[inside], wanted, reached)
 
 

