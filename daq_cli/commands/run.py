@@ -19,6 +19,7 @@ from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
 from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles
+from daq_cli.models.model_input import MODEL_HELP
 from daq_cli.robot.access import robot_of
 from daq_cli.robot.experiment import Computation, RunOptions, carry_out
 
@@ -77,8 +78,12 @@ OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
 NotesOption = Annotated[str, typer.Option(help="Remarks that are kept with the trace.")]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")]
 FeedforwardOption = Annotated[
-    Path | None,
-    typer.Option("--feedforward", help="A model (.json): compute set points with which the arm follows the motion."),
+    str | None,
+    typer.Option(
+        "--feedforward",
+        help=f"Compute set points with which the arm follows the motion, by a model. {MODEL_HELP}",
+        metavar="MODEL",
+    ),
 ]
 LearnFromOption = Annotated[
     str | None,

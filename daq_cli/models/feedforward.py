@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq_cli.app.context import console, print_table, printable
 from daq_cli.robot.experiment import Computation, RunOptions
-from model.units import joint_unit, shown_unit
+from model.units import joint_unit, shown_unit, with_unit
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -26,12 +26,12 @@ def with_computed_set_points(
     from daq.safety.planned import planned
     from daq.traces.reader import read_trace
     from daq_cli.app.progress import shown_progress
+    from daq_cli.models.model_input import read_model
     from model.feedforward.inverse import feedforward
     from model.feedforward.learning import learn
-    from model.machine_model.model_file import load_model
 
     machine = robot.machine
-    model = None if computation.model is None else load_model(computation.model)
+    model = None if computation.model is None else read_model(computation.model)
     with shown_progress("computing set points") as progress:
         if computation.learn_from is not None:
             file = robot.find_trace(options.folder or robot.call.trace_folder, computation.learn_from)
@@ -47,10 +47,11 @@ def with_computed_set_points(
 
 
 def expectation(source: Feedforward) -> str:
-    """A line on where set points come from, without the errors."""
+    """A line on where set points come from, above the table of errors."""
     by = [f"computed with model {source.model}"] if source.model else []
     by += [f"learned from trace {source.learned_from}"] if source.learned_from else []
-    return f"set points {' and '.join(by)}, to follow the {source.asked.trajectory.kind.replace('_', ' ')}"
+    motion = source.asked.trajectory.kind.replace("_", " ")
+    return f"set points {' and '.join(by)}, to follow the {motion}; tracking error, rms (largest):"
 
 
 def tracking_data(trace: Trace) -> list[dict[str, object]] | None:
@@ -97,14 +98,16 @@ def _rows(
 def _table(rows: list[dict[str, Any]], source: Feedforward) -> Table:
     from rich.table import Table
 
-    table = Table(box=None, header_style="bold", title_justify="left")
-    titles = {"before": "in that trace" if source.learned_from else "plain set points", "expected": "expected"}
-    titles |= {"reached": "reached"} if "reached" in rows[0] else {}
-    table.add_column("tracking error, rms (largest): joint", justify="right")
-    for title in titles.values():
+    before = "in that trace" if source.learned_from else "plain set points"
+    titles = {"before": before, "expected": "expected", "reached": "reached"}
+    told = [name for name in titles if name in rows[0]]
+    table = Table(box=None, header_style="bold")
+    for title in ("joint", *(titles[name] for name in told)):
         table.add_column(title, justify="right")
     for row in rows:
-        cells = [row[name] for name in titles]
-        shown = ("–" if c is None else f"{c['rms']:.3f} ({c['largest']:.2f}) {row['unit']}" for c in cells)
-        table.add_row(str(row["joint"]), *shown)
+        table.add_row(str(row["joint"]), *(_cell(row[name], row["unit"]) for name in told))
     return table
+
+
+def _cell(error: dict[str, float] | None, unit: str) -> str:
+    return "–" if error is None else f"{with_unit(format(error['rms'], '.3f'), unit)} ({error['largest']:.2f})"

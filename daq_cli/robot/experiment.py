@@ -37,7 +37,7 @@ class Computation:
     """How set points are to be computed: with a model, from the error of a trace, of which a share is corrected, or
     both."""
 
-    model: Path | None
+    model: str | None
     learn_from: str | None
     share: float
 

@@ -71,11 +71,12 @@ def learn(
     responses = _responses(motion, inputs, sent, reached, trace, model)
     found, predicted = sent.copy(), reached.copy()
     for column, joint in zip(motion.columns, motion.joints, strict=True):
-        if before[joint].rms <= FINEST * abs(motion.scale.unit[column]):
-            continue
-        response, allowed, wanted = responses[column], motion.allowed[column], motion.wanted[:, column]
-        task = Task(wanted, wanted, sent[:, column], reached[:, column], CAUTION)
-        best = sent[:, column] + share * (best_set_points(task, response, allowed) - sent[:, column])
+        response, allowed, best = responses[column], motion.allowed[column], sent[:, column]
+        came_late = np.abs(np.diff(best)).max() > allowed.step + 0.5
+        if came_late or before[joint].rms > FINEST * abs(motion.scale.unit[column]):
+            wanted = motion.wanted[:, column]
+            task = Task(wanted, wanted, sent[:, column], reached[:, column], CAUTION)
+            best = best + share * (best_set_points(task, response, allowed) - best)
         found[:, column] = rounded_set_points(best, response, allowed, motion.effective[column])
         predicted[:, column] += response.applied(found[:, column] - sent[:, column])
     source = Feedforward(
