@@ -14,7 +14,7 @@ from model.machine_model.model_file import save_model
 from tests.daq_cli.invoke import CommandLine
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "single_axis.toml"
-SHORT = ("--hold", "0.6", "--folder", "traces")
+SHORT = ("--settle", "0.2", "--hold", "0.3", "--folder", "traces")
 
 
 @pytest.fixture
@@ -39,12 +39,18 @@ def test_a_motion_is_followed_and_its_trace_tells_expected_beside_reached(
         assert row["unit"] == "°"
         assert row["reached"]["rms"] < row["before"]["rms"] / 2
         assert row["expected"]["rms"] / 3 < row["reached"]["rms"] < 3 * row["expected"]["rms"]
-    again = daq("--port", port, "run", "ramp", "--learn-from", "last", "--learn-share", "0.5", *SHORT, "--json")
+
+
+def test_set_points_are_learned_from_a_trace(daq: CommandLine, port: str) -> None:
+    run = ("--port", port, "run", "ramp", *SHORT, "--json")
+    first = json.loads(daq(*run).out)
+    again = daq(*run, "--learn-from", "last", "--learn-share", "0.5")
     assert again.code == 0, again.err
+    assert "in that trace" in again.err
     spec = read_trace(Path(json.loads(again.out)["trace"])).record.spec
     assert spec is not None
     assert spec.feedforward is not None
-    assert spec.feedforward.learned_from == data["record"]["trace_id"]
+    assert spec.feedforward.learned_from == read_trace(Path(first["trace"])).record.trace_id
     assert spec.feedforward.model is None
 
 

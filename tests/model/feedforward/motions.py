@@ -17,7 +17,7 @@ from model.feedforward.tracking import Followed, followed
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy.recording import recorded
 
-RAMP = parse_spec({"trajectory": {"kind": "ramp"}, "hold": 0.6})
+RAMP = parse_spec({"trajectory": {"kind": "ramp"}, "settle": 0.3, "hold": 0.4})
 STILL_MOCK = 7
 """Seed of the mock's noise and potentiometers."""
 

@@ -80,7 +80,7 @@ def test_a_missing_sample_is_bridged(attempt: Trace) -> None:
 def test_a_set_point_that_came_late_is_not_caught_up_with_in_a_jump(attempt: Trace) -> None:
     assert attempt.set_point is not None
     late = attempt.set_point.copy()
-    late[38:41] = late[37]
+    late[28:31] = late[27]
     assert np.abs(np.diff(late[:, 1])).max() / 0.02 > 1.2, "a jump that the limit of speed forbids"
     found = learned(replace(attempt, set_point=late))
     assert len(plan(found)) == len(plan(RAMP)), "the planner refuses what is too fast"
