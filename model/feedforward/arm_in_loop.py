@@ -22,8 +22,6 @@ from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
 LEAD_IN = 1.5
 """Time (s) for which the simulated arm first holds the posture where it begins, until gravity and drive are in
 balance."""
-STEP_OF_CHANGES = 5e-3
-"""Longest step of integration (s) of runs whose differences alone count."""
 CHANGE = 1.0
 """Change of a set point, in posture units, by which its response is found: the smallest that the controller takes."""
 
@@ -41,15 +39,15 @@ class ArmInLoop:
     rounded: Prepared
     lead: int
 
-    def readings(self, candidates: Sequence[Floats], step: float = LONGEST_STEP) -> Floats:
+    def readings(self, candidates: Sequence[Floats]) -> Floats:
         """Readings (r, k, n) for r courses of set points, nothing rounded. Raises SpecError for an unstable loop."""
-        return self._run([self._loaded(self.smooth, one) for one in candidates], step)
+        return self._run([self._loaded(self.smooth, one) for one in candidates])
 
     def rounded_readings(self, set_points: Floats, noise: Floats) -> Floats:
         """Readings (k, n) as the board makes them: set points, readings and powers rounded, noise (k, n) in counts."""
         own = self._loaded(self.rounded, np.floor(set_points + 0.5))
         own = replace(own, noise=np.concatenate([np.zeros((self.lead, noise.shape[1])), noise]))
-        return np.asarray(self._run([own], LONGEST_STEP)[0])
+        return np.asarray(self._run([own])[0])
 
     def responses(self, set_points: Floats) -> tuple[Response, ...]:
         """The response of each joint about these set points.
@@ -61,7 +59,7 @@ class ArmInLoop:
         reach = min(REACH, count)
         rows = np.arange(count)
         changed = [set_points + CHANGE * (rows % reach == comb)[:, None] for comb in range(reach)]
-        runs = self.readings([set_points, *changed], STEP_OF_CHANGES)
+        runs = self.readings([set_points, *changed])
         differences = (runs[1:] - runs[0]) / CHANGE
         places = rows[:, None] + np.arange(reach)
         inside = np.minimum(places, count - 1)
@@ -81,11 +79,11 @@ class ArmInLoop:
         counts = postures * (self.scale.unit / per_count)
         return np.ascontiguousarray(np.floor(counts + 0.5) if rounded else counts)
 
-    def _run(self, runs: Sequence[Prepared], step: float) -> Floats:
+    def _run(self, runs: Sequence[Prepared]) -> Floats:
         count = len(runs)
         vectors = np.tile(self.model.vector, (count, 1))
         initials = np.tile(self.smooth.initial, (count, 1, 1))
-        out = BatchRun(self.model, runs, np.arange(count), vectors, initials, step).run()
+        out = BatchRun(self.model, runs, np.arange(count), vectors, initials, LONGEST_STEP).run()
         readings = out[:, OUT_READING, self.lead :]
         if not np.isfinite(readings).all():
             raise SpecError("the simulated motion does not stay finite: the model's loop is unstable")

@@ -71,14 +71,15 @@ def learn(
     responses = _responses(motion, inputs, sent, reached, trace, model)
     found, predicted = sent.copy(), reached.copy()
     for column, joint in zip(motion.columns, motion.joints, strict=True):
-        response, allowed, best = responses[column], motion.allowed[column], sent[:, column]
-        came_late = np.abs(np.diff(best)).max() > allowed.step + 0.5
-        if came_late or before[joint].rms > FINEST * abs(motion.scale.unit[column]):
-            wanted = motion.wanted[:, column]
-            task = Task(wanted, wanted, sent[:, column], reached[:, column], CAUTION)
-            best = best + share * (best_set_points(task, response, allowed) - best)
-        found[:, column] = rounded_set_points(best, response, allowed, motion.effective[column])
-        predicted[:, column] += response.applied(found[:, column] - sent[:, column])
+        response, allowed, now = responses[column], motion.allowed[column], sent[:, column]
+        came_late = np.abs(np.diff(now)).max() > allowed.step + 0.5
+        if before[joint].rms <= FINEST * abs(motion.scale.unit[column]) and not came_late:
+            continue
+        wanted = motion.wanted[:, column]
+        best = best_set_points(Task(wanted, wanted, now, reached[:, column], CAUTION), response, allowed)
+        corrected = now + share * (best - now)
+        found[:, column] = rounded_set_points(corrected, response, allowed, motion.effective[column])
+        predicted[:, column] += response.applied(found[:, column] - now)
     source = Feedforward(
         asked=asked.as_asked,
         model=None if model is None else model.identity,

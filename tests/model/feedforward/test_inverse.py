@@ -38,6 +38,15 @@ def test_the_mock_follows_a_ramp_with_less_than_a_third_of_the_plain_error(tmp_p
         assert before.rms == pytest.approx(judged(plain).errors[joint].rms, rel=0.2)
 
 
+def test_a_joint_that_is_quick_and_damped_is_inverted_as_well() -> None:
+    """Its response needs short steps of integration: with long ones it comes out with the wrong sign."""
+    motor = {"rotor_inertia": 5e-7, "back_emf_constant": 0.08, "torque_constant": 0.0123, "resistance": 2.8}
+    quick = arm().with_values({f"joint3.motor.{name}": value for name, value in motor.items()} | {"load.mass": 0.3})
+    found = feedforward(quick, RAMP, machine(), plan).feedforward
+    assert found is not None
+    assert found.expected[3].rms < found.before[3].rms / 5
+
+
 def test_set_points_keep_the_machine_s_limits_and_begin_where_the_arm_stands() -> None:
     fast = parse_spec({"trajectory": {"kind": "ramp", "duration": 0.45}, "hold": 0.5})
     found = computed(fast)
