@@ -22,6 +22,8 @@ from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
 LEAD_IN = 1.5
 """Time (s) for which the simulated arm first holds the posture where it begins, until gravity and drive are in
 balance."""
+NOISE_SEED = 1
+"""Seed of the sensor's noise."""
 CHANGE = 1.0
 """Change of a set point, in posture units, by which its response is found: the smallest that the controller takes."""
 
@@ -43,11 +45,15 @@ class ArmInLoop:
         """Readings (r, k, n) for r courses of set points, nothing rounded. Raises SpecError for an unstable loop."""
         return self._run([self._loaded(self.smooth, one) for one in candidates])
 
-    def rounded_readings(self, set_points: Floats, noise: Floats) -> Floats:
-        """Readings (k, n) as the board makes them: set points, readings and powers rounded, noise (k, n) in counts."""
-        own = self._loaded(self.rounded, np.floor(set_points + 0.5))
-        own = replace(own, noise=np.concatenate([np.zeros((self.lead, noise.shape[1])), noise]))
-        return np.asarray(self._run([own])[0])
+    def rounded_readings(self, set_points: Floats, draws: int) -> Floats:
+        """Readings (r, k, n) as the board makes them: set points, readings and powers rounded, with `draws` draws of
+        the noise that the machine file states."""
+        machine = self.model.machine
+        sensors = [machine.joint(joint).sensor for joint in machine.modelled_joints]
+        counts = np.array([s.noise.value if s is not None and s.noise is not None else 0.0 for s in sensors])
+        own, rng = self._loaded(self.rounded, np.floor(set_points + 0.5)), np.random.default_rng(NOISE_SEED)
+        noises = counts * rng.standard_normal((draws, *own.noise.shape))
+        return self._run([replace(own, noise=noise) for noise in noises])
 
     def responses(self, set_points: Floats) -> tuple[Response, ...]:
         """The response of each joint about these set points.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import ExperimentSpec, Feedforward
+from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
 from daq.contracts.machine import Machine
 from daq.contracts.progress import Progress, silent
 from model.arrays import Floats
@@ -26,8 +26,14 @@ FIRST_CAUTION = 1e-3
 """Weight at first of a set point's squared change in a step, beside the squared error."""
 LARGEST_CAUTION = 10.0
 """Weight at which a step is given up: it would change next to nothing."""
-NOISE_SEED = 1
-"""Seed of the sensor's noise in the run that gives the expected error."""
+DRAWS = 4
+"""Draws of the sensor's noise over which the error with rounding is averaged."""
+MOST_CORRECTIONS = 8
+"""Most corrections of rounded set points."""
+LEAST_SHARE = 0.2
+"""Share of a correction below which a joint's set points are left as they are."""
+CAUTION = 0.1
+"""Weight of a set point's squared change in such a correction, beside the squared error."""
 
 
 def feedforward(
@@ -49,7 +55,7 @@ def feedforward(
     gains = gains_for(motion, None)
     arm = arm_in_loop(model, motion.wanted[0], len(motion), gains)
     found = inverted(arm, motion, progress)
-    expected, before = (errors_of(motion.joints, motion.miss(_shown(arm, one))) for one in (found, motion.wanted))
+    expected, before = (_expected(arm, motion, one) for one in (found, motion.wanted))
     source = Feedforward(asked=asked.as_asked, model=model.identity, expected=expected, before=before)
     return computed_experiment(motion, found, gains, source)
 
@@ -102,7 +108,41 @@ def inverted(arm: ArmInLoop, motion: Motion, progress: Progress = silent) -> Flo
         responses = arm.responses(now)
         if fall < SETTLED:
             break
-    return rounded(motion, now, responses)
+    return _with_rounding(arm, motion, rounded(motion, now, responses), responses)
+
+
+def _with_rounding(arm: ArmInLoop, motion: Motion, found: Floats, responses: Sequence[Response]) -> Floats:
+    """Rounded set points, corrected by what readings and powers that are rounded as well make of them.
+
+    A drive of whole counts and friction that sticks may hold a joint off the motion, or keep it swinging. What they do
+    on average over draws of the noise is corrected, joint by joint, as long as its squared error falls.
+    """
+    shares = dict.fromkeys(motion.columns, 1.0)
+    shown = arm.rounded_readings(found, DRAWS)
+    costs = _costs(motion, shown)
+    for _ in range(MOST_CORRECTIONS):
+        tried = found.copy()
+        for column in [one for one, share in shares.items() if share >= LEAST_SHARE]:
+            wanted, now, response = motion.wanted[:, column], found[:, column], responses[column]
+            task = Task(wanted, wanted, now, shown[:, :, column].mean(axis=0), CAUTION)
+            best = now + shares[column] * (best_set_points(task, response, motion.allowed[column]) - now)
+            tried[:, column] = rounded_set_points(best, response, motion.allowed[column], motion.effective[column])
+        if (tried == found).all():
+            break
+        after = _costs(motion, arm.rounded_readings(tried, DRAWS))
+        for column in motion.columns:
+            if after[column] < costs[column]:
+                found[:, column] = tried[:, column]
+            else:
+                shares[column] /= 2
+        shown = arm.rounded_readings(found, DRAWS)
+        costs = _costs(motion, shown)
+    return found
+
+
+def _costs(motion: Motion, shown: Floats) -> Floats:
+    """(n,) squared error of each joint over draws of readings (r, k, n)."""
+    return np.asarray(np.square(motion.wanted - shown).sum(axis=(0, 1)))
 
 
 def rounded(motion: Motion, set_points: Floats, responses: Sequence[Response]) -> Floats:
@@ -118,10 +158,7 @@ def _cost(motion: Motion, readings: Floats) -> float:
     return float(np.square((motion.wanted - readings)[:, motion.columns]).sum())
 
 
-def _shown(arm: ArmInLoop, set_points: Floats) -> Floats:
-    """Readings (k, n) as the board would make them, with the noise that the machine file states."""
-    machine = arm.model.machine
-    sensors = [machine.joint(joint).sensor for joint in machine.modelled_joints]
-    counts = np.array([s.noise.value if s is not None and s.noise is not None else 0.0 for s in sensors])
-    noise = counts * np.random.default_rng(NOISE_SEED).standard_normal(set_points.shape)
-    return arm.rounded_readings(set_points, noise)
+def _expected(arm: ArmInLoop, motion: Motion, set_points: Floats) -> dict[int, TrackingError]:
+    """Tracking errors over draws of the sensor's noise."""
+    shown = arm.rounded_readings(set_points, DRAWS)
+    return errors_of(motion.joints, np.concatenate([motion.miss(one) for one in shown]))
