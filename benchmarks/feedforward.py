@@ -63,7 +63,7 @@ PAYLOAD = (0.25, 0.8)
 """Hidden load, kg, beside the stated 1.25 kg."""
 FLOOR = 0.1
 """Error (°), a third of a posture unit, below which attempts differ by chance."""
-LEARNED = 5
+LEARNED = 4
 """Attempts that learn from the one before."""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.feedforward.posture_units import Allowed
 from model.feedforward.response import Response
 
@@ -20,6 +20,8 @@ MOST_STEPS = 300
 """Most steps of the alternating directions; what violates a limit then is mended by the rounding."""
 NEAR = 0.01
 """Violation of a limit, in posture units, that counts as none."""
+HELD_WITHIN = 0.75
+"""Largest distance, in posture units, at which a set point is held instead of rounded."""
 SHARE_OF_RESPONSE = 0.1
 """Weight of the limits in the alternating directions, as a share of the mean square response."""
 _NEIGHBOURS = np.array([-1.0, 0.0, 1.0])
@@ -118,10 +120,13 @@ def _padded(band: Floats, rows: int) -> Floats:
     return np.concatenate([band, np.zeros((max(0, rows - len(band)), band.shape[1]))])
 
 
-def rounded_set_points(wanted: Floats, response: Response, allowed: Allowed, effective: Floats) -> Floats:
+def rounded_set_points(
+    wanted: Floats, response: Response, allowed: Allowed, effective: Floats, held: Mask | None = None
+) -> Floats:
     """Whole posture units (k,) whose response is nearest to that of `wanted` (k,), as far as one pass finds them.
 
     effective: what each posture unit is for the controller, which may count more coarsely or finely.
+    held: periods (k,) in which the set point stays at the one before it where that is near enough.
 
     Each set point is rounded with the errors of those before it in mind, so that they cancel in what the arm shows:
     decision feedback, Babai's nearest plane (1986, Combinatorica 6).
@@ -143,6 +148,8 @@ def rounded_set_points(wanted: Floats, response: Response, allowed: Allowed, eff
         aim = wanted[i] + float(column[1:] @ error[row + 1 : row + reach]) / column[0]
         low, high = max(allowed.low, before - allowed.step), min(allowed.high, before + allowed.step)
         near = np.clip(np.floor(aim + 0.5) + _NEIGHBOURS, low, high).astype(np.int64)
-        before = chosen[i] = near[np.abs(effective[near] - aim).argmin()]
+        if held is None or not held[i] or abs(effective[int(before)] - wanted[i]) > HELD_WITHIN:
+            before = near[np.abs(effective[near] - aim).argmin()]
+        chosen[i] = before
         error[row] = wanted[i] - effective[int(before)]
     return chosen

@@ -10,10 +10,10 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
 from daq.contracts.machine import Machine
 from daq.contracts.progress import Progress, silent
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.feedforward.arm_in_loop import ArmInLoop, arm_in_loop
 from model.feedforward.best_set_points import Task, best_set_points, rounded_set_points
-from model.feedforward.motion import Motion, Planner, computed_experiment, gains_for, motion_of
+from model.feedforward.motion import Motion, Planner, computed_experiment, gains_for, motion_of, with_rest
 from model.feedforward.response import Response
 from model.feedforward.tracking import errors_of
 from model.machine_model.model import Model
@@ -28,6 +28,10 @@ LARGEST_CAUTION = 10.0
 """Weight at which a step is given up: it would change next to nothing."""
 DRAWS = 4
 """Draws of the sensor's noise over which the error with rounding is averaged."""
+AT_REST = 1e-9
+"""Change of a motion in a period, in posture units, that counts as rest."""
+MOST_RESTS = 40
+"""Most rests of a motion at which it is tried whether set points are better held than rounded."""
 MOST_CORRECTIONS = 8
 """Most corrections of rounded set points."""
 LEAST_SHARE = 0.2
@@ -53,8 +57,9 @@ def feedforward(
     require_same(model, machine)
     motion = motion_of(asked, machine, plan)
     gains = gains_for(motion, None)
+    longer = with_rest(motion)
+    found = inverted(arm_in_loop(model, motion.wanted[0], len(longer), gains), longer, progress)[: len(motion)]
     arm = arm_in_loop(model, motion.wanted[0], len(motion), gains)
-    found = inverted(arm, motion, progress)
     expected, before = (_expected(arm, motion, one) for one in (found, motion.wanted))
     source = Feedforward(asked=asked.as_asked, model=model.identity, expected=expected, before=before)
     return computed_experiment(motion, found, gains, source)
@@ -108,16 +113,27 @@ def inverted(arm: ArmInLoop, motion: Motion, progress: Progress = silent) -> Flo
         responses = arm.responses(now)
         if fall < SETTLED:
             break
-    return _with_rounding(arm, motion, rounded(motion, now, responses), responses)
+    return _with_rounding(arm, motion, now, responses)
 
 
-def _with_rounding(arm: ArmInLoop, motion: Motion, found: Floats, responses: Sequence[Response]) -> Floats:
+def _with_rounding(arm: ArmInLoop, motion: Motion, smooth: Floats, responses: Sequence[Response]) -> Floats:
     """Rounded set points, corrected by what readings and powers that are rounded as well make of them.
 
     A drive of whole counts and friction that sticks may hold a joint off the motion, or keep it swinging. What they do
     on average over draws of the noise is corrected, joint by joint, as long as its squared error falls.
     """
     shares = dict.fromkeys(motion.columns, 1.0)
+    held = np.zeros(smooth.shape, dtype=np.bool_)
+    found = rounded(motion, smooth, responses, held)
+    costs = _costs(motion, arm.rounded_readings(found, DRAWS))
+    for rest in _rests(motion):
+        tried_held = held | rest
+        tried = rounded(motion, smooth, responses, tried_held)
+        after = _costs(motion, arm.rounded_readings(tried, DRAWS))
+        for column in motion.columns:
+            if after[column] < costs[column]:
+                found[:, column], held[:, column] = tried[:, column], tried_held[:, column]
+                costs[column] = after[column]
     shown = arm.rounded_readings(found, DRAWS)
     costs = _costs(motion, shown)
     for _ in range(MOST_CORRECTIONS):
@@ -126,7 +142,8 @@ def _with_rounding(arm: ArmInLoop, motion: Motion, found: Floats, responses: Seq
             wanted, now, response = motion.wanted[:, column], found[:, column], responses[column]
             task = Task(wanted, wanted, now, shown[:, :, column].mean(axis=0), CAUTION)
             best = now + shares[column] * (best_set_points(task, response, motion.allowed[column]) - now)
-            tried[:, column] = rounded_set_points(best, response, motion.allowed[column], motion.effective[column])
+            allowed, effective = motion.allowed[column], motion.effective[column]
+            tried[:, column] = rounded_set_points(best, response, allowed, effective, held[:, column])
         if (tried == found).all():
             break
         after = _costs(motion, arm.rounded_readings(tried, DRAWS))
@@ -140,17 +157,27 @@ def _with_rounding(arm: ArmInLoop, motion: Motion, found: Floats, responses: Seq
     return found
 
 
+def _rests(motion: Motion) -> list[Mask]:
+    """Stretches (k, n) in which joints are to rest: the first of each joint, then the second, and so on."""
+    still = np.ones(motion.wanted.shape, dtype=np.bool_)
+    still[1:] = np.abs(np.diff(motion.wanted, axis=0)) < AT_REST
+    begins = still & ~np.concatenate([np.zeros((1, still.shape[1]), dtype=np.bool_), still[:-1]])
+    number = np.where(still, begins.cumsum(axis=0), 0)
+    return [number == one for one in range(1, min(int(number.max()), MOST_RESTS) + 1)]
+
+
 def _costs(motion: Motion, shown: Floats) -> Floats:
     """(n,) squared error of each joint over draws of readings (r, k, n)."""
     return np.asarray(np.square(motion.wanted - shown).sum(axis=(0, 1)))
 
 
-def rounded(motion: Motion, set_points: Floats, responses: Sequence[Response]) -> Floats:
+def rounded(motion: Motion, set_points: Floats, responses: Sequence[Response], held: Mask | None = None) -> Floats:
     """Whole posture units (k, n) whose response is nearest to that of these set points."""
     found = np.floor(set_points + 0.5)
     for column in motion.columns:
         allowed, effective = motion.allowed[column], motion.effective[column]
-        found[:, column] = rounded_set_points(set_points[:, column], responses[column], allowed, effective)
+        own = None if held is None else held[:, column]
+        found[:, column] = rounded_set_points(set_points[:, column], responses[column], allowed, effective, own)
     return found
 
 

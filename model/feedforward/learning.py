@@ -21,8 +21,8 @@ from model.feedforward.arm_in_loop import arm_in_loop
 from model.feedforward.best_set_points import Task, best_set_points, rounded_set_points
 from model.feedforward.estimated_response import estimated_loop
 from model.feedforward.inverse import require_same
-from model.feedforward.motion import Motion, Planner, computed_experiment, gains_for, motion_of
-from model.feedforward.response import Response
+from model.feedforward.motion import Motion, Planner, and_rest, computed_experiment, gains_for, motion_of
+from model.feedforward.response import REACH, Response
 from model.feedforward.tracking import errors_of
 from model.machine_model.model import Model
 from model.simulation.inputs import RunInputs, inputs_of
@@ -70,16 +70,17 @@ def learn(
     _require_converging(trace, before, motion)
     responses = _responses(motion, inputs, sent, reached, trace, model)
     found, predicted = sent.copy(), reached.copy()
+    wanted, now, shown = (and_rest(one).T for one in (motion.wanted, sent, reached))
     for column, joint in zip(motion.columns, motion.joints, strict=True):
-        response, allowed, now = responses[column], motion.allowed[column], sent[:, column]
-        came_late = np.abs(np.diff(now)).max() > allowed.step + 0.5
+        allowed, count = motion.allowed[column], len(motion)
+        came_late = np.abs(np.diff(now[column])).max() > allowed.step + 0.5
         if before[joint].rms <= FINEST * abs(motion.scale.unit[column]) and not came_late:
             continue
-        wanted = motion.wanted[:, column]
-        best = best_set_points(Task(wanted, wanted, now, reached[:, column], CAUTION), response, allowed)
-        corrected = now + share * (best - now)
-        found[:, column] = rounded_set_points(corrected, response, allowed, motion.effective[column])
-        predicted[:, column] += response.applied(found[:, column] - now)
+        task = Task(wanted[column], wanted[column], now[column], shown[column], CAUTION)
+        corrected = now[column] + share * (best_set_points(task, responses[column], allowed) - now[column])
+        rounded = rounded_set_points(corrected, responses[column], allowed, motion.effective[column])
+        found[:, column] = rounded[:count]
+        predicted[:, column] += responses[column].applied(rounded - now[column])[:count]
     source = Feedforward(
         asked=asked.as_asked,
         model=None if model is None else model.identity,
@@ -151,8 +152,8 @@ def _responses(
     motion: Motion, inputs: RunInputs, sent: Floats, reached: Floats, trace: Trace, model: Model | None
 ) -> dict[int, Response]:
     if model is not None:
-        arm = arm_in_loop(model, sent[0], len(motion), trace.record.gains)
-        return dict(enumerate(arm.responses(sent)))
+        arm = arm_in_loop(model, sent[0], len(motion) + REACH, trace.record.gains)
+        return dict(enumerate(arm.responses(and_rest(sent))))
     found = {}
     for column, joint in zip(motion.columns, motion.joints, strict=True):
         loop = estimated_loop(sent[:, column], reached[:, column], inputs.period)
@@ -161,5 +162,5 @@ def _responses(
                 f"{_called(trace)}: joint {joint} does not follow its set points ({100 * loop.explained:.0f} % of its "
                 "motion is explained): nothing can be learned from it; is it blocked, or is the motion too small?"
             )
-        found[column] = loop.response(len(motion), inputs.period)
+        found[column] = loop.response(len(motion) + REACH, inputs.period)
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from daq.contracts.experiment import ExperimentSpec, Feedforward, Gain, Path
 from daq.contracts.machine import BoardPid, Machine, NoController
 from daq.contracts.trace import Floats
 from model.feedforward.posture_units import Allowed, Scale, allowed_postures, effective_postures, scale_of
+from model.feedforward.response import REACH
 
 Planner = Callable[[ExperimentSpec], Floats]
 """A function that gives the set points (k, joints of the machine) of an experiment in rad, one row per control period.
@@ -86,6 +87,17 @@ def motion_of(asked: ExperimentSpec, machine: Machine, plan: Planner) -> Motion:
         tuple(allowed_postures(machine, joint, period) for joint in modelled),
         tuple(effective_postures(machine, joint) for joint in modelled),
     )
+
+
+def and_rest(signal: Floats) -> Floats:
+    """A signal (k, n) that keeps its last value for another REACH periods."""
+    return np.pad(signal, ((0, REACH), (0, 0)), mode="edge")
+
+
+def with_rest(motion: Motion) -> Motion:
+    """The motion and a rest after its end. Without one the last set points would be free to do harm that shows only
+    later."""
+    return replace(motion, planned=and_rest(motion.planned), wanted=and_rest(motion.wanted))
 
 
 def gains_for(motion: Motion, present: Mapping[int, Gain] | None) -> dict[int, Gain]:
