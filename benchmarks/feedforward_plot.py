@@ -33,10 +33,10 @@ def plot(entries: Sequence[dict[str, Any]], path: Path) -> None:
     over_time.set(
         xlabel="time (s)",
         ylabel=f"wanted − read, joint {joint + 1} (°)",
-        title=f"{MOTION}, the arm on which the fitted model did worst ({', '.join(worst['hidden'])})",
+        title=f"{MOTION}, the arm on which the fitted model did worst\n{', '.join(worst['hidden'])}",
     )
-    over_time.title.set_fontsize(10)
-    over_time.legend(ncols=4, frameon=False)
+    over_time.title.set_fontsize(9)
+    over_time.legend(ncols=4, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.16))
     methods = ["plain", "fitted", "diagnosed", "diagnosed, learned once", *labels]
     for entry in entries:
         rms = [np.sqrt(np.mean([r[label]["rms"] ** 2 for r in entry["runs"].values()])) for label in methods]

@@ -161,7 +161,8 @@ def _rests(motion: Motion) -> list[Mask]:
     """Stretches (k, n) in which joints are to rest: the first of each joint, then the second, and so on."""
     still = np.ones(motion.wanted.shape, dtype=np.bool_)
     still[1:] = np.abs(np.diff(motion.wanted, axis=0)) < AT_REST
-    begins = still & ~np.concatenate([np.zeros((1, still.shape[1]), dtype=np.bool_), still[:-1]])
+    begins = still.copy()
+    begins[1:] &= ~still[:-1]
     number = np.where(still, begins.cumsum(axis=0), 0)
     return [number == one for one in range(1, min(int(number.max()), MOST_RESTS) + 1)]
 
