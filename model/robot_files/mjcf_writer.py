@@ -19,6 +19,8 @@ HELD = frozenset((at.VISCOUS, at.COULOMB, at.SPRING, at.SPRING_REST, at.FLUX_LOS
 """Numbers of effects that MJCF has a place for, beside those of the bodies."""
 LEAST_MOMENT = 1e-10
 """Least principal moment of a body, as a share of its largest: MuJoCo refuses the 0 of a thin rod about itself."""
+SMALLEST_MOMENT = 1e-12
+"""Least principal moment of a body, kg·m²: MuJoCo takes smaller ones for 0."""
 LEAST_MASS = 1e-9
 """Least mass (kg) of a body: MuJoCo refuses a massless one that moves."""
 
@@ -102,7 +104,7 @@ def _heavy_enough(link: OutgoingLink) -> tuple[float, Floats]:
     """Mass and inertia that MuJoCo accepts: a thin rod's are made larger by 1e-10 of themselves. Raises SpecError."""
     inertia = 0.5 * (link.inertia + link.inertia.T)
     least, middle, most = np.linalg.eigvalsh(inertia)
-    floor = LEAST_MOMENT * max(float(most), LEAST_MASS)
+    floor = max(LEAST_MOMENT * float(most), SMALLEST_MOMENT)
     missing = max(floor - least, floor - (least + middle - most), 0.0)
     if missing > 11.0 * floor or link.mass < 0.0:
         shown = ", ".join(f"{moment:.4g}" for moment in (least, middle, most))

@@ -36,7 +36,7 @@ ARMS = {
     "panda": PublishedArm(
         "panda_description/urdf/panda.urdf",
         numbered("panda_joint{}", 1, 2, 3, 4, 5, 6, 7),
-        {"panda_finger_joint1": 0.02},
+        {"panda_finger_joint1": 0.02, "panda_finger_joint2": 0.02},
     ),
     "ur5": PublishedArm(
         "ur_description/urdf/ur5_robot.urdf",
