@@ -64,7 +64,10 @@ def from_urdf(
 
     if output is not None:
         _check_new(output)
-    pull = None if gravity is None else parse_numbers(gravity, "--gravity", 3)
+    pull = None
+    if gravity is not None:
+        x, y, z = parse_numbers(gravity, "--gravity", 3)
+        pull = (x, y, z)
     other = None if drives is None else load_machine(drives)
     robot = read_urdf(urdf)
     arm = serial_arm(robot, None if joints is None else _names(joints), _held(hold), tip)

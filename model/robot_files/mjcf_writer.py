@@ -19,7 +19,7 @@ HELD = frozenset((at.VISCOUS, at.COULOMB, at.SPRING, at.SPRING_REST, at.FLUX_LOS
 """Numbers of effects that MJCF has a place for, beside those of the bodies."""
 LEAST_MOMENT = 1e-10
 """Least principal moment of a body, as a share of its largest: MuJoCo refuses the 0 of a thin rod about itself."""
-SMALLEST_MOMENT = 1e-12
+SMALLEST_MOMENT = 1e-14
 """Least principal moment of a body, kg·m²: MuJoCo takes smaller ones for 0."""
 LEAST_MASS = 1e-9
 """Least mass (kg) of a body: MuJoCo refuses a massless one that moves."""
