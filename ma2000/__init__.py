@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from ma2000.files import read_traces as read_traces
     from ma2000.files import write_trace as write_trace
     from ma2000.pictures import plot as plot
+    from ma2000.robot_files import save_machine as save_machine
+    from ma2000.robot_files import write_mjcf as write_mjcf
+    from ma2000.robot_files import write_urdf as write_urdf
     from ma2000.running import Run as Run
     from ma2000.running import RunError as RunError
     from ma2000.running import run as run
@@ -54,6 +57,7 @@ if TYPE_CHECKING:
     from model.machine_model.model import base_model as base_model
     from model.machine_model.model_file import load_model as load_model
     from model.machine_model.model_file import save_model as save_model
+    from model.robot_files.machine_of_arm import machine_from_urdf as machine_from_urdf
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
     from model.validation.criterion import Fidelity as Fidelity
@@ -88,14 +92,18 @@ _HOME = {
     "learn": "ma2000.studies",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
+    "machine_from_urdf": "model.robot_files.machine_of_arm",
     "plot": "ma2000.pictures",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
     "run": "ma2000.running",
+    "save_machine": "ma2000.robot_files",
     "save_model": "model.machine_model.model_file",
     "simulate": "model.simulation.simulate",
     "validate": "ma2000.studies",
+    "write_mjcf": "ma2000.robot_files",
     "write_trace": "ma2000.files",
+    "write_urdf": "ma2000.robot_files",
 }
 """Module of each public name. They are imported when they are first used: a notebook that only reads traces waits for
 no compiler."""
