@@ -129,12 +129,21 @@ def test_a_patient_recording_hears_of_a_disk_that_fails_while_it_waits(
         writer.sample(row(tick))
     fails.set()
 
-    def record_on() -> None:
-        for tick in range(21, 100):
-            writer.sample(row(tick))
+    told: list[str] = []
 
-    with pytest.raises(TraceError, match="cannot be written: Input/output error"):
-        record_on()
+    def record_on() -> None:
+        try:
+            for tick in range(21, 100):
+                writer.sample(row(tick))
+        except TraceError as error:
+            told.append(str(error))
+
+    recording = threading.Thread(target=record_on, daemon=True)
+    recording.start()
+    recording.join(60)
+    assert not recording.is_alive(), "it waits for room until its patience ends"
+    assert len(told) == 1
+    assert "cannot be written: Input/output error" in told[0]
     with pytest.raises(TraceError, match="Input/output error"):
         writer.close("complete")
     assert part_path(tmp_path / "a.mcap").exists()
