@@ -11,8 +11,8 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import DaqError
 
 EXAMPLES = "sqlite:////srv/arm/service.sqlite or postgresql+psycopg://daq@localhost/daq"
-PACKAGES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
-"""The package of a driver's module, for modules whose package has another name."""
+PACKAGES = {"psycopg": "ma2000-daq[postgresql]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
+"""What to install for a driver's module, where that has another name."""
 
 
 class StoreError(DaqError):
