@@ -184,7 +184,9 @@ def main() -> int:
         for name, took in searches.items()
     ]
     figures.append(Figure("start of the service", f"{start:.1f} s", beside=f"of a hundredth {few_start:.1f} s"))
-    return show(f"{given.traces} traces in the catalogue, {given.database}", "python -m benchmarks service_catalogue", figures)
+    return show(
+        f"{given.traces} traces in the catalogue, {given.database}", "python -m benchmarks service_catalogue", figures
+    )
 
 
 if __name__ == "__main__":

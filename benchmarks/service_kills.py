@@ -25,7 +25,17 @@ from random import Random
 from typing import Any
 
 from benchmarks.figures import Figure, quantile, show
-from benchmarks.service_process import DATABASES, ENDS, RunningService, child, database_of, dice, ramp, serving, started_service
+from benchmarks.service_process import (
+    DATABASES,
+    ENDS,
+    RunningService,
+    child,
+    database_of,
+    dice,
+    ramp,
+    serving,
+    started_service,
+)
 from daq.contracts.errors import TraceError
 from daq.traces.reader import read_trace
 

@@ -48,7 +48,8 @@ def open_engine(url: str) -> Engine:
     the error says which package to install."""
     parsed = parse_address(url)
     try:
-        return create_engine(parsed)
+        # A connection that its server has closed meanwhile is replaced before it is used.
+        return create_engine(parsed, pool_pre_ping=parsed.get_backend_name() != "sqlite")
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error
     except (ArgumentError, TypeError, ValueError) as error:

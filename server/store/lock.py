@@ -1,4 +1,4 @@
-"""Ensures that one service at a time uses a database: by a lock of a file, or of PostgreSQL, which ends with its process."""
+"""Ensures that one service at a time uses a database, by a lock that ends with its process: of a file or PostgreSQL."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class ServerLock:
         self._lost = lost
         self._closing = threading.Event()
         try:
-            self._connection = self._taken()
+            self._connection: Connection | None = self._taken()
         except DatabaseError as error:
             raise StoreError(f"database {place}: cannot be opened: {line_of(error)}") from error
         self._watch = threading.Thread(target=self._look_again, name="database lock", daemon=True)
@@ -107,24 +107,32 @@ class ServerLock:
         """Returns whether the lock is held, after taking it again if the connection was lost. False, with one line in
         the log, if another service has it. A server that cannot be reached changes nothing: nobody can take the lock.
         """
-        try:
-            self._connection.execute(text("SELECT 1"))
-        except DatabaseError:
-            self._connection.close()
+        if self._connection is not None:
             try:
-                self._connection = self._taken()
-            except InUseError as error:
-                log.error("%s: this service ends", error)
-                return False
+                self._connection.execute(text("SELECT 1"))
             except DatabaseError:
-                pass
+                self._release()
+        if self._connection is not None:
+            return True
+        try:
+            self._connection = self._taken()
+        except InUseError as error:
+            log.warning("%s: this service ends", error)
+            return False
+        except DatabaseError:  # the server is away: the next look tries again
+            pass
         return True
 
     def close(self) -> None:
         """Gives the lock back."""
         self._closing.set()
         self._watch.join()
-        self._connection.close()
+        self._release()
+
+    def _release(self) -> None:
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
 
     def _taken(self) -> Connection:
         connection = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")

@@ -128,8 +128,9 @@ class TraceStore:
                 query = query.where(getattr(TraceRow, column) == wanted)
         few = None
         if search.text:
-            query = query.where(TraceRow.searched.contains(search.text.lower(), autoescape=True))
             few = self._few_with(search.text.lower())
+            searched = search.text.lower().replace("\0", "")
+            query = query.where(TraceRow.searched.contains(searched, autoescape=True))
         if few is not None:
             query = query.where(TraceRow.id.in_(few))
         if search.tag is not None:
@@ -155,7 +156,9 @@ class TraceStore:
     def _few_with(self, searched: str) -> list[str] | None:
         """Returns the identities of all traces with this text, which an index of trigrams finds. None if they are more
         than FEW, so that reading the list in its order soon finds the first ones, and if there is no such index."""
-        if len(searched) < TRIGRAM or "\0" in searched:
+        if "\0" in searched:  # which no database looks for
+            return []
+        if len(searched) < TRIGRAM:
             return None
         with self._store.reading() as session:
             match session.get_bind().dialect.name:

@@ -18,11 +18,11 @@ FAST = ("fsync=off", "synchronous_commit=off", "full_page_writes=off", "listen_a
 
 def programs() -> Path | None:
     """Returns the folder of the newest PostgreSQL that is installed; None if there is none."""
-    on_path = shutil.which("postgres")
-    if on_path is not None:
-        return Path(on_path).parent
     found = sorted(DEBIAN.glob("*/bin/postgres"), key=lambda path: int(path.parts[-3]))
-    return found[-1].parent if found else None
+    if found:
+        return found[-1].parent
+    on_path = shutil.which("postgres")
+    return None if on_path is None else Path(on_path).resolve().parent
 
 
 class PostgresServer:

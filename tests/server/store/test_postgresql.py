@@ -39,9 +39,9 @@ def test_one_service_at_a_time_uses_a_database(postgresql: PostgresServer) -> No
 
 def test_a_server_that_cannot_be_reached_is_told_in_one_line() -> None:
     address = "postgresql+psycopg://anna:secret@/daq?host=/nowhere"
-    with pytest.raises(StoreError, match=r"database postgresql\+psycopg://anna:\*\*\*@/daq.*cannot be opened") as told:
-        with sole_use(address):
-            pass
+    expected = pytest.raises(StoreError, match=r"database postgresql\+psycopg://anna:\*\*\*@/daq.*cannot be opened")
+    with expected as told, sole_use(address):
+        pass
     assert "\n" not in str(told.value)
 
 

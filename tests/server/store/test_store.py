@@ -43,7 +43,10 @@ def test_tables_are_those_of_the_migrations(store: Store) -> None:
 
 
 def _is_of_an_object(name: str | None, kind: str, _parents: object) -> bool:
-    return kind != "table" or not str(name).startswith(TABLES_OF_THE_SEARCH)
+    """Tables and indexes of the search differ between the databases: they stand in the migration alone."""
+    return name not in {"traces_found", "traces_words"} and not (
+        kind == "table" and str(name).startswith(TABLES_OF_THE_SEARCH)
+    )
 
 
 def test_migrations_lead_back_too(store: Store) -> None:
@@ -165,7 +168,7 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
     assert found(text='"belt" OR loose') == []
     assert found(text="\0\0\0") == []
     assert found(text="elt") == [2, 1]
-    assert found(text="lt") == [2, 1]
+    assert found(text="lt") == [3, 2, 1]
     assert found(outcome="fault") == [3]
     assert found(kind="sine") == [2]
     assert found(since=NOW + timedelta(seconds=2)) == [3, 2]

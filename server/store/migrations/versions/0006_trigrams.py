@@ -22,7 +22,8 @@ SQLITE = (
     "CREATE TABLE trace_numbers (number INTEGER NOT NULL PRIMARY KEY, trace VARCHAR(64) NOT NULL UNIQUE)",
     "INSERT INTO trace_numbers (trace) SELECT id FROM traces",
     "CREATE VIRTUAL TABLE trace_words USING fts5(searched, tokenize='trigram')",
-    "INSERT INTO trace_words (rowid, searched) SELECT n.number, t.searched FROM trace_numbers n JOIN traces t ON t.id = n.trace",
+    """INSERT INTO trace_words (rowid, searched)
+        SELECT n.number, t.searched FROM trace_numbers n JOIN traces t ON t.id = n.trace""",
     """CREATE TRIGGER trace_words_insert AFTER INSERT ON traces BEGIN
         INSERT INTO trace_numbers (trace) VALUES (new.id);
         INSERT INTO trace_words (rowid, searched) SELECT number, new.searched FROM trace_numbers WHERE trace = new.id;
