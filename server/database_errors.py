@@ -57,8 +57,10 @@ def is_full(error: DatabaseError) -> bool:
 
 
 def is_value(error: DatabaseError) -> bool:
-    """Whether PostgreSQL refused a value: a text with the character NUL, one that is too long, a number too large."""
-    return type(error.orig).__module__.startswith("psycopg") and type(error).__name__ == "DataError"
+    """Whether the database refused a value: PostgreSQL a text with the character NUL, for example."""
+    from sqlalchemy.exc import DataError
+
+    return isinstance(error, DataError)
 
 
 def _result_code(error: DatabaseError) -> int | None:
