@@ -12,8 +12,9 @@ from daq.contracts.recorded import Recorded
 WIDTH, HEIGHT, MARGIN = 420, 110, 6
 MOST_POINTS = 300
 """Points of a line: more would not show in the picture's width."""
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B")
-"""Colours of the joints, as in plots."""
+JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B")
+"""Colours of the joints: those of Okabe and Ito, which colour-blind readers can distinguish; yellow darkened for
+paper."""
 
 
 def html_of(trace: Recorded) -> str:
@@ -29,7 +30,7 @@ def html_of(trace: Recorded) -> str:
 def _picture(trace: Recorded) -> str:
     lines, labels = [], []
     for column, joint in enumerate(trace.joints):
-        colour = COLOURS[(joint - 1) % len(COLOURS)]
+        colour = JOINT_COLOURS[(joint - 1) % len(JOINT_COLOURS)]
         if len(trace):
             points = _points(trace.time, trace.position[:, column])
             lines.append(f'<polyline fill="none" stroke="{colour}" stroke-width="1.5" points="{points}"/>')

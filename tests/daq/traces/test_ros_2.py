@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -49,6 +50,23 @@ def test_every_message_decodes_by_its_own_definition_and_encodes_to_the_same_byt
         [],
     )
     assert (found["/rosout"][1].name, found["/rosout"][1].msg) == ("end", "done: 21.6° reached")
+
+
+def test_what_ros_2_prints_about_a_trace_is_what_the_page_says(tmp_path: Path) -> None:
+    """`ros2 bag info` prints the counts of the index, in lines of this form."""
+    with write(tmp_path / "a.mcap", 200).open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    counts = summary.statistics.channel_message_counts
+    lines = sorted(
+        f"Topic: {one.topic} | Type: {summary.schemas[one.schema_id].name} | Count: {counts[number]} | "
+        f"Serialization Format: {one.message_encoding}"
+        for number, one in summary.channels.items()
+    )
+    page = Path(__file__).parents[3].joinpath("docs", "traces.md").read_text("utf-8")
+    assert [line[19:] for line in page.splitlines() if "Topic: /" in line] == lines
+    assert f"Messages:          {summary.statistics.message_count}\n" in page
 
 
 @pytest.mark.parametrize("velocity", [False, True])
