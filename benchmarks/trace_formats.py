@@ -17,7 +17,7 @@ from typing import IO
 
 from benchmarks.figures import Figure, at_most, show
 from benchmarks.trace_open import RATE, ROWS_A_SYNC, rows
-from daq.contracts.machine import load_machine
+from daq.contracts.machine import joint_names, load_machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
@@ -38,7 +38,7 @@ class RecordingOfFormat1:
     def __init__(self, stream: IO[bytes], record: TraceRecord, joints: tuple[int, ...]) -> None:
         self.samples = 0
         self._start_ns = layout.nanoseconds(record.created)
-        self._names = layout.joint_names(record, joints)
+        self._names = joint_names(record.machine, joints)
         self._mcap = open_mcap(stream, "")
         start = record.model_copy(update={"format": 1}).model_dump_json()
         signals = " ".join(layout.RECORDED_SIGNALS)

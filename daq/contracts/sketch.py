@@ -7,7 +7,9 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.contracts.machine import joint_names
 from daq.contracts.recorded import Recorded
+from daq.contracts.tables import is_prismatic
 
 WIDTH, HEIGHT, MARGIN = 420, 110, 6
 MOST_POINTS = 300
@@ -18,29 +20,57 @@ paper."""
 
 
 def html_of(trace: Recorded) -> str:
-    """One line of facts and the positions over time, each joint within its own range. Every text is escaped."""
+    """Facts, the positions over time, each joint within its own range, and these ranges. Every text is escaped."""
     record = trace.record
     name = record.spec.name if record.spec is not None and record.spec.name else record.robot
-    span = f"{trace.time[-1] - trace.time[0]:.1f} s" if len(trace) else "0 s"
-    facts = f"{len(trace)} samples in {span}, {trace.missing} missing, {record.outcome or 'no outcome'}"
+    facts = f"{len(trace)} samples, {trace.missing} missing, {record.outcome or 'no outcome'}"
     head = f"<b>{escape(name)}</b> <code>{escape(record.trace_id)}</code> · {escape(facts)}"
-    return f"<div>{head}<br>{_picture(trace)}</div>"
+    return f"<div>{head}<br>{_picture(trace)}<br>{_key(trace)}</div>"
 
 
 def _picture(trace: Recorded) -> str:
-    lines, labels = [], []
-    for column, joint in enumerate(trace.joints):
-        colour = JOINT_COLOURS[(joint - 1) % len(JOINT_COLOURS)]
-        if len(trace):
-            points = _points(trace.time, trace.position[:, column])
-            lines.append(f'<polyline fill="none" stroke="{colour}" stroke-width="1.5" points="{points}"/>')
-        labels.append(f'<tspan fill="{colour}">joint {int(joint)}  </tspan>')
+    """Lines in a frame, with the first and the last time (s) below it; frame and text have the page's own colour."""
     title = f"Positions of joints {', '.join(map(str, trace.joints))} over time, each within its own range"
-    text = f'<text x="{MARGIN}" y="{HEIGHT + 14}" font-size="12" font-family="sans-serif">{"".join(labels)}</text>'
-    size = f'width="{WIDTH}" height="{HEIGHT + 20}" viewBox="0 0 {WIDTH} {HEIGHT + 20}"'
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" {size}><title>{title}</title>{"".join(lines)}{text}</svg>'
-    )
+    found = [f"<title>{title}</title>"]
+    frame = f'width="{WIDTH - 1}" height="{HEIGHT - 1}" fill="none" stroke="currentColor" stroke-opacity="0.3"'
+    found.append(f'<rect x="0.5" y="0.5" {frame}/>')
+    if len(trace):
+        for column, joint in enumerate(trace.joints):
+            points = _points(trace.time, trace.position[:, column])
+            stroke = f'stroke="{_colour(joint)}" stroke-width="1.5" stroke-linejoin="round"'
+            found.append(f'<polyline fill="none" {stroke} points="{points}"/>')
+        for x, anchor, time in ((0, "start", trace.time[0]), (WIDTH, "end", trace.time[-1])):
+            place = f'x="{x}" y="{HEIGHT + 14}" text-anchor="{anchor}"'
+            found.append(
+                f'<text {place} fill="currentColor" font-size="11" font-family="sans-serif">{time:.1f} s</text>'
+            )
+    size = f'width="{WIDTH}" height="{HEIGHT + 20}" viewBox="0 0 {WIDTH} {HEIGHT + 20}" style="max-width:100%"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" role="img" {size}>{"".join(found)}</svg>'
+
+
+def _key(trace: Recorded) -> str:
+    """Colour, number, name and range of each joint."""
+    found = []
+    names = joint_names(trace.record.machine, trace.joints)
+    for column, (joint, name) in enumerate(zip(trace.joints, names, strict=True)):
+        label = f"joint {int(joint)}" if name == f"joint_{joint}" else f"{int(joint)} {name}"
+        if len(trace):
+            low, high, unit = _range(trace, column)
+            label += f": {low:.1f} to {high:.1f}{unit}"
+        mark = f'<span style="color:{_colour(joint)}">&#9644;</span>'
+        found.append(f'<span style="white-space:nowrap;margin-right:1em">{mark} {escape(label)}</span>')
+    return f"<small>{' '.join(found)}</small>"
+
+
+def _range(trace: Recorded, column: int) -> tuple[float, float, str]:
+    """Least and greatest position of a joint in degrees or mm, as people read them, with the unit."""
+    scale, unit = (1000.0, " mm") if is_prismatic(trace, trace.joints[column]) else (180 / np.pi, "°")
+    values = trace.position[:, column] * scale
+    return float(values.min()), float(values.max()), unit
+
+
+def _colour(joint: int) -> str:
+    return JOINT_COLOURS[(joint - 1) % len(JOINT_COLOURS)]
 
 
 def _points(time: NDArray[np.float64], values: NDArray[np.float64]) -> str:

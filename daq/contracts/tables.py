@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from daq.contracts.extras import require_extra
+from daq.contracts.machine import joint_names
 from daq.contracts.recorded import Recorded
 
 if TYPE_CHECKING:
@@ -26,14 +27,6 @@ def units_of(trace: Recorded) -> dict[str, str]:
     return own | {"time": "s", "host_time": "s", "drive": drive, "power_raw": "DAC counts", "tick": "1", "status": "1"}
 
 
-def joint_names(trace: Recorded) -> tuple[str, ...]:
-    """Names of the trace's joints: the machine's, else joint_1 and so on."""
-    machine = trace.record.machine
-    if machine is None or max(trace.joints) > len(machine.joints):
-        return tuple(f"joint_{joint}" for joint in trace.joints)
-    return tuple(machine.joint(joint).name for joint in trace.joints)
-
-
 def attributes_of(trace: Recorded) -> dict[str, Any]:
     """What a table says of its trace, in types that every file format has."""
     record = trace.record
@@ -48,7 +41,7 @@ def attributes_of(trace: Recorded) -> dict[str, Any]:
         "operator": record.operator,
         "notes": record.notes,
         "joints": list(trace.joints),
-        "joint_names": list(joint_names(trace)),
+        "joint_names": list(joint_names(trace.record.machine, trace.joints)),
     }
     return {name: value for name, value in found.items() if value is not None}
 
@@ -91,14 +84,17 @@ def to_xarray(trace: Recorded) -> xr.Dataset:
     coordinates = {
         "time": ("time", trace.time, {"units": "s"}),
         "joint": ("joint", list(trace.joints)),
-        "joint_name": ("joint", list(joint_names(trace))),
+        "joint_name": ("joint", list(joint_names(trace.record.machine, trace.joints))),
     }
     return xr.Dataset(found, coordinates, attributes_of(trace))
 
 
-def _unit_of_position(trace: Recorded) -> str:
+def is_prismatic(trace: Recorded, joint: int) -> bool:
+    """Whether a joint slides; one of an unknown machine turns."""
     machine = trace.record.machine
-    if machine is None or max(trace.joints) > len(machine.joints):
-        return "rad"
-    kinds = {machine.joint(joint).kind == "prismatic" for joint in trace.joints}
+    return machine is not None and joint <= len(machine.joints) and machine.joint(joint).kind == "prismatic"
+
+
+def _unit_of_position(trace: Recorded) -> str:
+    kinds = {is_prismatic(trace, joint) for joint in trace.joints}
     return "rad or m" if len(kinds) > 1 else ("m" if kinds == {True} else "rad")

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic_core import from_json
 
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import TraceEvent, TraceRecord
+from daq.contracts.trace import TraceEvent
 from daq.traces.cdr import HEADER
 
 SUFFIX = ".mcap"
@@ -129,14 +129,6 @@ def json_object(text: str | bytes) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError("it is no JSON object")  # noqa: TRY004  # what is wrong is the text, not a type here
     return found
-
-
-def joint_names(record: TraceRecord, joints: tuple[int, ...]) -> tuple[str, ...]:
-    """Names of joints for JointStates: the machine's, else joint_1 and so on."""
-    machine = record.machine
-    if machine is None or max(joints) > len(machine.joints):
-        return tuple(f"joint_{joint}" for joint in joints)
-    return tuple(machine.joint(joint).name for joint in joints)
 
 
 def compact(data: object) -> bytes:

@@ -9,6 +9,7 @@ from typing import IO
 from mcap.writer import CompressionType, Writer
 
 from daq.contracts.errors import TraceError
+from daq.contracts.machine import joint_names
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TRACE_FORMAT, Outcome, TraceEvent, TraceRecord
 from daq.traces import cdr, layout
@@ -65,7 +66,7 @@ class Recording:
         self._first: SampleRow | None = None
         self._events = 0
         self._start_ns = layout.nanoseconds(record.created)
-        self._names = layout.joint_names(record, joints)
+        self._names = joint_names(record.machine, joints)
         self._encoder = JointStates(self._names, record.drive_unit in ("N·m", "N") and "drive" in signals)
         self._mcap = open_mcap(stream)
         self._schemas: dict[str, int] = {}
