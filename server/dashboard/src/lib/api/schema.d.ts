@@ -5217,7 +5217,7 @@ export interface components {
         TraceRecord: {
             /**
              * Format
-             * @default 1
+             * @default 2
              */
             format?: number;
             /** Trace Id */
