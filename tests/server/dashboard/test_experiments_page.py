@@ -103,7 +103,7 @@ def test_a_preset_fills_the_form_and_can_be_changed_as_text(dashboard: Dashboard
 
 def test_joints_can_have_amplitudes_starts_and_gains_of_their_own(dashboard: Dashboard, form: Page) -> None:
     form.get_by_role("checkbox", name="Joint 3 moves").uncheck()
-    form.get_by_role("checkbox", name="An amplitude of its own").check()
+    form.get_by_role("checkbox", name="A different amplitude for each joint").check()
     form.get_by_role("textbox", name="Amplitude of joint 1").fill("4")
     form.get_by_role("textbox", name="Amplitude of joint 2").fill("-3")
     form.get_by_role("textbox", name="Start of joint 3").fill("30")
