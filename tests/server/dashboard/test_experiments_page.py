@@ -228,7 +228,7 @@ def test_whoever_uses_the_page_attends_what_runs_on_a_real_arm(paused: Dashboard
 
     page.on("request", note)
     paused.open("experiments")
-    expect(page.get_by_text("Paused", exact=True)).to_be_visible()
+    expect(page.get_by_text("Paused:", exact=True)).to_be_visible()
     expect(page.get_by_role("button", name="I am present")).to_be_visible()
     assert [url for url in requested if "attend" in url] == []
     with page.expect_request("**/queue/attend"):
