@@ -228,7 +228,7 @@ def test_whoever_uses_the_page_attends_what_runs_on_a_real_arm(paused: Dashboard
 
     page.on("request", note)
     paused.open("experiments")
-    expect(page.get_by_text("Paused", exact=True)).to_be_visible()
+    expect(page.get_by_text("Paused:", exact=True)).to_be_visible()
     expect(page.get_by_role("button", name="I am present")).to_be_visible()
     assert [url for url in requested if "attend" in url] == []
     with page.expect_request("**/queue/attend"):
@@ -307,7 +307,7 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
 def test_a_schedule_may_begin_later(dashboard: Dashboard, form: Page) -> None:
     form.get_by_label("Repeatedly").check()
     form.get_by_label("First run").fill("2199-01-02T03:04")
-    form.get_by_role("button", name="Schedule it").click()
+    form.get_by_role("button", name="Add the schedule").click()
     expect(form.get_by_text(re.compile("scheduled every .*, first 02 Jan 2199"))).to_be_visible()
     made = dashboard.service.robot.get("/schedules", params={"limit": 1}).json()["items"][0]
     assert made["next"].startswith(("2199-01-01", "2199-01-02"))
