@@ -84,7 +84,7 @@ def test_a_search_that_was_left_with_the_emergency_stop_pressed_begins_with_the_
     record = Record.of(tmp_path)
     record.note_stop(True)
     said = daq("--port", MOCK, "memory", "find", "-o", tmp_path / "memory_map.toml")
-    assert said.code == 1
+    assert said.code == 130
     assert "Keep it pressed; this comes first." in said.err
     assert "Only while it is off, release the emergency stop." in said.err
     assert Record.of(tmp_path).stop_pressed
