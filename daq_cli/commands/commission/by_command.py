@@ -145,7 +145,13 @@ def model(bench: Bench) -> dict[str, Any]:
             if one.counts is not None
         },
     }
-    return result | _diagnosed(bench, begin, trace) if above else result
+    if not above:
+        return result
+    try:
+        return result | _diagnosed(bench, begin, trace)
+    except SpecError as error:  # the comparison stands without it
+        bench.operator.show(f"no diagnosis: {error}")
+        return result | {"verdict": "no diagnosis", "diagnosis": str(error)}
 
 
 def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
