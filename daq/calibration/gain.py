@@ -107,7 +107,8 @@ def estimate_gain(
             "make larger steps"
         )
         return NoEstimate(joint, reason, len(errors), saturated)
-    to_volts_per_rad = machine.joint(joint).dc_motor.scale.counts_to_volts(1) / machine.calibration(joint).rad_per_count
+    volts = machine.joint(joint).dc_motor.scale.counts_to_volts(machine.drive_sign(joint))
+    to_volts_per_rad = volts / machine.calibration(joint).rad_per_count
     return GainEstimate(
         joint=joint,
         gain=gain,
