@@ -73,7 +73,10 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
     count = len(decoded.samples[0])
     if end is not None and end.get("samples", str(count)) != str(count):
         raise TraceError(f"{origin}: has {count} samples, and says at its end that they are {end['samples'][:20]}")
-    signals = _signals(signals_of(start, origin), decoded)
+    named = signals_of(start, origin)
+    if "taken" in named and decoded.taken is None and count:
+        raise TraceError(f"{origin}: is not laid out as a trace: it has no topic {layout.SET_POINTS_TOPIC}")
+    signals = _signals(named, decoded)
     check_signals(signals, origin)
     check_record(record, decoded.events, origin)
     return Trace(record, joints, events=decoded.events, **signals)
@@ -93,4 +96,6 @@ def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, NDArray[Any]]
         found["power_raw"] = columns("power_raw").astype(np.int64)
     if "status" in names:
         found["status"] = first["status"].astype(np.int64)
+    if "taken" in names and decoded.taken is not None:
+        found["taken"] = decoded.taken["taken"].copy()
     return found

@@ -82,6 +82,10 @@ class Recording:
             for joint, name in zip(joints, self._names, strict=True)
         ]
         self._log = self._mcap.register_channel(layout.EVENTS_TOPIC, "json", log)
+        self._taken: int | None = None
+        if "taken" in signals:
+            taken = self._mcap.register_schema(layout.SET_POINTS_SCHEMA, "ros2msg", layout.schema("SetPointsTaken.msg"))
+            self._taken = self._mcap.register_channel(layout.SET_POINTS_TOPIC, "cdr", taken)
 
     def row(self, row: SampleRow) -> None:
         """Adds one control period.
@@ -96,6 +100,8 @@ class Recording:
         self._mcap.add_message(self._states, logged, states, published, self.samples)
         for column, channel in enumerate(self._joints):
             self._mcap.add_message(channel, logged, layout.joint_sample(row, column), published, self.samples)
+        if self._taken is not None:
+            self._mcap.add_message(self._taken, logged, layout.set_points_taken(row), published, self.samples)
         self.samples += 1
         self.last_time = row.time
 
