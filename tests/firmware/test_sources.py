@@ -14,7 +14,7 @@ from firmware_protocol.errors import MemoryMapError
 from firmware_protocol.memory_map import default_memory_map
 from tests.firmware.compiled import BUILD, SOURCES, made, need
 
-MOST_CORE_FLASH = 6_900
+MOST_CORE_FLASH = 6_400
 """Bytes that the core may take of an AVR's flash, compiled alone."""
 MOST_CORE_RAM = 1_536
 """Bytes of RAM that it may take, its ring of 32 snapshots included."""
