@@ -88,25 +88,39 @@ def recorded(
     seed: int,
     plant: str | None = None,
     board: str | None = None,
+    modify: Sequence[str] = (),
     *,
     baud: int = 115_200,
 ) -> list[Trace]:
-    """Traces of experiments, one after the other on one mock in lock-step."""
-    with tempfile.TemporaryDirectory() as name, connected(Path(name), seed, plant, board, baud=baud) as controller:
-        return [_recorded(controller, spec, machine, Path(name)) for spec in specs]
+    """Traces of experiments, one after the other on one mock in lock-step, with these hidden effects."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with connected(folder, seed, plant, board, modify, baud=baud) as controller:
+            return [_recorded(controller, spec, machine, folder) for spec in specs]
 
 
 @contextmanager
 def connected(
-    folder: Path, seed: int, plant: str | None = None, board: str | None = None, *, baud: int = 115_200
+    folder: Path,
+    seed: int,
+    plant: str | None = None,
+    board: str | None = None,
+    modify: Sequence[str] = (),
+    *,
+    baud: int = 115_200,
 ) -> Iterator[Controller]:
-    """A new mock in lock-step, whose files lie in a folder."""
-    options: dict[str, str] = {"lock_step": "1", "seed": str(seed), "baud": str(baud)}
+    """A new mock in lock-step with these hidden effects, whose files lie in a folder."""
+    options: dict[str, str | list[str]] = {
+        "lock_step": "1",
+        "seed": str(seed),
+        "baud": str(baud),
+        "modify": list(modify),
+    }
     for kind, text in (("plant", plant), ("board", board)):
         if text is not None:
             (folder / f"{kind}.toml").write_text(text, "utf-8")
             options[kind] = str(folder / f"{kind}.toml")
-    with Controller.connect(f"mock://?{urlencode(options)}") as controller:
+    with Controller.connect(f"mock://?{urlencode(options, doseq=True)}") as controller:
         yield controller
 
 
