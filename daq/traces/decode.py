@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import layout
+from daq.traces import layout, set_points_taken
 from daq.traces.scan import UNREADABLE, Scan, payloads, require
 
 Samples = NDArray[Any]
-"""Samples of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`; or when set points were taken, (n,) of
-`layout.SET_POINTS_TAKEN_DTYPE`."""
+"""Samples of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +24,13 @@ class Decoded:
     the file tells; and the events."""
 
     samples: tuple[Samples, ...]
-    taken: Samples | None
+    taken: NDArray[Any] | None
     events: tuple[TraceEvent, ...]
 
-    def require_same_ticks(self) -> None:
-        """Raises ValueError where a period is not there for all joints."""
-        others = self.samples[1:] if self.taken is None else (*self.samples[1:], self.taken)
-        if any(not np.array_equal(other["tick"], self.samples[0]["tick"]) for other in others):
-            raise ValueError("the joints do not have the same ticks")
+    @property
+    def of_periods(self) -> tuple[NDArray[Any], ...]:
+        """Messages of every topic that has one in each recorded period."""
+        return self.samples if self.taken is None else (*self.samples, self.taken)
 
 
 def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded:
@@ -42,9 +40,9 @@ def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded
     empty = np.empty(0, layout.JOINT_SAMPLE_DTYPE)
     samples = tuple(np.concatenate([empty, *(part.samples[column] for part in parts)]) for column in range(len(joints)))
     times = [part.taken for part in parts if part.taken is not None]
-    taken = np.concatenate([np.empty(0, layout.SET_POINTS_TAKEN_DTYPE), *times]) if decoder.tells_taken else None
+    taken = np.concatenate([set_points_taken.read([]), *times]) if decoder.tells_taken else None
     decoded = Decoded(samples, taken, tuple(event for part in parts for event in part.events))
-    decoded.require_same_ticks()
+    _require_same_ticks(decoded.of_periods)
     return decoded
 
 
@@ -62,7 +60,7 @@ def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimit
     for number, chunk in enumerate(found.chunks):
         try:
             decoded = decoder.chunk(chunk)
-            decoded.require_same_ticks()
+            _require_same_ticks(decoded.of_periods)
             time = decoded.samples[0]["time"]
             if not (np.diff(time, prepend=last) > 0).all():
                 raise ValueError("its time does not increase")
@@ -81,8 +79,8 @@ class _Decoder:
         self._event_count, self._most_events = 0, limits.events
         channels = _channels(found)
         self._joints = [channels.get(f"{layout.JOINT_TOPIC}{joint}") for joint in joints]
-        self._taken = channels.get(layout.SET_POINTS_TOPIC)
         self._events = channels.get(layout.EVENTS_TOPIC)
+        self._taken = set_points_taken.channel_in(found)
 
     @property
     def tells_taken(self) -> bool:
@@ -98,39 +96,39 @@ class _Decoder:
         self._records_left -= count
         if not seen <= self._known:
             raise ValueError(f"channel {min(seen - self._known)} is not defined")
-        samples = tuple(
-            _samples(parts[channel] if channel is not None else [], layout.JOINT_SAMPLE_DTYPE)
-            for channel in self._joints
-        )
-        taken = None if self._taken is None else _samples(parts[self._taken], layout.SET_POINTS_TAKEN_DTYPE)
+        samples = tuple(_samples(parts[channel] if channel is not None else []) for channel in self._joints)
+        taken = None if self._taken is None else set_points_taken.read(parts[self._taken])
         events = parts[self._events] if self._events is not None else []
         self._event_count += len(events)
         require(self._event_count, self._most_events, "there are more than {} events", "events")
         return Decoded(samples, taken, tuple(layout.event_of(message) for message in events))
 
 
+def _require_same_ticks(samples: tuple[NDArray[Any], ...]) -> None:
+    if any(not np.array_equal(other["tick"], samples[0]["tick"]) for other in samples[1:]):
+        raise ValueError("the topics do not have the same ticks")
+
+
 def _channels(found: Scan) -> dict[str, int]:
-    """Channel of each topic. Raises ValueError where a schema is not ours, or a topic has two channels."""
+    """Channel of each topic. Raises ValueError where a joint's schema is not ours, or a topic has two channels."""
     channels: dict[str, int] = {}
     for channel in found.channels.values():
         schema = found.schemas.get(channel.schema_id)
         name = schema.name if schema else ""
-        expected = _schema_of(channel.topic)
-        if expected is not None and (name, channel.message_encoding) != (expected, "cdr"):
-            raise ValueError(f"topic {channel.topic} has schema {name!r}, expected {expected!r} in CDR")
+        if channel.topic.startswith(layout.JOINT_TOPIC) and (name, channel.message_encoding) != (
+            layout.JOINT_SCHEMA,
+            "cdr",
+        ):
+            raise ValueError(f"topic {channel.topic} has schema {name!r}, expected {layout.JOINT_SCHEMA!r} in CDR")
         if channels.setdefault(channel.topic, channel.id) != channel.id:
             raise ValueError(f"topic {channel.topic} has two channels")
     return channels
 
 
-def _schema_of(topic: str) -> str | None:
-    """The schema that a topic must have; None where it is not read as samples."""
-    if topic == layout.SET_POINTS_TOPIC:
-        return layout.SET_POINTS_SCHEMA
-    return layout.JOINT_SCHEMA if topic.startswith(layout.JOINT_TOPIC) else None
-
-
-def _samples(parts: list[bytes], dtype: np.dtype[Any]) -> Samples:
-    if any(len(part) != dtype.itemsize for part in parts):
-        raise ValueError(f"a sample does not have {dtype.itemsize} bytes")
-    return np.frombuffer(b"".join(parts), dtype)
+def _samples(parts: list[bytes]) -> Samples:
+    data = b"".join(parts)
+    if len(data) != len(parts) * layout.JOINT_SAMPLE_BYTES or any(
+        len(part) != layout.JOINT_SAMPLE_BYTES for part in parts
+    ):
+        raise ValueError(f"a sample does not have {layout.JOINT_SAMPLE_BYTES} bytes")
+    return np.frombuffer(data, layout.JOINT_SAMPLE_DTYPE)

@@ -28,11 +28,7 @@ EVENTS_TOPIC = "/events"
 JOINT_TOPIC = "/joint/"
 """Topic of one joint, followed by its number, from 1."""
 
-SET_POINTS_TOPIC = "/set_points"
-"""Topic of the periods in which set points were taken. Only records of slow lines have it."""
-
 JOINT_SCHEMA = "ma2000_daq/msg/JointSample"
-SET_POINTS_SCHEMA = "ma2000_daq/msg/SetPointsTaken"
 JOINT_STATES_SCHEMA = "foxglove.JointStates"
 EVENT_SCHEMA = "foxglove.Log"
 
@@ -63,8 +59,9 @@ ALL_SIGNALS = (
 )
 """Columns of a trace."""
 
-_CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _JOINT_SAMPLE = struct.Struct("<4s2dq5diI")
+JOINT_SAMPLE_BYTES = _JOINT_SAMPLE.size
 JOINT_SAMPLE_DTYPE = np.dtype(
     [
         ("cdr", "S4"),
@@ -81,9 +78,6 @@ JOINT_SAMPLE_DTYPE = np.dtype(
     ]
 )
 """schemas/JointSample.msg in CDR: a 4-byte header, then every field on its natural boundary, without padding."""
-_SET_POINTS_TAKEN = struct.Struct("<4s2q")
-SET_POINTS_TAKEN_DTYPE = np.dtype([("cdr", "S4"), ("tick", "<i8"), ("taken", "<i8")])
-"""schemas/SetPointsTaken.msg in CDR."""
 
 _LEVELS: dict[EventKind, int] = {
     **dict.fromkeys(("limit", "pause", "retry", "missing", "missed_set_point", "stop"), 3),
@@ -112,7 +106,7 @@ def timestamp(utc_ns: int) -> dict[str, int]:
 def joint_sample(row: SampleRow, column: int) -> bytes:
     """The sample of one joint: `column` is its index in the row."""
     return _JOINT_SAMPLE.pack(
-        _CDR_LITTLE_ENDIAN,
+        CDR_LITTLE_ENDIAN,
         row.time,
         row.host_time,
         row.tick,
@@ -124,11 +118,6 @@ def joint_sample(row: SampleRow, column: int) -> bytes:
         row.power_raw[column],
         row.status,
     )
-
-
-def set_points_taken(row: SampleRow) -> bytes:
-    """When the set points of a row were taken."""
-    return _SET_POINTS_TAKEN.pack(_CDR_LITTLE_ENDIAN, row.tick, row.taken)
 
 
 def joint_states(row: SampleRow, utc_ns: int, names: tuple[str, ...], effort: bool) -> bytes:

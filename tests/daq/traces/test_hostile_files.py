@@ -17,7 +17,7 @@ from benchmarks.trace_damage import campaign
 from benchmarks.trace_damage import record as sound_record
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import layout
+from daq.traces import layout, set_points_taken
 from daq.traces.catalogue import list_traces
 from daq.traces.fields import CompressedChunk
 from daq.traces.inflate import inflate
@@ -205,7 +205,7 @@ def test_a_value_that_no_rig_can_have_measured_is_refused(
     def changed(chunk: bytes) -> bytes:
         data = bytearray(chunk)
         for opcode, begin, end in records(bytes(8) + chunk):
-            if opcode == Opcode.MESSAGE and end - begin == HEAD + 22 + layout.JOINT_SAMPLE_DTYPE.itemsize:
+            if opcode == Opcode.MESSAGE and end - begin == HEAD + 22 + layout.JOINT_SAMPLE_BYTES:
                 at = begin - 8 + HEAD + 22 + place
                 data[at : at + 8] = sample
         return bytes(data)
@@ -216,7 +216,7 @@ def test_a_value_that_no_rig_can_have_measured_is_refused(
 
 def test_a_record_of_a_slow_line_that_does_not_tell_each_sample_s_set_points_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", every=2)
-    least = HEAD + 22 + layout.SET_POINTS_TAKEN_DTYPE.itemsize
+    least = HEAD + 22 + set_points_taken.DTYPE.itemsize
     left_out = 0
 
     def changed(chunk: bytes) -> bytes:
@@ -227,7 +227,7 @@ def test_a_record_of_a_slow_line_that_does_not_tell_each_sample_s_set_points_is_
 
     line = refused(tmp_path / "b.mcap", recompressed(path.read_bytes(), "zstd", changed))
     assert left_out >= 1
-    assert "the joints do not have the same ticks" in line
+    assert "the topics do not have the same ticks" in line
 
 
 @pytest.mark.parametrize(

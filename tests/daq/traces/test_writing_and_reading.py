@@ -68,28 +68,6 @@ def test_a_recording_reads_back_to_the_bit(
         np.testing.assert_array_equal(getattr(trace, name), [getattr(sample, name) for sample in rows])
 
 
-def test_a_record_of_a_slow_line_tells_when_set_points_were_taken(tmp_path: Path) -> None:
-    with TraceWriter(tmp_path / "a.mcap", record(every=4), JOINTS) as writer:
-        for tick in range(0, 40, 4):
-            writer.sample(row(tick, taken=max(0, tick - 2)))
-        writer.close("complete")
-    trace = read_trace(tmp_path / "a.mcap")
-    assert trace.taken is not None
-    assert trace.taken.tolist() == [0, *range(2, 38, 4)]
-    again = read_trace(write_trace(trace, tmp_path / "b.mcap"))
-    np.testing.assert_array_equal(again.taken, trace.taken)  # type: ignore[arg-type]
-    with (tmp_path / "a.mcap").open("rb") as stream:
-        schemas = {schema.name for schema, channel, _ in make_reader(stream).iter_messages() if schema is not None}
-    assert "ma2000_daq/msg/SetPointsTaken" in schemas
-
-
-def test_a_record_of_a_fast_line_shows_every_set_point_itself(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mcap")
-    assert read_trace(path).taken is None
-    with path.open("rb") as stream:
-        assert layout.SET_POINTS_TOPIC not in {channel.topic for _, channel, _ in make_reader(stream).iter_messages()}
-
-
 def test_the_record_the_outcome_and_the_events_read_back(tmp_path: Path) -> None:
     trace = read_trace(write(tmp_path / "a.mcap", notes="two\nlines, 21.6°", operator="A"))
     expected = {"outcome": "complete", "counters": {"missing_samples": 0, "retries": 3}}
