@@ -67,18 +67,24 @@ static uint16_t read_again_us;
 static uint8_t periods_to_take; /* results still to come before those that must show what is in the set points */
 static uint32_t missed;
 
-void period_start(enum period_source period_source)
+/* Nothing is known of the controller: the state at the start, and after a reset of the board. */
+static void forget(void)
 {
-    source = period_source;
     following = SEARCHING;
     tick = 0;
-    has_supply = true;
     unchanged_periods = 0;
     is_read_once = false;
     periods_to_take = 0;
-    missed = 0;
     ring_clear();
-    read_positions(positions);
+}
+
+void period_start(enum period_source period_source)
+{
+    source = period_source;
+    has_supply = true;
+    missed = 0;
+    forget();
+    (void)read_positions(positions);
 }
 
 bool period_newest_is_current(void)
@@ -119,27 +125,20 @@ static void begin_new_life(void)
 {
     session_board_was_reset();
     sampling_board_was_reset();
-    ring_clear();
-    following = SEARCHING;
-    tick = 0;
-    periods_to_take = 0;
-    unchanged_periods = 0;
-    is_read_once = false;
+    forget();
 }
 
 /* Reads the positions. True when they differ from the last look, and the board had its supply at both. */
 static bool look(void)
 {
-    uint16_t seen[JOINTS];
-    read_positions(seen);
-    const bool powered = !all_zero(seen);
-    const bool changed = has_supply && powered && memcmp(seen, positions, sizeof seen) != 0;
+    const bool differ = read_positions(positions);
+    const bool powered = !all_zero(positions);
+    const bool changed = has_supply && powered && differ;
     if (powered != has_supply && (!powered || session_is_open())) {
         begin_new_life(); /* when the supply fails, and when it returns to hosts that have greeted meanwhile */
     }
     has_supply = powered;
     moment_was(POSITIONS_SEEN, 0);
-    memcpy(positions, seen, sizeof seen);
     return changed;
 }
 

@@ -35,7 +35,7 @@ static uint16_t read_word(uint8_t low, uint8_t high)
     return (uint16_t)(low_byte | ((uint16_t)read_at(high) << 8));
 }
 
-static uint16_t read_position(uint8_t joint)
+uint16_t read_position(uint8_t joint)
 {
     return (uint16_t)(read_word(position_low[joint], position_high[joint]) & MASK_OF(POSITION_BITS));
 }
@@ -54,6 +54,11 @@ static uint16_t read_error(uint8_t joint)
     const uint16_t sign = (uint16_t)(1u << (ERROR_BITS - 1));
     return (uint16_t)((raw ^ sign) - sign);
 #endif
+}
+
+bool has_joint(uint8_t mask, uint8_t joint)
+{
+    return ((unsigned)mask >> joint & 1u) != 0;
 }
 
 void read_joint(uint8_t joint, struct reading *reading)
@@ -90,11 +95,15 @@ void write_set_point(uint8_t joint, uint16_t posture)
     write_at(set_point_high[joint], (uint8_t)(posture >> 8));
 }
 
-void read_positions(uint16_t counts[JOINTS])
+bool read_positions(uint16_t counts[JOINTS])
 {
+    bool differ = false;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        const uint16_t before = counts[joint];
         counts[joint] = read_position(joint);
+        differ |= counts[joint] != before;
     }
+    return differ;
 }
 
 bool all_zero(const uint16_t counts[JOINTS])

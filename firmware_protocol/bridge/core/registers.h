@@ -7,6 +7,9 @@
 
 #include "protocol.h"
 
+/* Whether a mask has the bit of a joint. */
+bool has_joint(uint8_t mask, uint8_t joint);
+
 /* What the memory has of a joint, packed: 10 + 12 + 16 + 8 bits. */
 struct reading {
     uint8_t set_point_low; /* posture units */
@@ -27,8 +30,11 @@ uint16_t position_of(const struct reading *reading);
 uint16_t read_set_point(uint8_t joint);
 void write_set_point(uint8_t joint, uint16_t posture);
 
-/* Reads the positions (ADC counts) byte by byte. */
-void read_positions(uint16_t counts[JOINTS]);
+/* Reads a position (ADC counts) byte by byte. */
+uint16_t read_position(uint8_t joint);
+
+/* Reads all positions. Whether one is another than was there. */
+bool read_positions(uint16_t counts[JOINTS]);
 
 /* Whether no position is other than 0: the memory of a board without supply. */
 bool all_zero(const uint16_t counts[JOINTS]);

@@ -1,7 +1,5 @@
 #include "stop.h"
 
-#include <string.h>
-
 #include "framing.h"
 #include "moments.h"
 #include "numbers.h"
@@ -23,7 +21,7 @@ static uint16_t sequence;
 static uint8_t readings;
 static uint16_t newest[JOINTS];    /* ADC counts, of the newest reading */
 static uint16_t to_freeze[JOINTS]; /* of each joint what two readings in a row agreed on last, else the newest */
-static uint8_t joints_agreed;      /* a mask: two readings in a row have agreed on them */
+static bool agreed[JOINTS];        /* two readings in a row have agreed on it */
 
 void stop_start(bool begin_frozen)
 {
@@ -74,29 +72,28 @@ void stop_request(uint16_t request_sequence)
     } else {
         reading_posture = true;
         readings = 1;
-        joints_agreed = 0;
+        for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+            agreed[joint] = false;
+        }
         moment_was(POSTURE_READ, 0);
-        read_positions(newest);
+        (void)read_positions(newest);
     }
 }
 
 /* Reads the positions again. True when every joint reads as before. */
 static bool read_again(void)
 {
-    uint16_t before[JOINTS];
     bool all_agree = true;
-    memcpy(before, newest, sizeof before);
     moment_was(POSTURE_READ, 0);
-    read_positions(newest);
     ++readings;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        const bool agrees = newest[joint] == before[joint];
-        if (agrees || !has_joint(joints_agreed, joint)) {
-            to_freeze[joint] = newest[joint];
+        const uint16_t counts = read_position(joint);
+        const bool agrees = counts == newest[joint];
+        if (agrees || !agreed[joint]) {
+            to_freeze[joint] = counts;
         }
-        if (agrees) {
-            joints_agreed = (uint8_t)(joints_agreed | (1u << joint));
-        }
+        newest[joint] = counts;
+        agreed[joint] |= agrees;
         all_agree &= agrees;
     }
     return all_agree;
