@@ -39,4 +39,5 @@ class RowMaker:
             drive=tuple(scale.counts_to_volts(r.power) for scale, r in zip(self._scales, readings, strict=True)),
             power_raw=tuple(reading.power for reading in readings),
             status=int(snapshot.flags),
+            taken=snapshot.taken or 0,
         )
