@@ -1,6 +1,7 @@
 """Traces as tables, arrays and their files, which pandas, pyarrow and xarray read; and as a notebook shows them."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,3 +65,17 @@ def test_a_notebook_shows_a_small_picture_without_scripts_and_names_are_no_html(
     assert len(page) < 20_000
     svg = ET.fromstring(page[page.index("<svg") : page.index("</svg>") + 6])
     assert len(svg.findall("{http://www.w3.org/2000/svg}polyline")) == (3 if samples else 0)
+
+
+def test_a_joint_at_rest_is_a_straight_line_beside_one_that_moves(tmp_path: Path) -> None:
+    trace = read_trace(write(tmp_path / "a.mcap", 50))
+    still = trace.position.copy()
+    still[:, 1] = 1.0 + 1e-4 * (np.arange(50) % 2)
+    page = replace(trace, position=still)._repr_html_()
+    svg = ET.fromstring(page[page.index("<svg") : page.index("</svg>") + 6])
+    lines = [line.attrib["points"].split() for line in svg.findall("{http://www.w3.org/2000/svg}polyline")]
+    spans = [np.ptp([float(point.split(",")[1]) for point in line]) for line in lines]
+    assert spans == sorted(spans)
+    assert spans[0] < 1
+    assert spans[1] > 50
+    assert "2 shoulder: 57.3°" in page
