@@ -77,7 +77,7 @@ def _colour(joint: int) -> str:
 def _moved(trace: Recorded) -> NDArray[np.float64]:
     """Positions (n, joints) since the first sample, as shares of the widest range among joints of the same kind and
     shifted into 0 to 1: so a joint at rest is a straight line, whatever its sensor's noise."""
-    found = trace.position - trace.position[0]
+    found: NDArray[np.float64] = trace.position - trace.position[0]
     slides = np.array([is_prismatic(trace, joint) for joint in trace.joints])
     for kind in (slides, ~slides):
         if kind.any():

@@ -8,7 +8,9 @@ import pytest
 from mcap.reader import make_reader
 
 from daq.contracts.trace import TRACE_FORMAT, TraceEvent
+from daq.traces.catalogue import list_traces
 from daq.traces.naming import part_path
+from daq.traces.plot import plot_trace
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage
 from daq.traces.store import write_trace
@@ -34,6 +36,15 @@ def test_a_trace_of_format_1_is_read_with_its_events() -> None:
     np.testing.assert_array_equal(trace.position, [row(tick).position for tick in range(40)])
     assert trace.events == EVENTS
     assert verify(FORMAT_1).trustworthy
+
+
+def test_a_trace_of_format_1_is_drawn_listed_and_shown_in_a_notebook(tmp_path: Path) -> None:
+    shutil.copy(FORMAT_1, tmp_path / "old.mcap")
+    trace = read_trace(tmp_path / "old.mcap")
+    assert plot_trace(trace, tmp_path / "old.svg").stat().st_size > 10_000
+    (listed,) = list_traces(tmp_path)
+    assert (listed.state, listed.samples, listed.outcome) == ("finished", 40, "complete")
+    assert "40 samples, 0 missing, complete" in trace._repr_html_()
 
 
 def test_a_trace_of_format_1_is_written_again_in_the_format_of_today(tmp_path: Path) -> None:
