@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 BY_JOINT = ("position", "set_point", "error", "drive", "velocity", "power_raw")
-BY_SAMPLE = ("tick", "host_time", "status")
+BY_SAMPLE = ("tick", "host_time", "status", "taken")
 
 
 def units_of(trace: Recorded) -> dict[str, str]:
@@ -24,7 +24,8 @@ def units_of(trace: Recorded) -> dict[str, str]:
     if " " not in length:
         own["velocity"] = f"{length}/s"
     drive = trace.record.drive_unit or "V"
-    return own | {"time": "s", "host_time": "s", "drive": drive, "power_raw": "DAC counts", "tick": "1", "status": "1"}
+    counted = {"power_raw": "DAC counts", "tick": "1", "status": "1", "taken": "1"}
+    return own | {"time": "s", "host_time": "s", "drive": drive} | counted
 
 
 def attributes_of(trace: Recorded) -> dict[str, Any]:

@@ -43,4 +43,5 @@ class RowMaker:
             ),
             power_raw=tuple(reading.power for reading in readings),
             status=int(snapshot.flags),
+            taken=snapshot.taken or 0,
         )

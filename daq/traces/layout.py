@@ -52,6 +52,8 @@ OPTIONAL_SIGNALS = ("set_point", "error", "drive", "velocity")
 """Signals a sample may lack (NaN)."""
 RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "error", "drive", "power_raw")
 """Signals that a recording of the controller has."""
+SLOW_LINE_SIGNALS = (*RECORDED_SIGNALS, "taken")
+"""The same where only every n-th period has a sample."""
 
 ALL_SIGNALS = (
     "time",
@@ -64,6 +66,7 @@ ALL_SIGNALS = (
     "tick",
     "host_time",
     "status",
+    "taken",
 )
 """Columns of a trace."""
 

@@ -12,7 +12,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.machine import joint_names
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TRACE_FORMAT, Outcome, TraceEvent, TraceRecord
-from daq.traces import cdr, layout
+from daq.traces import cdr, layout, set_points_taken
 from daq.traces.cdr import JointStates
 from daq.traces.scan import Scan
 
@@ -89,6 +89,9 @@ class Recording:
         ]
         self._event = self._channel(layout.EVENTS_TOPIC, layout.EVENT_SCHEMA)
         self._log = self._channel(layout.LOG_TOPIC, layout.LOG_SCHEMA)
+        self._taken: int | None = None
+        if set_points_taken.SIGNAL in signals:
+            self._taken = self._channel(set_points_taken.TOPIC, set_points_taken.SCHEMA)
 
     def _channel(self, topic: str, schema: str, joint: str | None = None) -> int:
         """Registers a topic; `joint` is the name of the joint that it is of."""
@@ -111,6 +114,8 @@ class Recording:
         self._mcap.add_message(self._states, logged, states, published, self.samples)
         for column, channel in enumerate(self._joints):
             self._mcap.add_message(channel, logged, layout.joint_sample(row, column), published, self.samples)
+        if self._taken is not None:
+            self._mcap.add_message(self._taken, logged, set_points_taken.message(row), published, self.samples)
         self.samples += 1
         self.last_time = row.time
 

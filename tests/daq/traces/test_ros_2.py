@@ -52,6 +52,16 @@ def test_every_message_decodes_by_its_own_definition_and_encodes_to_the_same_byt
     assert (found["/rosout"][1].name, found["/rosout"][1].msg) == ("end", "done: 21.6° reached")
 
 
+def test_a_record_of_a_slow_line_tells_when_set_points_were_taken_and_is_of_ros_2_as_a_whole(tmp_path: Path) -> None:
+    with TraceWriter(tmp_path / "a.mcap", record(every=4), JOINTS) as writer:
+        for tick in (0, 4, 8):
+            writer.sample(row(tick, taken=max(0, tick - 2)))
+        writer.close("complete")
+    found = messages(tmp_path / "a.mcap")
+    assert [(one.tick, one.taken) for one in found["/set_points"]] == [(0, 0), (4, 2), (8, 6)]
+    assert [one.tick for one in found["/samples/joint_1"]] == [0, 4, 8]
+
+
 def test_what_ros_2_prints_about_a_trace_is_what_the_page_says(tmp_path: Path) -> None:
     """`ros2 bag info` prints the counts of the index, in lines of this form."""
     with write(tmp_path / "a.mcap", 200).open("rb") as stream:
