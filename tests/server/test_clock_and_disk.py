@@ -130,7 +130,7 @@ def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(
 
     monkeypatch.setattr(os, "fsync", refuses)
     table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
-    for number, status, kind in (
+    for number, status, kind in (  # noqa: B007  # `refuses` reads the number
         (errno.ENOSPC, 507, "no-room"),
         (errno.EROFS, 503, "disk"),
         (errno.EIO, 503, "disk"),
