@@ -131,7 +131,7 @@ def _remove_old(parent: Path, before: float) -> None:
             shutil.rmtree(sibling, ignore_errors=True)
 
 
-class SharedCacheLocator(UserProvidedCacheLocator):  # type: ignore[misc]  # of a library without types
+class SharedCacheLocator(UserProvidedCacheLocator):
     """Tells numba where to keep machine code: for sources of ours by their place in the project, not on the disk."""
 
     @classmethod
@@ -139,7 +139,7 @@ class SharedCacheLocator(UserProvidedCacheLocator):  # type: ignore[misc]  # of 
         """Folder below that of the module."""
         path = Path(py_file).resolve()
         if not path.is_relative_to(_ROOT):
-            own: str = super().get_suitable_cache_subpath(py_file)
+            own: str = super().get_suitable_cache_subpath(py_file)  # type: ignore[no-untyped-call]
             return own
         return ".".join(path.relative_to(_ROOT).parts[:-1])
 
