@@ -43,7 +43,7 @@ def test_a_sound_arm_is_explained_to_the_noise_of_its_readings(sound: outside_ar
 def test_sudden_friction_with_the_true_numbers_leaves_the_noise_of_readings() -> None:
     """The arm's friction is there at once: its model's must not need a distance to build up."""
     arm = outside_arm.drawn(106)
-    observation, given = observe(base_model(MACHINE), [outside_arm.record(arm, 1061, duration=8.0)])
+    observation, given = observe(base_model(MACHINE), [outside_arm.record(arm, 1061)])
     true = {"controller.delay": arm.delay}
     for joint in range(3):
         true[f"link{joint + 1}.mass"] = arm.mass[joint]
