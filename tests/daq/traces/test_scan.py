@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -64,7 +63,7 @@ def changed(data: bytes, opcode: int, offset: int, value: bytes) -> bytes:
 @pytest.mark.parametrize(
     ("opcode", "offset", "says"),
     [
-        (Opcode.METADATA, -1, "the data section does not match its checksum"),
+        (Opcode.HEADER, 8, "the data section does not match its checksum"),
         (Opcode.CHUNK_INDEX, 0, "the index does not match its checksum"),
         (Opcode.STATISTICS, 0, "the index does not match its checksum"),
         (Opcode.FOOTER, -1, "the index does not match its checksum"),
@@ -89,11 +88,11 @@ def test_metadata_of_one_name_come_once(data: bytes) -> None:
     assert (twice.good_bytes, len(twice.metadata)) == (end, 1)
 
 
-@pytest.mark.parametrize("opcode", [Opcode.SCHEMA, Opcode.CHANNEL])
-def test_a_definition_may_be_repeated_and_not_changed(data: bytes, opcode: int) -> None:
+@pytest.mark.parametrize(("opcode", "kind", "name_at"), [(Opcode.SCHEMA, "schema", 6), (Opcode.CHANNEL, "channel", 8)])
+def test_a_definition_may_be_repeated_and_not_changed(data: bytes, opcode: int, kind: str, name_at: int) -> None:
     begin, end = next((begin, end) for found, begin, end in records(data) if found == opcode)
     again = data[begin:end]
     assert scan(data[:end] + again, "a").damage == "it ends before its last record"
-    other = struct.pack("<BQ", opcode, end - begin - HEAD) + again[HEAD:-1] + bytes([again[-1] ^ 1])
-    kind = {Opcode.SCHEMA: "schema", Opcode.CHANNEL: "channel"}[opcode]
+    place = HEAD + name_at
+    other = again[:place] + b"x" + again[place + 1 :]
     assert f"{kind} 1 is defined twice, and differently" in (scan(data[:end] + other, "a").damage or "")
