@@ -237,9 +237,10 @@ def _watched(items: list[pytest.Item], files: set[str], orders: Orders) -> _With
     items[0].config.pluginmanager.register(failures)
     for item, following in zip(items, [*items[1:], None], strict=True):
         called: set[CodeType] = set()
-        with _calls_into(files, called):
+        limit_s = 2.0 * orders.longest_s if orders.leave_out_failing else 0.0
+        with _calls_into(files, called), _interrupted(limit_s):
             without.seconds[item.nodeid] = _seconds(item, following)
-        if without.seconds[item.nodeid] > orders.longest_s:
+        if without.seconds[item.nodeid] > orders.longest_s and not failures.names:
             without.seconds[item.nodeid] = _seconds(item, following)
         if failures.names:
             without.failing.append(item.nodeid)
@@ -252,6 +253,22 @@ def _watched(items: list[pytest.Item], files: set[str], orders: Orders) -> _With
             without.callers[code.co_filename, code.co_qualname.partition(".<locals>")[0]].append(item.nodeid)
     without.callers = {function: sorted(set(tests)) for function, tests in without.callers.items()}
     return without
+
+
+@contextmanager
+def _interrupted(after_s: float) -> Iterator[None]:
+    """Fails what takes longer; 0: nothing does."""
+
+    def fail(_signal: int, _frame: FrameType | None) -> NoReturn:
+        raise TimeoutError(f"longer than {after_s:g} s")
+
+    before = signal.signal(signal.SIGALRM, fail)
+    signal.setitimer(signal.ITIMER_REAL, after_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _seconds(item: pytest.Item, following: pytest.Item | None) -> float:

@@ -22,7 +22,7 @@ killed.
               process or a clock may have failed without noticing the fault
 --line N      only those that begin at this line; for one file
 --uncompiled  without a compiler, for the compiled code of the model: its functions run in Python, a hundred times
-              slower and with nothing to compile; tests that fail like this even without a fault are left out
+              slower and with nothing to compile; tests that fail like this, or take too long, are left out
 --quick       only in forks of one process (see `forked_mutants`), which leaves out what is decided at import, compiled
               code and other processes; a survivor here may still be noticed by a test that starts a process
 """
