@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -189,6 +190,7 @@ def _initial_deflection(model: Model, prepared: Prepared) -> NDArray[np.float64]
     return np.clip((np.array(gain) * prepared.first_drive - rod_arm_gravity(posture, joints, body)) / levels, -1.0, 1.0)
 
 
+@cache
 def _compile_c(optimised: str) -> Any:
     columns = {n: v for n, v in vars(at).items() if n.isupper() and isinstance(v, int)}
     columns |= {"GAIN_P": pid.P, "GAIN_I": pid.I, "GAIN_D": pid.D, "GAIN_SCALE": pid.SCALE, "GAINS": pid.GAINS}
