@@ -159,6 +159,7 @@ def test_a_folder_is_salvaged_though_one_file_of_it_cannot_be(tmp_path: Path, sy
     found = salvage_folder(tmp_path)
     assert [result.path and result.path.name for result in found] == ["a.mcap", None, None, None]
     assert [result.problem is None for result in found] == [True, False, False, False]
+    assert [(result.samples, result.dropped_bytes) for result in found[1:]] == [(0, 0)] * 3
     put_aside = {"b.mcap.part.unreadable", "c.mcap.part.unreadable"}
     assert {entry.name for entry in tmp_path.iterdir()} == {"a.mcap", "d.mcap.part"} | put_aside
     assert (tmp_path / "c.mcap.part.unreadable").read_bytes() == synced[0][:60]
