@@ -67,7 +67,7 @@ def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: P
     assert record["line"]["capabilities"] == ["sample", "lock_step", "simulated", "compact"]
     assert record["memory"]["skipped"]
     page = (tmp_path / "acceptance.html").read_text("utf-8")
-    assert "1 of 12 steps are done, 11 are left out, 0 are open." in page
+    assert f"1 of {len(STEPS)} steps are done, {len(STEPS) - 1} are left out, 0 are open." in page
     assert page.count("Left out on ") == 11
     assert tomllib.loads((tmp_path / "daq.toml").read_text("utf-8"))["robot"]["port"] == MOCK
     done = record["line"]["done"]
@@ -84,6 +84,7 @@ SKIPPED = (
     "emergency_stop",
     "stop",
     "period",
+    "delay",
     "gain",
     "first_ramp",
     "ramp",
@@ -115,9 +116,11 @@ def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place
     why = "the arm is on loan"
     assert daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why, *options).code == 0
     sheet = acceptance_sheet(Record.of(tmp_path))
-    assert sheet.answer.startswith("0 of 12 steps are done, 12 are left out, 0 are open. Left out: Port and line, ")
+    assert sheet.answer.startswith(
+        f"0 of {(n := len(STEPS))} steps are done, {n} are left out, 0 are open. Left out: Port and line, "
+    )
     blocks = [block for section in sheet.sections for block in section.blocks]
-    assert len(blocks) == 12
+    assert len(blocks) == len(STEPS)
     assert all(isinstance(block, Text) and why in block.text for block in blocks)
     daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why).complains(2, "it needs --skip")
 
@@ -237,11 +240,12 @@ def test_a_step_at_the_arm_is_asked_for_even_with_yes() -> None:
 
 def test_the_steps_that_move_need_the_bridge_and_go_when_it_is_done_again(tmp_path: Path) -> None:
     record = Record.of(tmp_path)
-    moving = {"stop", "gain", "first_ramp", "ramp"}
+    moving = {"stop", "delay", "gain", "first_ramp", "ramp"}
     for name in SKIPPED:
         record.keep(name, {"skipped": True})
     assert all("bridge" in lacking(step_named(name), record) for name in moving)
     record.keep("bridge", {})
+    record.keep("period", {})
     assert not any(lacking(step_named(name), record) for name in moving)
     assert moving < resting_on(["bridge"])
     assert {"bridge", *moving} < resting_on(["memory"])

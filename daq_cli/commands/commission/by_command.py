@@ -48,7 +48,6 @@ def period(bench: Bench) -> dict[str, Any]:
         "period_ms": round(found.period_ms, 4),
         "jitter_ms": round(found.jitter_ms, 3),
         "missed_set_points": missed,
-        "computing_delay": "not measured: the machine file's assumption stands",
     }
 
 
