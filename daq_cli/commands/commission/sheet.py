@@ -180,7 +180,8 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
             Picture(_sensor_picture(sensors), "Departure of the protractor's angles from each joint's straight line.")
         ]
     if name in RAMPS and (record.folder / result["trace"]).exists():
-        return [Picture(_ramp_picture(record.folder / result["trace"]), "Set points (grey) and positions, from where each joint began.")]
+        caption = "Set points (grey) and positions, from where each joint began."
+        return [Picture(_ramp_picture(record.folder / result["trace"]), caption)]
     return []
 
 
