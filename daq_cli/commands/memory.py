@@ -137,7 +137,7 @@ def search(
     pressed:    told that the emergency stop is about to be pressed, and that it was released safely
     """
     from daq.commissioning.memory.findings import judge
-    from daq.commissioning.memory.procedure import Finder
+    from daq.commissioning.memory.procedure import Finder, Task
     from daq_cli.app.output_file import replacing
     from daq_cli.robot.pressed import EmergencyStop
 
@@ -163,7 +163,7 @@ def search(
             consent.require(call.port, page)
             if stop.pressed and _released(page, operator, found):
                 stop.tell(False)
-            if not stop.pressed:
+            if not stop.pressed and page.release_freeze(lambda: operator.begin(Task("end_freeze"))):
                 proofs = _prove(page, operator, found)
     save(found, proofs)
     return found, proofs

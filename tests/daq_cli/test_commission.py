@@ -24,6 +24,7 @@ from daq_cli.commands.commission.steps import STEPS, lacking, resting_on, step_n
 from daq_cli.robot.memory_page import UnprovedWriteError, open_page
 from daq_cli.robot.pressed import KEEP_PRESSED, EmergencyStop
 from daq_cli.robot.terminal_operator import Lines, TerminalOperator, words
+from firmware_protocol.commands import ReadStatus, Status, StatusFlag, Stop, Stopped
 from firmware_protocol.memory_map import default_memory_map
 from model.reports.page import Text
 from tests.daq_cli.invoke import CommandLine
@@ -219,6 +220,16 @@ def test_the_errors_are_read_again_after_the_prompt_and_while_the_emergency_stop
             assert "joint 2 would jump" in release(page, hand, lambda reasons=reasons: next(reasons))
             assert hand.tasks == ["hold_for_release", "release_emergency_stop"][:tasks]
         assert release(page, Hand(), lambda: "") == ""
+
+
+def test_a_stop_that_is_in_force_is_released_only_with_the_persons_word() -> None:
+    with open_page(MOCK, default_memory_map()) as page:
+        assert page.release_freeze(lambda: False), "nothing is in force, so nobody is asked"
+        page.link.request(Stop(), Stopped)
+        assert not page.release_freeze(lambda: False)
+        assert page.link.request(ReadStatus(), Status).status & StatusFlag.FROZEN
+        assert page.release_freeze(lambda: True)
+        assert not page.link.request(ReadStatus(), Status).status & StatusFlag.FROZEN
 
 
 def test_a_controller_that_was_not_seen_without_supply_is_to_be_switched_off_again() -> None:
