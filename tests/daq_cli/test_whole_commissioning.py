@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from daq.config.robot_files import load_memory_map
-from daq.contracts.machine import load_machine
+from daq.contracts.machine import BoardPid, load_machine
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
 from daq_cli.commands.commission.steps import STEPS
@@ -55,6 +55,31 @@ def holds_the_truth(folder: Path, joints: tuple[int, ...]) -> bool:
         assert found.range_rad == pytest.approx(true.range_rad, abs=0.05)
         assert found.angle_at_zero_rad == pytest.approx(true.angle_at_zero_rad, abs=0.03)
     return {machine.calibration(joint).direction for joint in joints} == {-1, 1}
+
+
+LEFT_OUT = ("memory", "potentiometers", "end_stops", "emergency_stop", "gain", "first_ramp", "ramp", "model")
+
+
+def test_the_bridge_the_stop_and_the_timing_of_an_arm_with_a_known_map(daq: CommandLine, tmp_path: Path) -> None:
+    daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
+    with mock("") as arm:
+        said = commission(daq, arm, tmp_path, *(word for name in LEFT_OUT for word in ("--skip", name)))
+    assert said.code == 0, said.err
+    steps = json.loads(said.out)["steps"]
+    assert [name for name, one in steps.items() if not one.get("skipped")] == [
+        "line",
+        "bridge",
+        "stop",
+        "period",
+        "delay",
+    ]
+    assert steps["period"]["period_ms"] == pytest.approx(20.0, abs=0.01)
+    true = 1e-3 * default_board().timing.computing_delay
+    assert steps["delay"]["lowest_ms"] <= true <= steps["delay"]["highest_ms"]
+    controller = load_machine(str(tmp_path / "machine.toml")).controller
+    assert isinstance(controller, BoardPid)
+    assert not controller.delay.assumed
+    assert controller.delay.value == pytest.approx(1e-3 * true, abs=0.001)
 
 
 @pytest.mark.slow
