@@ -69,7 +69,7 @@ def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: P
     assert record["memory"]["skipped"]
     page = (tmp_path / "acceptance.html").read_text("utf-8")
     assert f"1 of {len(STEPS)} steps are done, {len(STEPS) - 1} are left out, 0 are open." in page
-    assert page.count("Left out on ") == 11
+    assert page.count("Left out on ") == len(STEPS) - 1
     assert tomllib.loads((tmp_path / "daq.toml").read_text("utf-8"))["robot"]["port"] == MOCK
     done = record["line"]["done"]
     assert daq("--port", MOCK, "commission", "--folder", tmp_path).code == 0
