@@ -18,6 +18,7 @@ from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, load_machine, parse_machine
 from daq_cli.commands.commission.machine_text import machine_file_text, with_controller, with_limits, with_sensors
+from daq_cli.commands.commission.periods import Periods
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import acceptance_sheet, memory_picture
 from daq_cli.commands.commission.steps import STEPS, lacking, resting_on, step_named
@@ -287,6 +288,11 @@ def test_what_is_missing_or_damaged_is_one_line(daq: CommandLine, tmp_path: Path
         (tmp_path / "memory_findings.json").write_text(damaged, "utf-8")
         with pytest.raises(SpecError, match="damaged"):
             acceptance_sheet(record)
+
+
+def test_a_period_that_a_busy_computer_blurs_is_not_known() -> None:
+    assert Periods(20.0, 0.01, 5.0).problem == ""
+    assert "scatter of 69.2 ms" in Periods(19.679, 0.13, 69.2).problem
 
 
 def test_a_dead_memory_is_not_alive() -> None:

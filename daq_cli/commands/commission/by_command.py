@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 TO_GAIN = (1, 2, 3)
-CERTAIN = 5e-4
-"""Largest standard error of the control period, as a share of it: 0.01 ms of 20 ms, which is 0.1 ms over the 12 periods
-in which a set point settles."""
 FLOORS = 2.0
 """Errors of this many times the noise floor are more than noise, and are diagnosed."""
 DIAGNOSIS = "diagnosis.html"
@@ -48,11 +45,8 @@ def period(bench: Bench) -> dict[str, Any]:
     with connected(bench) as controller:
         found = followed_periods(controller)
         missed = controller.status().missed
-    if found.error_ms > CERTAIN * found.period_ms:
-        raise NotCommissionedError(
-            f"samples arrive with a scatter of {found.jitter_ms:.1f} ms, so that the period is known to "
-            f"± {found.error_ms:.3f} ms only: the computer or the line is too busy; end other programs, and try again"
-        )
+    if found.problem:
+        raise NotCommissionedError(found.problem)
     note_period(bench, found.period_ms, found.error_ms)
     return {
         "period_ms": round(found.period_ms, 4),
