@@ -115,7 +115,8 @@ class Trace:
     position:  (n, j) rad (m on a prismatic joint)
     set_point: (n, j) rad, as the controller took it in that period; None where the record has none
     error:     (n, j) rad, set point − position as the controller formed it
-    drive:     (n, j) motor volts after the amplifier, or A, N·m, N where `record.drive_unit` says so
+    drive:     (n, j) motor volts after the amplifier, or A, N·m, N where `record.drive_unit` says so. Positive volts
+               turn the joint to larger angles, whichever way its sensor counts, unless its gear ratio is negative
     velocity:  (n, j) rad/s
     power_raw: (n, j) the controller's output before the amplifier, DAC counts
     tick:      (n,)   number of the control period; a step of more than `record.every` is a gap

@@ -16,7 +16,10 @@ from daq.contracts.errors import DaqError
 
 DEFAULT_BAUD = 115200
 """Line rate where the URL names none (bits per second; ten bits carry a byte)."""
-BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
+BAUD_RATES = (
+    *(1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400),
+    *(250000, 460800, 500000, 921600, 1000000),  # of these, a clock of 16 MHz gives 250000, 500000, 1000000 exactly
+)
 
 
 class TransportError(DaqError):

@@ -116,7 +116,7 @@ def find(
         return
     print(findings_text(found, proofs))
     print(f"findings: {findings}")
-    print(f"memory map: {output}" if written else _why_no_map(found))
+    print(f"memory map: {output}" if written else why_no_map(found, output))
 
 
 def search(
@@ -137,7 +137,7 @@ def search(
     pressed:    told that the emergency stop is about to be pressed, and that it was released safely
     """
     from daq.commissioning.memory.findings import judge
-    from daq.commissioning.memory.procedure import Finder
+    from daq.commissioning.memory.procedure import Finder, Task
     from daq_cli.app.output_file import replacing
     from daq_cli.robot.pressed import EmergencyStop
 
@@ -163,7 +163,7 @@ def search(
             consent.require(call.port, page)
             if stop.pressed and _released(page, operator, found):
                 stop.tell(False)
-            if not stop.pressed:
+            if not stop.pressed and page.release_freeze(lambda: operator.begin(Task("end_freeze"))):
                 proofs = _prove(page, operator, found)
     save(found, proofs)
     return found, proofs
@@ -206,12 +206,14 @@ def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandP
 
 
 def keep_map(found: Findings, path: Path) -> bool:
-    """Writes the memory map; False where a register has no place."""
-    from daq.commissioning.memory.map_text import memory_map_text
+    """Writes the memory map; where a register has no place, a map to be completed beside it, and returns False."""
+    from daq.commissioning.memory.map_text import begun_map_text, memory_map_text
     from daq_cli.app.output_file import replacing
 
     memory_map = found.memory_map("found at this arm")
     if memory_map is None:
+        with replacing(begun_map(path)) as part:
+            part.write_text(begun_map_text(found), "utf-8")
         return False
     remarks = ('Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with what was seen.',)
     with replacing(path) as part:
@@ -219,9 +221,18 @@ def keep_map(found: Findings, path: Path) -> bool:
     return True
 
 
-def _why_no_map(found: Findings) -> str:
+def begun_map(path: Path) -> Path:
+    """Where the map to be completed is written, beside a memory map."""
+    return path.with_suffix(".begun.toml")
+
+
+def why_no_map(found: Findings, path: Path) -> str:
+    """What has no place, and what to do."""
     names = sorted({one.register for one in found.missing()})
-    return f"no memory map is written, for these have no place: {', '.join(names)}"
+    return (
+        f"no memory map, for these have no place: {', '.join(names)}; {begun_map(path).name} has all others: put the "
+        f"addresses from your manual in place of its question marks, and save it as {path.name}"
+    )
 
 
 def findings_data(found: Findings, proofs: list[CommandProof]) -> dict[str, object]:

@@ -1,11 +1,12 @@
 """The shared memory of a controller at a port, read and written by peek and poke alone.
 
-No other request is used: the bridge carries them out by its own memory map, which is what is to be found out.
+The bridge carries out other requests by its own memory map, which is what is to be found out. Of these only the
+release of a stop is used, which touches no memory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -14,7 +15,19 @@ from daq.commissioning.memory.recording import PageReading
 from daq.contracts.errors import SafetyError
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.link import Link, expect
-from firmware_protocol.commands import Block, BlockWritten, Capability, HelloReply, ReadBlock, WriteBlock
+from firmware_protocol.commands import (
+    Block,
+    BlockWritten,
+    Capability,
+    HelloReply,
+    ReadBlock,
+    ReadStatus,
+    Release,
+    Released,
+    Status,
+    StatusFlag,
+    WriteBlock,
+)
 from firmware_protocol.framing import MAX_PAYLOAD
 
 if TYPE_CHECKING:
@@ -80,6 +93,16 @@ class LinkPage:
         if address not in self.proved:
             raise UnprovedWriteError(f"{address:04X}: it is not proved what this byte is; nothing was written")
         self.link.request(WriteBlock(address, bytes((value,))), BlockWritten)
+
+    def release_freeze(self, may: Callable[[], bool]) -> bool:
+        """Releases a stop that is in force, if it `may` be; whether none is. Writes nothing to the memory."""
+        status = self.link.request(ReadStatus(), Status)
+        if not status.status & StatusFlag.FROZEN:
+            return True
+        if not may():
+            return False
+        self.link.request(Release(status.stop), Released)
+        return True
 
     def reconnect(self) -> bool:
         """Greets the controller again; whether it has been reset since."""

@@ -23,8 +23,8 @@ SWEEP = ((60, 1.2), (940, 2.0))
 
 IN_REAL_TIME = 2.5
 """Factor by which a mock's arm is led more slowly through its control port, where this computer may pause."""
-PLACES, PLACES_APART = 11, 3
-"""Postures of a protractor over a joint's range, and from one to the next."""
+PLACES = (0, 10, 5, 2, 8, 4, 6, 1, 9, 3, 7)
+"""Postures of a protractor, in tenths of the range that is led through: the first of them span it."""
 
 
 End = Literal["low", "high"]
@@ -122,7 +122,7 @@ class MockOperator:
 
     def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
         """Moves a joint by hand to posture `number` (from 1) of its range; the angle, read to half a degree."""
-        to = 100.0 + 800.0 * ((number * PLACES_APART) % PLACES) / (PLACES - 1)
+        to = 100.0 + 80.0 * PLACES[(number - 1) % len(PLACES)]
         self._path, self._until = [({joint: to}, 1.0)], self.arm.now()
         while not self.finished():
             wait(0.05)

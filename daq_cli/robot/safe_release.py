@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from daq.commissioning.memory.procedure import SAFE_ERROR, Operator, Task, is_alive, release, switched_off_and_on
+from daq.commissioning.memory.procedure import SAFE_ERROR, Operator, Page, Task, is_alive, release, switched_off_and_on
 from daq.contracts.errors import SafetyError
 from daq_cli.robot.pressed import EmergencyStop
 from firmware_protocol.units import POSTURE_UNITS, posture_to_counts
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 FIRST = "The emergency stop was pressed and not released safely. Keep it pressed; this comes first."
 
 
-def typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
+def typical(page: Page, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
     """A register of each joint: the median of its readings, of which some may be torn."""
     register = memory_map[name]
     values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}

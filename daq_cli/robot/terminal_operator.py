@@ -15,7 +15,16 @@ from daq.commissioning.memory.procedure import Task
 from daq_cli.app.consent import can_be_asked
 from daq_cli.app.context import console
 
-NO_PAUSE = ("press_emergency_stop", "hold_for_release", "set_inputs", "rest", "command", "unplug", "plug_in")
+NO_PAUSE = (
+    "end_freeze",
+    "press_emergency_stop",
+    "hold_for_release",
+    "set_inputs",
+    "rest",
+    "command",
+    "unplug",
+    "plug_in",
+)
 """Tasks that are over when the person says that they are done."""
 AT_ONCE = ("release_emergency_stop",)
 """Tasks that begin without a question, for one has just been answered."""
@@ -46,6 +55,8 @@ def words(task: Task) -> str:
         "the emergency stop. The arm should stay where it is. If it moves, press at once.",
         "set_inputs": f"Switch the process inputs so that their number is {task.inputs} (input 1 counts 1, input 2 "
         "counts 2). Without switches at the inputs, skip this.",
+        "end_freeze": "The bridge holds the set points: it begins so after its program was loaded, or somebody has "
+        "stopped the arm. If that is over, the stop is released now; nothing moves by that.",
         "command": f"Joint {task.joint} will move by at most 4 posture units (a degree of a major axis) and back. "
         "Watch it; the emergency stop ends it.",
     }[task.kind]

@@ -18,12 +18,14 @@ from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, load_machine, parse_machine
 from daq_cli.commands.commission.machine_text import machine_file_text, with_controller, with_limits, with_sensors
+from daq_cli.commands.commission.periods import Periods
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import acceptance_sheet, memory_picture
 from daq_cli.commands.commission.steps import STEPS, lacking, resting_on, step_named
 from daq_cli.robot.memory_page import UnprovedWriteError, open_page
 from daq_cli.robot.pressed import KEEP_PRESSED, EmergencyStop
 from daq_cli.robot.terminal_operator import Lines, TerminalOperator, words
+from firmware_protocol.commands import ReadStatus, Status, StatusFlag, Stop, Stopped
 from firmware_protocol.memory_map import default_memory_map
 from model.reports.page import Text
 from tests.daq_cli.invoke import CommandLine
@@ -67,8 +69,8 @@ def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: P
     assert record["line"]["capabilities"] == ["sample", "lock_step", "simulated", "compact"]
     assert record["memory"]["skipped"]
     page = (tmp_path / "acceptance.html").read_text("utf-8")
-    assert "1 of 12 steps are done, 11 are left out, 0 are open." in page
-    assert page.count("Left out on ") == 11
+    assert f"1 of {len(STEPS)} steps are done, {len(STEPS) - 1} are left out, 0 are open." in page
+    assert page.count("Left out on ") == len(STEPS) - 1
     assert tomllib.loads((tmp_path / "daq.toml").read_text("utf-8"))["robot"]["port"] == MOCK
     done = record["line"]["done"]
     assert daq("--port", MOCK, "commission", "--folder", tmp_path).code == 0
@@ -84,6 +86,7 @@ SKIPPED = (
     "emergency_stop",
     "stop",
     "period",
+    "delay",
     "gain",
     "first_ramp",
     "ramp",
@@ -115,9 +118,11 @@ def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place
     why = "the arm is on loan"
     assert daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why, *options).code == 0
     sheet = acceptance_sheet(Record.of(tmp_path))
-    assert sheet.answer.startswith("0 of 12 steps are done, 12 are left out, 0 are open. Left out: Port and line, ")
+    assert sheet.answer.startswith(
+        f"0 of {(n := len(STEPS))} steps are done, {n} are left out, 0 are open. Left out: Port and line, "
+    )
     blocks = [block for section in sheet.sections for block in section.blocks]
-    assert len(blocks) == 12
+    assert len(blocks) == len(STEPS)
     assert all(isinstance(block, Text) and why in block.text for block in blocks)
     daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why).complains(2, "it needs --skip")
 
@@ -218,6 +223,16 @@ def test_the_errors_are_read_again_after_the_prompt_and_while_the_emergency_stop
         assert release(page, Hand(), lambda: "") == ""
 
 
+def test_a_stop_that_is_in_force_is_released_only_with_the_persons_word() -> None:
+    with open_page(MOCK, default_memory_map()) as page:
+        assert page.release_freeze(lambda: False), "nothing is in force, so nobody is asked"
+        page.link.request(Stop(), Stopped)
+        assert not page.release_freeze(lambda: False)
+        assert page.link.request(ReadStatus(), Status).status & StatusFlag.FROZEN
+        assert page.release_freeze(lambda: True)
+        assert not page.link.request(ReadStatus(), Status).status & StatusFlag.FROZEN
+
+
 def test_a_controller_that_was_not_seen_without_supply_is_to_be_switched_off_again() -> None:
     with open_page(MOCK, default_memory_map()) as page:
         hand = Hand(times=2)
@@ -237,11 +252,12 @@ def test_a_step_at_the_arm_is_asked_for_even_with_yes() -> None:
 
 def test_the_steps_that_move_need_the_bridge_and_go_when_it_is_done_again(tmp_path: Path) -> None:
     record = Record.of(tmp_path)
-    moving = {"stop", "gain", "first_ramp", "ramp"}
+    moving = {"stop", "delay", "gain", "first_ramp", "ramp"}
     for name in SKIPPED:
         record.keep(name, {"skipped": True})
     assert all("bridge" in lacking(step_named(name), record) for name in moving)
     record.keep("bridge", {})
+    record.keep("period", {})
     assert not any(lacking(step_named(name), record) for name in moving)
     assert moving < resting_on(["bridge"])
     assert {"bridge", *moving} < resting_on(["memory"])
@@ -272,6 +288,11 @@ def test_what_is_missing_or_damaged_is_one_line(daq: CommandLine, tmp_path: Path
         (tmp_path / "memory_findings.json").write_text(damaged, "utf-8")
         with pytest.raises(SpecError, match="damaged"):
             acceptance_sheet(record)
+
+
+def test_a_period_that_a_busy_computer_blurs_is_not_known() -> None:
+    assert Periods(20.0, 0.01, 5.0).problem == ""
+    assert "scatter of 69.2 ms" in Periods(19.679, 0.13, 69.2).problem
 
 
 def test_a_dead_memory_is_not_alive() -> None:

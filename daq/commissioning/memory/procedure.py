@@ -58,6 +58,7 @@ TaskKind = Literal[
     "hold_for_release",
     "release_emergency_stop",
     "set_inputs",
+    "end_freeze",
     "command",
 ]
 

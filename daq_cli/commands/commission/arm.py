@@ -124,5 +124,5 @@ def _compared(bench: Bench, kept: Identity) -> tuple[Identity, str, bool]:
     if not why and kept.period_ms and "bridge" in bench.record.done:
         with connected(bench) as controller:
             found = followed_periods(controller)
-        why = same_period(kept, found.period_ms, found.error_ms)
+        why = "" if found.problem else same_period(kept, found.period_ms, found.error_ms)
     return left, why, False

@@ -20,6 +20,8 @@ TO_GAIN = (1, 2, 3)
 FLOORS = 2.0
 """Errors of this many times the noise floor are more than noise, and are diagnosed."""
 DIAGNOSIS = "diagnosis.html"
+WITHIN_TOLERANCES = "yes, within its tolerances"
+"""What is said of an arm that differs from the file's numbers, but not from what the file says they may be."""
 
 
 def stop(bench: Bench) -> dict[str, Any]:
@@ -43,12 +45,13 @@ def period(bench: Bench) -> dict[str, Any]:
     with connected(bench) as controller:
         found = followed_periods(controller)
         missed = controller.status().missed
+    if found.problem:
+        raise NotCommissionedError(found.problem)
     note_period(bench, found.period_ms, found.error_ms)
     return {
         "period_ms": round(found.period_ms, 4),
         "jitter_ms": round(found.jitter_ms, 3),
         "missed_set_points": missed,
-        "computing_delay": "not measured: the machine file's assumption stands",
     }
 
 
@@ -164,7 +167,9 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     from model.reports.page import write_report
     from server.jobs.next_experiment import experiment_chooser
 
-    bench.operator.show("The arm does not behave like its machine file. A diagnosis follows; it only computes.")
+    bench.operator.show(
+        "The ramp differs from the machine file by more than noise. A diagnosis follows; it only computes."
+    )
     with shown_progress("diagnosing") as progress:
         found = diagnose(begin, [trace], progress=progress, chooser=experiment_chooser(begin.machine))
     pair = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
@@ -172,7 +177,9 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     said = headline(found)
     bench.operator.show(said)
     asked = found.next_experiment
+    behaves = {"behaves_like_the_machine_file": WITHIN_TOLERANCES} if found.verdict == "nothing-significant" else {}
     return {
+        **behaves,
         "verdict": found.verdict.replace("-", " "),
         "diagnosis": said,
         "report": DIAGNOSIS,

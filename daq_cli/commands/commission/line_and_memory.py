@@ -55,7 +55,7 @@ def line(bench: Bench) -> dict[str, Any]:
 
 def memory(bench: Bench) -> dict[str, Any]:
     """The memory map, by `daq memory find`."""
-    from daq_cli.commands.memory import findings_text, keep_map, search
+    from daq_cli.commands.memory import findings_text, keep_map, search, why_no_map
 
     def when_found(found: Findings) -> None:
         if keep_map(found, bench.folder / MAP):
@@ -78,11 +78,7 @@ def memory(bench: Bench) -> dict[str, Any]:
     bench.operator.show(findings_text(found, proofs))
     bench.configure()
     if found.memory_map("") is None:
-        names = ", ".join(sorted({one.register for one in found.missing()}))
-        raise NotCommissionedError(
-            f"no memory map, for these have no place: {names}; {FINDINGS} has what was found. Complete a map by "
-            f"hand as {MAP} (`daq config copy memory-map` gives one to start from), then go on with --skip memory"
-        )
+        raise NotCommissionedError(f"{why_no_map(found, bench.folder / MAP)}; then go on with --skip memory")
     return _memory_result(found, proofs)
 
 

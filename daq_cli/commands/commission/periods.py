@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 PERIODS = 150
 """Number of control periods over which the period is measured."""
 
+CERTAIN = 5e-4
+"""Largest standard error of the control period, as a share of it: 0.01 ms of 20 ms, which is 0.1 ms over the 12 periods
+in which a set point settles."""
+
 
 class Periods(NamedTuple):
     """The control period by the host's clock, its standard error, and the scatter of the samples (all in ms)."""
@@ -20,6 +24,16 @@ class Periods(NamedTuple):
     period_ms: float
     error_ms: float
     jitter_ms: float
+
+    @property
+    def problem(self) -> str:
+        """Why the period is not known; empty if it is."""
+        if self.error_ms <= CERTAIN * self.period_ms:
+            return ""
+        return (
+            f"samples arrive with a scatter of {self.jitter_ms:.1f} ms, so that the period is known to "
+            f"± {self.error_ms:.3f} ms only: the computer or the line is too busy; end other programs, and try again"
+        )
 
 
 def followed_periods(controller: Controller) -> Periods:

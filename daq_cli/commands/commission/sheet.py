@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from daq.contracts.errors import SpecError
 from daq_cli.commands.commission.bench import FINDINGS
 from daq_cli.commands.commission.record import FILE, Record
@@ -24,6 +26,8 @@ UNITS = {"_deg": "°", "_percent": "%", "_ms": "ms"}
 """Ends of names that are units."""
 DRAWN = ("counts", "angles_deg", "residuals_deg")
 """What a picture shows, of potentiometers."""
+RAMPS = ("first_ramp", "ramp")
+"""Steps that show their record."""
 COLUMNS, CELL = 16, 30
 REGISTER_COLOURS = {
     "position": 1,
@@ -98,7 +102,15 @@ def _blocks(record: Record, name: str, does: str) -> list[Block]:
     when = _when(str(result["done"]))
     if name in record.left_out:
         return [Text(f"Left out on {when}: {result.get('reason', NO_REASON)}.", "warning")]
+    if "trace" in result:
+        result = result | {"trace": _beside(record.folder, str(result["trace"]))}
     return [Text(f"{does} Done on {when}.", "quiet"), *_pictures(record, name, result), *_tables(result)]
+
+
+def _beside(folder: Path, path: str) -> str:
+    """A path from the folder of the arm on, where it lies there."""
+    whole = folder.absolute()
+    return str(Path(path).relative_to(whole)) if Path(path).is_relative_to(whole) else path
 
 
 def _when(iso: str) -> str:
@@ -131,10 +143,11 @@ def _tables(result: dict[str, Any]) -> list[Block]:
 
 def _words(name: str) -> str:
     """A name of the record as people write it."""
+    name = name.strip()
     for suffix, unit in UNITS.items():
         if name.endswith(suffix):
             return f"{name.removesuffix(suffix).replace('_', ' ')} ({unit})"
-    return name.replace("_", " ").strip()
+    return name.replace("_", " ")
 
 
 def _shown(value: Any, interval: bool = False) -> str:
@@ -166,6 +179,9 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
         return [
             Picture(_sensor_picture(sensors), "Departure of the protractor's angles from each joint's straight line.")
         ]
+    if name in RAMPS and (record.folder / result["trace"]).exists():
+        caption = "Set points (grey) and positions, from where each joint began."
+        return [Picture(_ramp_picture(record.folder / result["trace"]), caption)]
     return []
 
 
@@ -217,6 +233,29 @@ def _sensor_picture(sensors: dict[str, Any]) -> str:
             )
         axes.set_xlabel("reading, ADC counts")
         axes.set_ylabel("angle − line, degrees")
+        axes.legend()
+
+    return drawn(draw, 2.6)
+
+
+def _ramp_picture(path: Path) -> str:
+    from daq.traces.reader import read_trace
+    from model.reports.figures import COLOURS, drawn
+
+    trace = read_trace(path)
+    moved = trace.joints if trace.record.spec is None else trace.record.spec.joints
+
+    def draw(figure: Any) -> None:
+        axes = figure.subplots()
+        for number, joint in enumerate(moved):
+            column = trace.column(joint)
+            begin = trace.position[0, column]
+            if trace.set_point is not None:
+                axes.plot(trace.time, np.rad2deg(trace.set_point[:, column] - begin), color="0.6")
+            colour = COLOURS[number % len(COLOURS)]
+            axes.plot(trace.time, np.rad2deg(trace.position[:, column] - begin), color=colour, label=f"joint {joint}")
+        axes.set_xlabel("time, s")
+        axes.set_ylabel("from the start, degrees")
         axes.legend()
 
     return drawn(draw, 2.6)

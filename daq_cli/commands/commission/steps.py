@@ -9,16 +9,18 @@ from daq.contracts.errors import SpecError
 from daq_cli.commands.commission.bench import Bench
 from daq_cli.commands.commission.by_command import first_ramp, gain, model, period, ramp, stop
 from daq_cli.commands.commission.by_hand import emergency_stop, end_stops, potentiometers
+from daq_cli.commands.commission.delay import delay
 from daq_cli.commands.commission.line_and_memory import bridge, line, memory
 from daq_cli.commands.commission.record import Record
 
-NOT_TO_BE_SKIPPED = ("bridge", "ramp")
+NOT_TO_BE_SKIPPED = ("bridge", "period", "ramp")
 """Steps whose result the steps after them rely on."""
 RESTS_ON = {
     "bridge": ("port", "memory_map"),
     "potentiometers": ("memory_map",),
     "end_stops": ("memory_map",),
     "emergency_stop": ("port", "memory_map"),
+    "delay": ("port",),
     "gain": ("machine",),
     "first_ramp": ("machine",),
     "ramp": ("machine",),
@@ -105,6 +107,15 @@ STEPS = (
     ),
     Step(
         "period", "Control period", "Follows 150 control periods.", SEE, "Ctrl-C", period, ("bridge",), at_the_arm=False
+    ),
+    Step(
+        "delay",
+        "Computing delay",
+        "Moves joint 1 to and fro by half a degree, 36 times, and writes the computing delay into the machine file.",
+        "The arm.",
+        KEY,
+        delay,
+        (*BEFORE_MOVING, "period"),
     ),
     Step(
         "gain",

@@ -14,22 +14,26 @@ from mock_controller.board.sensor import LinearityCurve
 ARMS = 300
 
 
-def measured(seed: int, count: int = 6) -> tuple[Potentiometer, float, float, int]:
-    """A sensor that a seed hides, with its own bend, by angles read to half a degree; then range, zero, direction."""
+def measured(seed: int, scatter: float, step: float) -> tuple[Potentiometer, float, float, int]:
+    """A sensor that a seed hides, with its own bend, by angles (degrees) with a scatter, read to `step`; then range,
+    zero, direction."""
+    count = 6
     random = Random(f"sensor {seed}")
     curve = LinearityCurve(random, 10.24)
     whole, zero = math.radians(270 * random.gauss(1.0, 0.02)), math.radians(random.uniform(-60, 60))
     direction = random.choice((-1, 1))
     places = [300 + 3500 * (k + random.uniform(-0.3, 0.3)) / (count - 1) for k in range(count)]
     counts = [place + curve.at(place) for place in places]
-    angles = [zero + direction * whole * p / 4096 + math.radians(random.gauss(0, 0.5)) for p in places]
-    return calibrate_potentiometer(1, counts, angles), whole, zero, direction
+    seen = [math.degrees(zero + direction * whole * p / 4096) + random.gauss(0, scatter) for p in places]
+    read = [math.radians(round(angle / step) * step) for angle in seen]
+    return calibrate_potentiometer(1, counts, read), whole, zero, direction
 
 
-def test_hidden_sensors_lie_within_the_stated_intervals_as_often_as_they_should() -> None:
+@pytest.mark.parametrize(("scatter", "step"), [(0.5, 0.01), (0.0, 0.5), (0.1, 0.01)])
+def test_hidden_sensors_lie_within_the_stated_intervals_as_often_as_they_should(scatter: float, step: float) -> None:
     ranges = zeros = 0
     for seed in range(ARMS):
-        found, whole, zero, direction = measured(seed)
+        found, whole, zero, direction = measured(seed, scatter, step)
         assert found.direction == direction
         ranges += found.range.holds(whole)
         zeros += found.at_zero.holds(zero)

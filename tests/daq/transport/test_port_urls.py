@@ -16,6 +16,7 @@ from daq.transport import MockPort, SerialPort, TcpPort, TransportError, parse_p
     [
         ("serial:///dev/ttyUSB0", SerialPort("/dev/ttyUSB0", 115200)),
         ("serial:///dev/pts/3?baud=19200", SerialPort("/dev/pts/3", 19200)),
+        ("serial:///dev/ttyACM0?baud=250000", SerialPort("/dev/ttyACM0", 250000)),
         ("tcp://127.0.0.1:4000", TcpPort("127.0.0.1", 4000)),
         ("tcp://[::1]:4000?lock_step=1", TcpPort("::1", 4000, lock_step=True)),
         ("mock://", MockPort()),
