@@ -1,4 +1,5 @@
-"""The experiments that a diagnosis may ask for: those of the library that the machine's limits allow.
+"""The experiments that a diagnosis may ask for: those of the library that the machine's limits allow, and motions that
+it designs within them.
 
 The service, `daq diagnose` and the diagnosing process of a blind trial use this.
 """
@@ -16,11 +17,13 @@ if TYPE_CHECKING:
 
 
 def experiment_chooser(machine: Machine, budget: float | None = None) -> ExperimentChooser:
-    """Returns the library of experiments, planned and checked for a machine. The caller runs those asked for.
+    """Returns the library of experiments, planned and checked for a machine, and a search for better ones. The caller
+    runs those asked for.
 
     Args:
         budget: remaining robot time (s); None for no limit.
     """
     from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
+    from model.discrepancy.experiment_design.search import MotionSearch
 
-    return ExperimentChooser(offered_experiments(), lambda spec: planned(spec, machine), budget)
+    return ExperimentChooser(offered_experiments(), lambda spec: planned(spec, machine), budget, MotionSearch())

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from daq.contracts.errors import DaqError
-from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from model.arrays import Floats
 from model.design.information import imagined_trace
 from model.discrepancy.output_error.calibration import Calibration
@@ -50,14 +50,19 @@ class Imagined:
         return len(inputs) * inputs.period
 
 
-def imagine(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | None:
+Imaginer = Callable[[OfferedExperiment, Point, int], Imagined | None]
+"""An experiment as a diagnosis with a point's model would see it, with noise of a seed; None where it cannot be run or
+takes too long."""
+
+
+def imagine(model: Model, spec: ExperimentSpec, plan: Planner, noise_seed: int = NOISE_SEED) -> Imagined | None:
     """The experiment on the grid of control periods; None where the planner refuses it, or nothing would move."""
     try:
         observation, given = observe(model, [imagined_trace(model, spec, plan)])
     except DaqError:
         return None
     counts = observation.deviations / observation.unit
-    drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.prepared[0].noise.shape)
+    drawn = np.random.default_rng(noise_seed).standard_normal(observation.prepared[0].noise.shape)
     observation = observation.with_drive_as_input(False)  # nothing has been recorded yet
     return Imagined(observation, tuple(u for u in given.unknowns if u.trace is not None), (drawn * counts,))
 
