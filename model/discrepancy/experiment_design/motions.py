@@ -20,6 +20,7 @@ from daq.contracts.experiment import Cubic, ExperimentSpec, Gain, Pause, Ramp, S
 from daq.contracts.experiment import Sequence as Segments
 from daq.contracts.machine import BoardPid, Machine, NoController
 from model.arrays import Floats
+from model.fitting.records import resolution
 
 Way = Literal["step", "ramp", "smooth"]
 """How joints go from one level to the next."""
@@ -40,9 +41,10 @@ MOST_SPEED = 0.8
 """Share of a joint's speed limit that a designed motion asks for at most."""
 LARGEST_GAIN = 20
 """Largest P of the board."""
+STEP_SHARE = 0.45
+"""Largest amplitude of steps as a share of the error at which set points pause: a step is twice its amplitude."""
 LARGEST: Mapping[Way, float] = {"step": math.radians(3.8), "ramp": math.radians(30.0), "smooth": math.radians(120.0)}
-"""Largest amplitude of a joint, rad. Twice that of a step is its size, and less than a step at which set points
-pause."""
+"""Largest amplitude of a joint, rad."""
 CALLED: Mapping[Way, str] = {"step": "steps", "ramp": "moves at constant speed", "smooth": "smooth moves"}
 
 
@@ -110,15 +112,18 @@ def within_limits(motion: Motion, machine: Machine) -> Motion:
     refuses."""
     low, high = room(machine)
     posture = np.clip(motion.posture, low, high)
+    counts = machine.limits.following_error_counts
     blocks = []
     for block in motion.blocks:
         most = np.minimum(np.minimum(posture - low, high - posture), LARGEST[block.way])
         farthest = np.abs(np.diff(block.levels, axis=0, prepend=0.0, append=0.0)).max(axis=0)
         moving = block.pace * (1.0 - block.rest) / (PEAK if block.way == "smooth" else 1.0)
         for k, joint in enumerate(machine.modelled_joints):
-            speed = machine.limits.joint(joint).speed
+            speed, sensor = machine.limits.joint(joint).speed, machine.joint(joint).sensor
             if block.way != "step" and speed is not None:
                 most[k] = min(most[k], MOST_SPEED * speed * moving / max(farthest[k], 1e-9))
+            if block.way == "step" and counts is not None and sensor is not None:
+                most[k] = min(most[k], STEP_SHARE * counts * resolution(sensor))
         blocks.append(replace(block, amplitude=np.clip(block.amplitude, -most, most)))
     return replace(motion, posture=posture, blocks=tuple(blocks))
 
