@@ -38,7 +38,7 @@ MOST_RIVALS = 4
 """Most rivals among which an experiment is to decide: each of them is simulated on every experiment."""
 SETTLING = 5
 """Steps of each search that runs a rival's fit to convergence."""
-LONGEST_DESIGN = 30.0
+LONGEST_DESIGN = 20.0
 """Longest designed motion, s of robot time."""
 
 

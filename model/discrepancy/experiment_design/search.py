@@ -35,8 +35,8 @@ EXTRA_TIME = 1.0
 class MotionSearch:
     """How much to search: motions `drawn` at random, and `changed` afterwards, the best few `kept` as their parents."""
 
-    drawn: int = 40
-    changed: int = 60
+    drawn: int = 16
+    changed: int = 24
     kept: int = 4
     seed: int = 1
 
