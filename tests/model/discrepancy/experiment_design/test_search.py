@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.contracts.errors import CancelledError, SpecError
+from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.progress import Never
+from daq.contracts.progress import CancelledError, Never
 from daq.safety.planned import planned
 from model.design.information import check_followed, imagined_trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit, judge
