@@ -125,6 +125,7 @@ def speed_law(trace: Trace, point: Point, effect: str) -> CandidateFit:
     return CandidateFit(probe, judge(found.with_new_tangents()), 50.0)
 
 
+@pytest.mark.slow
 def test_candidates_that_no_motion_separates_are_one_class_with_what_would_tell_them() -> None:
     coefficient = SPEED_LAWS["viscous_friction"]
     arm = imagined.arm()

@@ -52,6 +52,7 @@ def chooser() -> ExperimentChooser:
     return ExperimentChooser((EXPERIMENTS["diagnostic-d"],), plan, search=SMALL)
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_promises_no_less_than_what_is_offered(
     rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser
 ) -> None:
