@@ -17,11 +17,11 @@ static inline double motor_gain(const double *j, double rise) {
   return j[GEAR] * j[TORQUE_CONSTANT] / (j[RESISTANCE] * (1.0 + rise));
 }
 static inline double motor_damping(const double *j, double rise) {
-  const double e = j[BACK_EMF] * (1.0 + j[BACK_EMF_ERROR]);
+  const double e = j[BACK_EMF];
   return j[GEAR] * j[GEAR] * (j[TORQUE_CONSTANT] * e / (j[RESISTANCE] * (1.0 + rise)) + j[VISCOUS]);
 }
 static inline double steady_current(const double *j, double rise, double volts, double speed) {
-  return (volts - j[BACK_EMF] * (1.0 + j[BACK_EMF_ERROR]) * j[GEAR] * speed) / (j[RESISTANCE] * (1.0 + rise));
+  return (volts - j[BACK_EMF] * j[GEAR] * speed) / (j[RESISTANCE] * (1.0 + rise));
 }
 static inline void winding_functions(double x, double *f) {
   if (x < 0.05) {

@@ -82,17 +82,22 @@ def board_text(linearity: float) -> str:
 
 
 def recorded(
-    specs: Sequence[ExperimentSpec], machine: Machine, seed: int, plant: str | None = None, board: str | None = None
+    specs: Sequence[ExperimentSpec],
+    machine: Machine,
+    seed: int,
+    plant: str | None = None,
+    board: str | None = None,
+    modify: Sequence[str] = (),
 ) -> list[Trace]:
-    """Traces of experiments, one after the other on one mock in lock-step."""
+    """Traces of experiments, one after the other on one mock in lock-step, with these hidden effects."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        options: dict[str, str] = {"lock_step": "1", "seed": str(seed)}
+        options: dict[str, str | list[str]] = {"lock_step": "1", "seed": str(seed), "modify": list(modify)}
         for kind, text in (("plant", plant), ("board", board)):
             if text is not None:
                 (folder / f"{kind}.toml").write_text(text, "utf-8")
                 options[kind] = str(folder / f"{kind}.toml")
-        with Controller.connect(f"mock://?{urlencode(options)}") as controller:
+        with Controller.connect(f"mock://?{urlencode(options, doseq=True)}") as controller:
             return [_recorded(controller, spec, machine, folder) for spec in specs]
 
 

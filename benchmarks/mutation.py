@@ -16,7 +16,7 @@ One that no test could notice is entered in equivalent_mutants.toml with the rea
 sample is drawn, so that a seed keeps its sample. The exit code is 1 where less than 90 % of a path's mutants are
 killed.
 
---sample N    as many mutants of each path, drawn with --seed (all of them without it)
+--sample N    as many mutants of each path, drawn with --seed (all of them without it), whatever other paths there are
 --list        print the mutants and run nothing
 --kills       print each killed mutant too, with the test that failed; on a busy machine a test that waits for a
               process or a clock may have failed without noticing the fault
@@ -57,8 +57,12 @@ from benchmarks.mutants import Mutant, mutants_of
 ROOT = Path(__file__).parents[1]
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 PACKAGES = ("firmware_protocol", "daq", "daq_cli", "server", "model", "mock_controller")
-TEST_FOLDERS = {"firmware_protocol": "protocol", "mock_controller": "mock"}
-"""Packages whose folder of tests has another name."""
+TEST_FOLDERS = {
+    Path("firmware_protocol", "bridge"): "firmware",
+    Path("firmware_protocol"): "protocol",
+    Path("mock_controller"): "mock",
+}
+"""Folders whose folder of tests has another name; of a folder and one inside it, the inner one first."""
 
 LEFT_OUT = "not slow and not browser and not hardware and not lab_data"
 TARGET = 0.9
@@ -148,15 +152,17 @@ def _import_graph() -> grimp.ImportGraph:
 
 def mirrored_folder(file: str, root: Path = ROOT) -> Path:
     """The folder of tests for a module: the same path below `tests`, or the nearest folder above that exists."""
-    first, *rest = Path(file).parent.parts
-    folder = root / "tests" / TEST_FOLDERS.get(first, first) / Path(*rest)
+    parent = Path(file).parent
+    renamed = next((outer for outer in TEST_FOLDERS if parent.is_relative_to(outer)), None)
+    inner = parent if renamed is None else TEST_FOLDERS[renamed] / parent.relative_to(renamed)
+    folder = root / "tests" / inner
     while not folder.is_dir():
         folder = folder.parent
     return folder
 
 
 def _imported(file: Path, root: Path) -> set[str]:
-    """Modules of this repository that a file of tests imports, itself or through helpers below `tests`."""
+    """Modules that a file of tests imports, itself or through helpers below `tests`."""
     seen: set[Path] = set()
     modules: set[str] = set()
     waiting = [file]
@@ -171,7 +177,7 @@ def _imported(file: Path, root: Path) -> set[str]:
                 modules.add(name)
             elif helper.is_file():
                 waiting.append(helper)
-    return modules & _import_graph().modules
+    return modules
 
 
 def _import_names(file: Path) -> Iterator[str]:
@@ -192,7 +198,8 @@ def reaching(file: str, root: Path = ROOT) -> tuple[str, ...]:
     """
     module = file.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
     package = module.rpartition(".")[0]
-    above = _import_graph().find_downstream_modules(module) | {module}
+    known = module in _import_graph().modules  # a program beside its sources belongs to no package
+    above = (_import_graph().find_downstream_modules(module) if known else set()) | {module}
     nearby = {other for other in above if other == package or other.startswith(f"{package}.")}
     files = sorted(mirrored_folder(file, root).rglob("test_*.py"))
     imports = {test: _imported(test, root) for test in files}
@@ -358,7 +365,6 @@ def _arguments() -> argparse.Namespace:
 def main() -> int:
     """The exit code: 0 when enough mutants of every path were killed."""
     options = _arguments()
-    random = Random(options.seed)
     known = equivalents()
     chosen: dict[str, list[Mutant]] = {}
     left_out: dict[str, int] = {}
@@ -366,7 +372,7 @@ def main() -> int:
         for path in options.paths:
             mutants = [m for m in mutants_below(path.rstrip("/")) if options.line in (None, m.line)]
             fewer = options.sample is not None and options.sample < len(mutants)
-            drawn = random.sample(mutants, options.sample) if fewer else mutants
+            drawn = Random(options.seed).sample(mutants, options.sample) if fewer else mutants
             chosen[path] = [mutant for mutant in drawn if mutant.identity not in known]
             left_out[path] = len(drawn) - len(chosen[path])
         if options.list:

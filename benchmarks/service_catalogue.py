@@ -1,6 +1,6 @@
 """A catalogue of 100 000 traces: how long its list, its pages and its search take over REST.
 
-    python -m benchmarks service_catalogue
+    python -m benchmarks service_catalogue [--database postgresql] [--traces 1000000]
 
 The table is filled with made-up rows in the shape of years of a lab's work: ten kinds, forty tags, notes in words; the
 folder has an empty file for each, since the service compares both when it starts. Then one client asks, one question
@@ -19,10 +19,10 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import insert
+from sqlalchemy import insert, text
 
 from benchmarks.figures import Figure, at_most, quantile, show
-from benchmarks.service_process import ROBOT, RunningService, dice, started_service
+from benchmarks.service_process import DATABASES, ROBOT, RunningService, database_of, dice, started_service
 from server.store.engine import Store
 from server.store.tables import TraceRow, TraceTagRow
 
@@ -87,11 +87,11 @@ def rows(count: int, random_: random.Random) -> Iterator[dict[str, Any]]:
         }
 
 
-def fill(folder: Path, count: int) -> None:
-    """A database and a folder of traces as `daq serve` finds them in `folder`."""
+def fill(folder: Path, database: str, count: int) -> None:
+    """A database, and a folder of traces, as `daq serve` finds them in `folder`."""
     random_ = dice(count)
     (folder / "traces").mkdir()
-    store = Store(f"sqlite:///{folder / 'service' / 'service.sqlite'}")
+    store = Store(database)
     store.migrate()
     made = list(rows(count, random_))
     for first in range(0, count, BATCH):
@@ -101,6 +101,8 @@ def fill(folder: Path, count: int) -> None:
             session.execute(insert(TraceTagRow), [{"trace": row["id"], "tag": random_.choice(TAGS)} for row in part])
         for row in part:
             (folder / "traces" / row["file"]).touch()
+    with store.engine.execution_options(isolation_level="AUTOCOMMIT").connect() as connection:
+        connection.execute(text("ANALYZE"))  # PostgreSQL does this by itself, some time later
     store.close()
 
 
@@ -144,12 +146,13 @@ def _timed(service: RunningService, query: dict[str, Any]) -> tuple[float, dict[
     return 1e3 * (time.perf_counter() - begun), page
 
 
-def measure(count: int, times: int) -> tuple[list[float], dict[str, list[float]], float]:
+def measure(kind: str, count: int, times: int) -> tuple[list[float], dict[str, list[float]], float]:
     """List, searches (ms), and the start of the service (s) with so many traces."""
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, database_of(kind, Path(name)) as database:
         folder = Path(name)
-        fill(folder, count)
-        (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n", "utf-8")
+        fill(folder, database, count)
+        lines = ("[server]", "connect_at_start = false", f'database = "{database}"', "")
+        (folder / "daq.toml").write_text("\n".join(lines), "utf-8")
         begun = time.perf_counter()
         with started_service(folder, "mock://") as service:
             start = time.perf_counter() - begun
@@ -161,11 +164,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks service_catalogue", description=__doc__)
     parser.add_argument("--traces", type=int, default=100_000)
     parser.add_argument("--times", type=int, default=40, help="how often each question is asked")
+    parser.add_argument("--database", choices=DATABASES, default="sqlite")
     parser.add_argument("--quick", action="store_true", help="each question 10 times")
     given = parser.parse_args()
     times = 10 if given.quick else given.times
-    pages, searches, start = measure(given.traces, times)
-    few_pages, few_searches, few_start = measure(max(1, given.traces // 100), times)
+    pages, searches, start = measure(given.database, given.traces, times)
+    few_pages, few_searches, few_start = measure(given.database, max(1, given.traces // 100), times)
     every, few_every = ([one for each in kinds.values() for one in each] for kinds in (searches, few_searches))
 
     def beside(many: list[float], few: list[float]) -> str:
@@ -180,7 +184,9 @@ def main() -> int:
         for name, took in searches.items()
     ]
     figures.append(Figure("start of the service", f"{start:.1f} s", beside=f"of a hundredth {few_start:.1f} s"))
-    return show(f"{given.traces} traces in the catalogue", "python -m benchmarks service_catalogue", figures)
+    return show(
+        f"{given.traces} traces in the catalogue, {given.database}", "python -m benchmarks service_catalogue", figures
+    )
 
 
 if __name__ == "__main__":

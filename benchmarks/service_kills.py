@@ -1,6 +1,6 @@
 """kill -9 of server, worker or acquisition process at random moments: what is lost, what is told untruly afterwards.
 
-    python -m benchmarks service_kills
+    python -m benchmarks service_kills [--database postgresql]
 
 One service with a queue of short experiments and a row of jobs, on a mock in lock-step: what its arm does depends on no
 clock, however busy the computer is, and half a minute of an experiment takes a second or two. Again and again one of
@@ -25,7 +25,17 @@ from random import Random
 from typing import Any
 
 from benchmarks.figures import Figure, quantile, show
-from benchmarks.service_process import ENDS, RunningService, child, dice, ramp, serving, started_service
+from benchmarks.service_process import (
+    DATABASES,
+    ENDS,
+    RunningService,
+    child,
+    database_of,
+    dice,
+    ramp,
+    serving,
+    started_service,
+)
 from daq.contracts.errors import TraceError
 from daq.traces.reader import read_trace
 
@@ -297,13 +307,15 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--minutes", type=float, default=60.0, help="no more kills after so long")
     parser.add_argument("--seed", type=int, default=1991)
+    parser.add_argument("--database", choices=DATABASES, default="sqlite")
     parser.add_argument("--quick", action="store_true", help="10 kills")
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, database_of(given.database, Path(name)) as database:
+        (Path(name) / "daq.toml").write_text(f'[server]\ndatabase = "{database}"\n', "utf-8")
         found = Campaign(Path(name), PORT, given.seed).run(10 if given.quick else given.kills, 60 * given.minutes)
     for line in (*found.lost, *found.untrue, *found.queue):
         print(line, file=sys.stderr)
-    return show("kill -9 at random moments", "python -m benchmarks service_kills", figures_of(found))
+    return show(f"kill -9 at random moments, {given.database}", "python -m benchmarks service_kills", figures_of(found))
 
 
 if __name__ == "__main__":

@@ -15,11 +15,13 @@ from typing import Any
 import httpx
 
 from benchmarks.own_environment import environment_of
+from tests.server.postgresql import programs, running_postgresql
 
 ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0
 END_WITHIN = 15.0
 ENDS = ("done", "failed", "cancelled", "interrupted")
+DATABASES = ("sqlite", "postgresql")
 COMMAND = [sys.executable, "-c", "from daq_cli import main; main()"]
 
 
@@ -63,6 +65,20 @@ class RunningService:
         """Kills this one process as a power cut would."""
         self.process.send_signal(signal.SIGKILL)
         self.process.wait(END_WITHIN)
+
+
+@contextlib.contextmanager
+def database_of(kind: str, folder: Path) -> Iterator[str]:
+    """The address of a new database for a service whose files lie in `folder`: "sqlite", or "postgresql" on a server
+    that ends with the block. Raises RuntimeError where PostgreSQL is not installed."""
+    if kind == "sqlite":
+        yield f"sqlite:///{folder / 'service' / 'service.sqlite'}"
+        return
+    found = programs()
+    if found is None:
+        raise RuntimeError("PostgreSQL is not installed: on Debian and Ubuntu, apt install postgresql")
+    with running_postgresql(found) as server:
+        yield server.database()
 
 
 def serving(folder: Path, port: str, *options: str) -> subprocess.Popen[bytes]:

@@ -33,16 +33,23 @@ if TYPE_CHECKING:
     from ma2000.files import read_traces as read_traces
     from ma2000.files import write_trace as write_trace
     from ma2000.pictures import plot as plot
+    from ma2000.robot_files import save_machine as save_machine
+    from ma2000.robot_files import write_mjcf as write_mjcf
+    from ma2000.robot_files import write_urdf as write_urdf
     from ma2000.running import Run as Run
     from ma2000.running import RunError as RunError
     from ma2000.running import run as run
     from ma2000.studies import design as design
     from ma2000.studies import diagnose as diagnose
+    from ma2000.studies import feedforward as feedforward
+    from ma2000.studies import followed as followed
+    from ma2000.studies import learn as learn
     from ma2000.studies import validate as validate
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
+    from model.feedforward.tracking import Followed as Followed
     from model.fitting.fit import fit as fit
     from model.fitting.options import FitOptions as FitOptions
     from model.fitting.result import FitResult as FitResult
@@ -50,6 +57,7 @@ if TYPE_CHECKING:
     from model.machine_model.model import base_model as base_model
     from model.machine_model.model_file import load_model as load_model
     from model.machine_model.model_file import save_model as save_model
+    from model.robot_files.machine_of_arm import machine_from_urdf as machine_from_urdf
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
     from model.validation.criterion import Fidelity as Fidelity
@@ -64,6 +72,7 @@ _HOME = {
     "Diagnosis": "model.discrepancy.diagnosis",
     "DiagnosisOptions": "model.discrepancy.options",
     "ExperimentSpec": "daq.contracts.experiment",
+    "Followed": "model.feedforward.tracking",
     "Fidelity": "model.validation.criterion",
     "FitOptions": "model.fitting.options",
     "FitResult": "model.fitting.result",
@@ -77,17 +86,24 @@ _HOME = {
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
+    "feedforward": "ma2000.studies",
     "fit": "model.fitting.fit",
+    "followed": "ma2000.studies",
+    "learn": "ma2000.studies",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
+    "machine_from_urdf": "model.robot_files.machine_of_arm",
     "plot": "ma2000.pictures",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
     "run": "ma2000.running",
+    "save_machine": "ma2000.robot_files",
     "save_model": "model.machine_model.model_file",
     "simulate": "model.simulation.simulate",
     "validate": "ma2000.studies",
+    "write_mjcf": "ma2000.robot_files",
     "write_trace": "ma2000.files",
+    "write_urdf": "ma2000.robot_files",
 }
 """Module of each public name. They are imported when they are first used: a notebook that only reads traces waits for
 no compiler."""

@@ -17,6 +17,8 @@ TRY_AGAIN = "try again; if this goes on, see the database's own log"
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 """SQLite's result codes that mean that the file or its tables are damaged. The last one is that of a table or column
 that a statement does not find, or that a migration finds already."""
+_FULL = "53100"
+"""PostgreSQL's code of a full disk."""
 _TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
 _LONGEST = 200
 
@@ -50,8 +52,15 @@ def advice_of(error: DatabaseError) -> str:
 
 
 def is_full(error: DatabaseError) -> bool:
-    """Whether SQLite found the disk full."""
-    return _result_code(error) == sqlite3.SQLITE_FULL
+    """Whether the database found the disk full."""
+    return _result_code(error) == sqlite3.SQLITE_FULL or getattr(error.orig, "sqlstate", None) == _FULL
+
+
+def is_value(error: DatabaseError) -> bool:
+    """Whether the database refused a value: PostgreSQL a text with the character NUL, for example."""
+    from sqlalchemy.exc import DataError
+
+    return isinstance(error, DataError)
 
 
 def _result_code(error: DatabaseError) -> int | None:

@@ -27,17 +27,17 @@ def _lines(name: str, table: dict[str, Any]) -> list[str]:
     """The table's own keys, then its subtables."""
     lines = [f"[{name}]"] if name else []
     lines += [f"# {key} is not set" for key, value in table.items() if value is None]
-    lines += [f"{key} = {_value(value)}" for key, value in table.items() if not isinstance(value, dict | NoneType)]
+    lines += [f"{key} = {toml_value(value)}" for key, value in table.items() if not isinstance(value, dict | NoneType)]
     for key, value in table.items():
         if isinstance(value, dict):
             lines += ["", *_lines(f"{name}.{key}", value)]
     return lines
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """A value as TOML. Strings, numbers and booleans are written as in JSON, but for DEL, which TOML wants escaped."""
     if isinstance(value, list):
-        return f"[{', '.join(map(_value, value))}]"
+        return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{key} = {_value(one)}' for key, one in value.items() if one is not None)}}}"
+        return f"{{{', '.join(f'{key} = {toml_value(one)}' for key, one in value.items() if one is not None)}}}"
     return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")

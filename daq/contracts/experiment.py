@@ -197,13 +197,8 @@ Trajectory = Annotated[
 ]
 
 
-class ExperimentSpec(FrozenRecord):
-    """One experiment. The same model serves the command line, the service and the trace's metadata.
-
-    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
-    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
-    record; None means every joint that the line has room for.
-    """
+class PlainExperiment(FrozenRecord):
+    """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
 
     trajectory: Trajectory = Ramp()
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)] = (1, 2, 3)
@@ -238,6 +233,56 @@ class ExperimentSpec(FrozenRecord):
             columns = len(self.trajectory.positions[0])
             raise ValueError(f"the path has {columns} columns for {len(self.joints)} joints")
         return self
+
+
+class TrackingError(FrozenRecord):
+    """Distance of a joint from the motion asked for: root mean square and largest, rad (m on a prismatic joint)."""
+
+    rms: Annotated[FiniteFloat, Field(ge=0)]
+    largest: Annotated[FiniteFloat, Field(ge=0)]
+
+
+class Feedforward(FrozenRecord):
+    """Where a path's set points come from: they were computed so that the arm follows another experiment's motion.
+
+    `asked` is that experiment. Set points were computed with the model of this identity, learned from the trace of this
+    number, or both. `expected` is the error that the arm should have; `before` that of plain set points in the model's
+    simulation, or that of the trace which was learned from.
+    """
+
+    asked: PlainExperiment
+    model: Annotated[str, Field(max_length=100)] | None = None
+    learned_from: Annotated[str, Field(max_length=100)] | None = None
+    expected: dict[JointNumber, TrackingError]
+    before: dict[JointNumber, TrackingError]
+
+
+class ExperimentSpec(PlainExperiment):
+    """One experiment. The same model serves the command line, the service and the trace's metadata.
+
+    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
+    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
+    record; None means every joint that the line has room for. `feedforward` says for which motion a path's set points
+    were computed.
+    """
+
+    feedforward: Annotated[Feedforward | None, Field(exclude_if=lambda one: one is None)] = None
+
+    @model_validator(mode="after")
+    def _computed_path(self) -> Self:
+        if self.feedforward is not None and not isinstance(self.trajectory, Path):
+            raise ValueError(f"feedforward is for a path of computed set points, not for a {self.trajectory.kind}")
+        return self
+
+    @property
+    def plain(self) -> ExperimentSpec:
+        """The experiment whose motion is wanted: this one, or the one that its set points were computed for."""
+        return self if self.feedforward is None else ExperimentSpec(**dict(self.feedforward.asked))
+
+    @property
+    def as_asked(self) -> PlainExperiment:
+        """This experiment without word of computed set points."""
+        return PlainExperiment(**{name: getattr(self, name) for name in PlainExperiment.model_fields})
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,11 @@ from daq.safety.check_plan import check_plan
 from daq.trajectories import plan, start_angles
 
 
+def motion_of(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
+    """Set points (k, joints) of an experiment, rad, whether or not it may be carried out. Raises SpecError."""
+    return plan(spec, machine, start_angles(spec, machine)).angles
+
+
 def planned(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
     """Set points (k, joints) of an experiment, rad. Raises SpecError, SafetyError where it may not be carried out."""
     motion = plan(spec, machine, start_angles(spec, machine))

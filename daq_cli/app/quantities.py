@@ -37,6 +37,15 @@ def parse_gains(text: str) -> dict[int, tuple[int, int, int]]:
     return gains
 
 
+def parse_numbers(text: str, what: str, count: int) -> tuple[float, ...]:
+    """So many finite numbers, separated by commas. Raises SpecError."""
+    words = [word.strip() for word in text.split(",")]
+    if len(words) != count or not all(re.fullmatch(_NUMBER, word) and math.isfinite(float(word)) for word in words):
+        needed = "a number" if count == 1 else f"{count} numbers, separated by commas"
+        raise SpecError(f"{what} {text[:100]!r}: write {needed}")
+    return tuple(map(float, words))
+
+
 def _pairs(text: str, what: str) -> list[tuple[int, str]]:
     pairs: list[tuple[int, str]] = []
     for part in text.split(","):

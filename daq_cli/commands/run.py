@@ -19,8 +19,9 @@ from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
 from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles
+from daq_cli.models.model_input import MODEL_HELP
 from daq_cli.robot.access import robot_of
-from daq_cli.robot.experiment import RunOptions, carry_out
+from daq_cli.robot.experiment import Computation, RunOptions, carry_out
 
 app = typer.Typer(add_completion=False, help="Run an experiment and record its trace.", no_args_is_help=True)
 
@@ -76,6 +77,25 @@ NameOption = Annotated[str | None, typer.Option(help="A name for the experiment.
 OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
 NotesOption = Annotated[str, typer.Option(help="Remarks that are kept with the trace.")]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")]
+FeedforwardOption = Annotated[
+    str | None,
+    typer.Option(
+        "--feedforward",
+        help=f"Compute set points with which the arm follows the motion, by a model. {MODEL_HELP}",
+        metavar="MODEL",
+    ),
+]
+LearnFromOption = Annotated[
+    str | None,
+    typer.Option(
+        "--learn-from",
+        help="A trace of the same motion: correct its set points by its error.",
+        autocompletion=completion.traces,
+    ),
+]
+LearnShareOption = Annotated[
+    float, typer.Option("--learn-share", min=0.01, max=1.0, help="Share of the correction that --learn-from makes.")
+]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only check and show the motion; connect to nothing.")]
 
 COMMON: dict[str, tuple[Any, Any]] = {
@@ -91,6 +111,9 @@ COMMON: dict[str, tuple[Any, Any]] = {
     "notes": (NotesOption, ""),
 }
 EXECUTION: dict[str, tuple[Any, Any]] = {
+    "feedforward": (FeedforwardOption, None),
+    "learn_from": (LearnFromOption, None),
+    "learn_share": (LearnShareOption, 1.0),
     "folder": (FolderOption, None),
     "dry_run": (DryRunOption, False),
     "yes": (YesOption, False),
@@ -158,9 +181,15 @@ def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operat
     return parse_spec(data)
 
 
-def _carry_out(context: typer.Context, spec: ExperimentSpec, values: dict[str, Any]) -> None:
-    options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
-    carry_out(robot_of(context), spec, options)
+def _carry_out(context: typer.Context, spec: ExperimentSpec, options: RunOptions, computation: Computation) -> None:
+    robot = robot_of(context)
+    if computation.learn_from is None and computation.share != 1.0:
+        raise SpecError("--learn-share: is for --learn-from; leave it out")
+    if computation.wanted:
+        from daq_cli.models.feedforward import with_computed_set_points
+
+        spec = with_computed_set_points(robot, spec, computation, options)
+    carry_out(robot, spec, options)
 
 
 def _command(kind: type[BaseModel]) -> Callable[..., None]:
@@ -168,7 +197,10 @@ def _command(kind: type[BaseModel]) -> Callable[..., None]:
 
     def command(context: typer.Context, **values: Any) -> None:
         operator = invocation(context).settings.operator
-        _carry_out(context, spec_from_options(_trajectory(kind, values), values, operator), values)
+        spec = spec_from_options(_trajectory(kind, values), values, operator)
+        options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
+        computation = Computation(values["feedforward"], values["learn_from"], values["learn_share"])
+        _carry_out(context, spec, options, computation)
 
     own = {name: _option(name, field) for name, field in kind.model_fields.items() if name != "kind"}
     options = {**own, **COMMON, **EXECUTION}
@@ -191,6 +223,9 @@ for _name, _kind in KINDS.items():
 def from_file(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="An experiment as JSON or TOML, angles in rad.")],
+    feedforward: FeedforwardOption = None,
+    learn_from: LearnFromOption = None,
+    learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
@@ -199,7 +234,8 @@ def from_file(
     """Run an experiment from a file: any kind, also paths and sequences."""
     from daq_cli.robot.experiment import read_spec
 
-    _carry_out(context, read_spec(file), {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json})
+    computation = Computation(feedforward, learn_from, learn_share)
+    _carry_out(context, read_spec(file), RunOptions(folder, dry_run, yes, json), computation)
 
 
 @app.command("preset")
@@ -208,6 +244,9 @@ def by_name(
     name: Annotated[
         str, typer.Argument(help="Name of a preset; without one, all are listed.", autocompletion=completion.presets)
     ] = "",
+    feedforward: FeedforwardOption = None,
+    learn_from: LearnFromOption = None,
+    learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
@@ -223,17 +262,20 @@ def by_name(
         for known, one in PRESETS.items():
             print(f"{known:14s} {one.description}")
         return
-    values = {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json}
-    _carry_out(context, preset(name).spec, values)
+    computation = Computation(feedforward, learn_from, learn_share)
+    _carry_out(context, preset(name).spec, RunOptions(folder, dry_run, yes, json), computation)
 
 
 @app.command()
 def diagnostic(
     context: typer.Context,
+    feedforward: FeedforwardOption = None,
+    learn_from: LearnFromOption = None,
+    learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
     """Run the preset `diagnostic`: about 55 s of motion that distinguishes hidden effects."""
-    by_name(context, "diagnostic", folder, dry_run, yes, json)
+    by_name(context, "diagnostic", feedforward, learn_from, learn_share, folder, dry_run, yes, json)

@@ -86,13 +86,23 @@ def show(
 ) -> None:
     """Show a trace's record, and its figures by joint."""
     from daq.traces.summary import joint_figures
+    from daq_cli.models.feedforward import print_tracking, tracking_data
 
     path, found = _read(context, trace, folder)
     figures = joint_figures(found)
     if json:
         data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
         joints = [figure.model_dump() for figure in figures]
-        print_json({"path": path, "record": data, "samples": len(found), "missing": found.missing, "joints": joints})
+        print_json(
+            {
+                "path": path,
+                "record": data,
+                "samples": len(found),
+                "missing": found.missing,
+                "joints": joints,
+                "tracking": tracking_data(found),
+            }
+        )
         return
     record = found.record
     what = record.spec.trajectory.kind if record.spec else "import"
@@ -102,6 +112,7 @@ def show(
     if record.operator or record.notes:
         print(printable(f"operator {record.operator or '?'}: {record.notes}"))
     print_figures(found)
+    print_tracking(found)
     for event in found.events:
         print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
     print(printable(f"file: {path}"))

@@ -32,6 +32,21 @@ class RunOptions:
     json: bool
 
 
+@dataclass(frozen=True)
+class Computation:
+    """How set points are to be computed: with a model, from the error of a trace, of which a share is corrected, or
+    both."""
+
+    model: str | None
+    learn_from: str | None
+    share: float
+
+    @property
+    def wanted(self) -> bool:
+        """Whether they are to be computed at all."""
+        return self.model is not None or self.learn_from is not None
+
+
 def read_spec(path: Path) -> ExperimentSpec:
     """The experiment that a .json or .toml file describes. Raises SpecError with one line."""
     from daq.contracts.documents import read_document
@@ -77,7 +92,9 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
     shown = motion.preview()
     violations = check_plan(motion, machine, machine.limits)
     if as_json:
-        print_json({"preview": shown.as_data(), "violations": [str(v) for v in violations]})
+        found = {"preview": shown.as_data(), "violations": [str(v) for v in violations]}
+        computed = {} if spec.feedforward is None else {"experiment": spec.model_dump(mode="json")}
+        print_json(found | computed)
     else:
         every = f"every {shown.period * 1e3:g} ms"
         print(f"{spec.trajectory.kind}: {shown.duration:.2f} s, {shown.set_points} set points {every}")

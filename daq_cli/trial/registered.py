@@ -28,6 +28,7 @@ REGISTERED = (
     "model/kinematics",
     "model/thesis_control",
     "model/design",
+    "model/feedforward",
     "model/validation",
     "model/analysis",
     "model/trial",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from daq.contracts.errors import TraceError
+from daq.contracts.experiment import Gain
 from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -109,7 +111,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
         initial,
         drive[0].copy(),
         rows,
-        _gains(machine, trace),
+        gains_of(machine, trace.record.gains),
         np.zeros((count, len(joints))),
         trace.record.trace_id,
         trace.set_point is not None,
@@ -185,8 +187,8 @@ def _rest_posture(trace: Trace, measured: Floats, first: Floats, machine: Machin
     return np.asarray(measured[: max(1, min(until, REST_PERIODS))].mean(axis=0))
 
 
-def _gains(machine: Machine, trace: Trace) -> Floats:
-    """Gains of the modelled joints: the record's own where it has them, else the machine's."""
+def gains_of(machine: Machine, own: Mapping[int, Gain] | None) -> Floats:
+    """Gains (n, GAINS) of the modelled joints: a record's own, by joint, where it has them, else the machine's."""
     gains = np.zeros((len(machine.modelled_joints), pid.GAINS))
     controller = machine.controller
     if isinstance(controller, NoController):
@@ -195,8 +197,8 @@ def _gains(machine: Machine, trace: Trace) -> Floats:
         gains[k, pid.P : pid.D + 1] = controller.gains[joint - 1]
         if isinstance(controller, BoardPid):
             gains[k, pid.SCALE] = controller.dac_counts_per_adc_count.value
-            if trace.record.gains and joint in trace.record.gains:
-                gains[k, pid.P : pid.D + 1] = trace.record.gains[joint]
+            if own and joint in own:
+                gains[k, pid.P : pid.D + 1] = own[joint]
         elif isinstance(controller, SampledPid):
             if controller.velocity_gains is not None:
                 gains[k, pid.INNER_P : pid.INNER_D + 1] = controller.velocity_gains[joint - 1]

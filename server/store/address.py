@@ -11,8 +11,8 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import DaqError
 
 EXAMPLES = "sqlite:////srv/arm/service.sqlite or postgresql+psycopg://daq@localhost/daq"
-PACKAGES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
-"""The package of a driver's module, for modules whose package has another name."""
+PACKAGES = {"psycopg": "ma2000-daq[postgresql]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
+"""What to install for a driver's module, where that has another name."""
 
 
 class StoreError(DaqError):
@@ -48,7 +48,8 @@ def open_engine(url: str) -> Engine:
     the error says which package to install."""
     parsed = parse_address(url)
     try:
-        return create_engine(parsed)
+        # A connection that its server has closed meanwhile is replaced before it is used.
+        return create_engine(parsed, pool_pre_ping=parsed.get_backend_name() != "sqlite")
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error
     except (ArgumentError, TypeError, ValueError) as error:

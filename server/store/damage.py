@@ -9,7 +9,7 @@ from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.experiments import ExperimentState
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
-from server.store.tables import ExperimentRow, JobRow, Table
+from server.store.tables import TABLES_OF_THE_SEARCH, ExperimentRow, JobRow, Table
 
 
 def require_sound(engine: Engine, place: str) -> None:
@@ -42,6 +42,9 @@ def _require_columns(connection: Connection, place: str) -> None:
         if missing:
             line = f"database {place}: table {name} has no column {', '.join(sorted(missing))}"
             raise DamagedError(f"{line}; {BRING_BACK}")
+    for name in TABLES_OF_THE_SEARCH if connection.dialect.name == "sqlite" else ():
+        if name not in tables:
+            raise DamagedError(f"database {place}: table {name} is missing; {BRING_BACK}")
 
 
 def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], place: str) -> None:

@@ -8,6 +8,9 @@ from typing import Any
 from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, String, Text, TypeDecorator, UniqueConstraint
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
+TABLES_OF_THE_SEARCH = ("trace_numbers", "trace_words")
+"""SQLite's tables that a migration makes and triggers fill. No row of theirs is an object here."""
+
 
 class Utc(TypeDecorator[datetime]):
     """A time with its time zone, stored as UTC, because SQLite has no time zones."""
@@ -120,11 +123,12 @@ class QueueRow(Table):
 class TraceRow(Table):
     """One trace of the folder. `searched` holds the text for searches, in lower case.
 
-    The index has the order of the list and all columns that a search needs, so the table is read for matches only.
+    The index has the order of the list. SQLite's has all columns that a search needs too, so the table is read for
+    matches only; PostgreSQL's cannot hold long notes. Beside it stands an index of trigrams for rare texts: on SQLite
+    the table `trace_words`, which triggers keep up to date. Migration 0006 makes what differs between the two.
     """
 
     __tablename__ = "traces"
-    __table_args__ = (Index("traces_found", "robot", "created", "id", "source", "outcome", "kind", "searched"),)
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     robot: Mapped[str] = mapped_column(String(32))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import delete, select, tuple_, update
+from sqlalchemy import delete, select, text, tuple_, update
 from sqlalchemy.orm import Session
 
 from daq.contracts.service.base import Page
@@ -18,6 +18,15 @@ from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, page_of
 from server.store.remembered import Remembered
 from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
+
+TRIGRAM = 3
+"""Number of characters of the shortest text that an index of trigrams finds."""
+FEW = 2000
+"""Number of traces up to which a search fetches all that match, and sorts them."""
+_FEW_OF_SQLITE = text(
+    "SELECT trace FROM trace_numbers JOIN trace_words ON number = trace_words.rowid"
+    " WHERE trace_words MATCH :phrase LIMIT :most"
+)
 
 
 @dataclass(frozen=True)
@@ -117,8 +126,13 @@ class TraceStore:
         for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
             if wanted is not None:
                 query = query.where(getattr(TraceRow, column) == wanted)
+        few = None
         if search.text:
-            query = query.where(TraceRow.searched.contains(search.text.lower(), autoescape=True))
+            few = self._few_with(search.text.lower())
+            searched = search.text.lower().replace("\0", "")
+            query = query.where(TraceRow.searched.contains(searched, autoescape=True))
+        if few is not None:
+            query = query.where(TraceRow.id.in_(few))
         if search.tag is not None:
             query = query.where(TraceRow.id.in_(select(TraceTagRow.trace).filter_by(tag=search.tag)))
         if search.since is not None:
@@ -138,6 +152,26 @@ class TraceStore:
             lambda row: _entry(row, tags.get(row.id, ())),
             lambda row: Cursor(row.created.timestamp(), row.id),
         )
+
+    def _few_with(self, searched: str) -> list[str] | None:
+        """Returns the identities of all traces with this text, which an index of trigrams finds. None if they are more
+        than FEW, so that reading the list in its order soon finds the first ones, and if there is no such index."""
+        if "\0" in searched:  # which no database looks for
+            return []
+        if len(searched) < TRIGRAM:
+            return None
+        with self._store.reading() as session:
+            match session.get_bind().dialect.name:
+                case "sqlite":
+                    phrase = '"' + searched.replace('"', '""') + '"'
+                    found = session.scalars(_FEW_OF_SQLITE, {"phrase": phrase, "most": FEW + 1})
+                case "postgresql":
+                    matching = TraceRow.searched.contains(searched, autoescape=True)
+                    found = session.scalars(select(TraceRow.id).where(matching).limit(FEW + 1))
+                case _:
+                    return None
+            identities = list(found)
+        return identities if len(identities) <= FEW else None
 
     def change(self, robot: str, identity: str, change: TraceChange) -> CatalogueEntry:
         """Changes tags or notes. Raises a 404."""

@@ -167,8 +167,8 @@ def test_more_arms_than_a_trial_can_have_are_refused(daq: CommandLine) -> None:
     [
         ("nonsense", ("server.database 'nonsense'", "write sqlite:///", "postgresql+psycopg://")),
         ("", ()),
-        ("postgresql://anna:secret@db/arm", ("anna:***@db", "its driver psycopg", "is not installed", "pip install")),
-        ("postgresql+psycopg://db/arm", ("driver psycopg is not installed", "pip install 'psycopg[binary]'")),
+        ("postgresql+psycopg2://anna:secret@db/arm", ("anna:***@db", "its driver psycopg2 is not installed", "pip")),
+        ("postgresql+pg8000://db/arm", ("driver pg8000 is not installed", "pip install 'pg8000'")),
         ("oracle9://db", ("is not the address of a database",)),
         ("sqlite:////proc/nothing/service.sqlite", ("/proc/nothing", "cannot be made")),
     ],

@@ -1,17 +1,13 @@
-"""The sources of the bridge in C: its header of the memory map, its warnings, its sizes, and what a fuzzer finds."""
+"""The sources of the bridge in C: how long they are, their warnings, their sizes, and what a fuzzer finds."""
 
 from __future__ import annotations
 
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from firmware_protocol.c_header import c_header, main
-from firmware_protocol.errors import MemoryMapError
-from firmware_protocol.memory_map import default_memory_map
 from tests.firmware.compiled import BUILD, SOURCES, made, need
 
 MOST_CORE_FLASH = 6_900
@@ -24,19 +20,6 @@ def make(*targets: str) -> str:
     """What a target of the bridge's Makefile prints."""
     command = ["make", "-s", "-C", SOURCES, f"BUILD={BUILD}", *targets]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-
-
-def test_the_header_of_the_memory_map_is_that_of_the_map_that_ships() -> None:
-    header = (SOURCES / "core" / "memory_map.h").read_text("utf-8")
-    assert header == c_header(default_memory_map()), "run: python -m firmware_protocol.c_header > …/core/memory_map.h"
-
-
-def test_a_memory_larger_than_a_page_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    large = default_memory_map().model_copy(update={"size": 0x200})
-    with pytest.raises(MemoryMapError, match="512 bytes: the core serves 256 at most"):
-        c_header(large)
-    assert main([str(tmp_path / "none.toml")]) == 2
-    assert "none.toml" in capsys.readouterr().err
 
 
 def test_functions_and_files_stay_short() -> None:

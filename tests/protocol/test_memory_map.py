@@ -63,6 +63,14 @@ MISTAKES = {
     "too many bits": ("bits = 12", "bits = 13", "register position has 13 bits: allowed are 12 to 12"),
     "high byte missing": ("bits = 8", "bits = 9", "registers.power: 9 bits need a high byte"),
     "size beyond the end": ("size = 0x80", "size = 0x8000", "32768 bytes from FC00: the address space ends at FFFF"),
+    "negative address": ("[0xFC72]", "[-1]", r"gripper.low.0: .* greater than or equal to 0 \(found -1\)"),
+    "no bits": ("bits = 12", "bits = 0", r"position.bits: .* greater than or equal to 1 \(found 0\)"),
+    "more bits than two bytes": ("bits = 16", "bits = 17", r"error.bits: .* less than or equal to 16 \(found 17\)"),
+    "no memory": ("size = 0x80", "size = 0", r"size: .* greater than or equal to 1 \(found 0\)"),
+    "too much memory": ("size = 0x80", "size = 0x10001", r"size: .* less than or equal to 65536 \(found 65537\)"),
+    "base beyond the end": ("base = 0xFC00", "base = 0x10000", r"base: .* less than or equal to 65535 \(found 65536\)"),
+    "below the base": ("[0xFC72]", "[0xFBFF]", "gripper at FBFF lies outside FC00–FC7F"),
+    "nested too deeply": ("version = 1", "version = " + "[" * 100_000, "not a memory map: it is nested too deeply"),
     "version": ("version = 1", "version = 2", r"version: Input should be 1 \(found 2\)"),
     "no TOML": ("version = 1", "version = ", "not TOML"),
 }
@@ -160,6 +168,13 @@ def test_every_value_of_a_register_survives_its_bytes(name: str) -> None:
     for value in (lowest - 1, lowest + (1 << register.bits)):
         with pytest.raises(UnitsError, match=f"value {value} .* allowed are {lowest} to"):
             register.encode(value)
+
+
+def test_the_memory_may_begin_at_nothing_and_be_the_whole_address_space() -> None:
+    whole = parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x10000").replace("base = 0xFC00", "base = 0"))
+    assert (whole.base, whole.size) == (0, 0x10000)
+    ends = parse_memory_map(SHIPPED.replace("[0xFC72]", "[0xFC7F]").replace("[0xFC70]", "[0xFC06]"))
+    assert (ends["gripper"].low, ends["process_inputs"].low) == ((0xFC7F,), (0xFC06,))
 
 
 def test_bits_above_a_reading_are_ignored() -> None:

@@ -2,13 +2,14 @@
 
 import dataclasses
 import struct
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_protocol import commands as c
-from firmware_protocol.errors import ProtocolError
+from firmware_protocol.errors import PayloadLengthError, ProtocolError
 from firmware_protocol.framing import MAX_PAYLOAD, Frame
 from tests.protocol import strategies
 
@@ -118,7 +119,7 @@ def test_a_stop_has_no_stamp_and_the_layout_of_version_1() -> None:
 def test_a_greeting_of_any_other_version_is_understood_as_such(payload: bytes) -> None:
     request = c.parse_request(Frame(0, c.Hello.OPCODE, payload))
     assert isinstance(request, c.Hello)
-    assert request.version == (payload[0] if payload else 1)
+    assert (request.version, request.nonce) == (payload[0] if payload else 1, 0)
 
 
 @pytest.mark.parametrize("opcode", sorted(c.REPLIES))
@@ -158,6 +159,7 @@ def test_joint_masks_have_bit_0_for_joint_1() -> None:
 
 
 READING = c.JointReading(0, 0, 0, 0)
+COMPACT = c.CompactReading(0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -200,11 +202,117 @@ READING = c.JointReading(0, 0, 0, 0)
         (lambda: c.Stopped(1 << 32, (1,) * 6), "Stopped: tick of 4294967296: allowed are 0 to 4294967295"),
         (lambda: c.Stopped(1, (1, 2, 3)), "Stopped: 3 postures, expected 6"),
         (lambda: c.Stopped(1, (1, 2, 3, 4, 5, 1000)), "posture of joint 6 of 1000: allowed are 0 to 999"),
+        (lambda: c.Stopped(1, (1, 2, 3, 4, 5, -1)), "posture of joint 6 of -1: allowed are 0 to 999"),
+        (lambda: c.SetGains(7, 1, 1, 1), "joint 7: allowed are 1 to 6"),
+        (lambda: c.SetGains(1, 1, 21, 1), "joint 1: gain I of 21: allowed are 0 to 20"),
+        (lambda: c.JointReading(0, 0, 0x8000, 0), "error of 32768: allowed are -32768 to 32767"),
+        (lambda: c.JointReading(0, 0, -0x8001, 0), "error of -32769: allowed are -32768 to 32767"),
+        (lambda: c.JointReading(0, 0, 0, -129), "power of -129: allowed are -128 to 127"),
+        (lambda: c.JointReading(0, -1, 0, 0), "position of -1: allowed are 0 to 4095"),
+        (lambda: c.JointReading(-1, 0, 0, 0), "set point of -1: allowed are 0 to 1023"),
+        (lambda: c.CompactReading(-1, 0, 0), "position of -1: allowed are 0 to 4095"),
+        (lambda: c.CompactReading(4096, 0, 0), "position of 4096: allowed are 0 to 4095"),
+        (lambda: c.CompactReading(0, 2048, 0), "error of 2048: allowed are -2048 to 2047"),
+        (lambda: c.CompactReading(0, -2049, 0), "error of -2049: allowed are -2048 to 2047"),
+        (lambda: c.CompactReading(0, 0, 128), "power of 128: allowed are -128 to 127"),
+        (lambda: c.CompactReading(0, 0, -129), "power of -129: allowed are -128 to 127"),
+        (lambda: c.CompactSnapshot(-1, 0, 0, ((3, COMPACT),)), "CompactSnapshot: tick of -1"),
+        (lambda: c.CompactSnapshot(1 << 32, 0, 0, ((3, COMPACT),)), "CompactSnapshot: tick of 4294967296"),
+        (lambda: c.CompactSnapshot(1, 256, 0, ((3, COMPACT),)), "CompactSnapshot: status of 256: allowed are 0 to 255"),
+        (lambda: c.CompactSnapshot(1, -1, 0, ((3, COMPACT),)), "CompactSnapshot: status of -1: allowed are 0 to 255"),
+        (lambda: c.CompactSnapshot(1, 0, 256, ((3, COMPACT),)), "CompactSnapshot: taken of 256: allowed are 0 to 255"),
+        (lambda: c.CompactSnapshot(1, 0, -1, ((3, COMPACT),)), "CompactSnapshot: taken of -1: allowed are 0 to 255"),
+        (lambda: c.CompactSnapshot(1, 0, 0, ()), "CompactSnapshot: no joints: at least one"),
+        (lambda: c.Snapshot(1, -1, ((3, READING),)), "Snapshot: status of -1: allowed are 0 to 255"),
+        (lambda: c.ErrorsPositionsPowers(()), "ErrorsPositionsPowers: no joints: at least one"),
+        (lambda: c.MoveAndSample(-1, 1), "MoveAndSample: after of -1: allowed are 0 to 4294967295"),
+        (lambda: c.MoveAndSample(1 << 32, 1), "MoveAndSample: after of 4294967296: allowed are 0 to 4294967295"),
+        (lambda: c.MoveAndSample(1, 0), "MoveAndSample: joint mask 0x00: allowed are 0x01 to 0x3f"),
+        (lambda: c.MoveAndSample(1, 1, ((1, 1000),)), "joint 1: set point of 1000 posture units"),
+        (lambda: c.Stamp(-1, 1), "session of -1: allowed are 0 to 4294967295"),
+        (lambda: c.Stamp(1 << 32, 1), "session of 4294967296: allowed are 0 to 4294967295"),
+        (lambda: c.Stamp(1, -1), "number of a command of -1: allowed are 0 to 4294967295"),
+        (lambda: c.Stamp(1, 1 << 32), "number of a command of 4294967296: allowed are 0 to 4294967295"),
     ],
 )
 def test_a_message_with_values_out_of_range_cannot_be_made(make: object, says: str) -> None:
     with pytest.raises(ProtocolError, match=says):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: c.JointReading(0, 0, -0x8000, -0x80),
+        lambda: c.JointReading(1023, 4095, 0x7FFF, 0x7F),
+        lambda: c.CompactReading(0, -2048, -0x80),
+        lambda: c.CompactReading(4095, 2047, 0x7F),
+        lambda: c.ReadBlock(0xFFFF, 1),
+        lambda: c.ReadBlock(0xFFD0, 48),
+        lambda: c.WriteBlock(0xFFDA, bytes(38)),
+        lambda: c.SetGains(6, 20, 0, 20),
+        lambda: c.SetGains(1, 0, 20, 0),
+        lambda: c.MoveAndSample(0xFFFFFFFF, 0x3F, ((6, 999),)),
+        lambda: c.Stopped(0xFFFFFFFF, (0, 999, 0, 999, 0, 999)),
+        lambda: c.CompactSnapshot(0xFFFFFFFF, 255, 255, ((6, COMPACT),)),
+    ],
+)
+def test_a_message_with_values_at_the_ends_of_their_ranges_can_be_made_and_sent(make: Callable[[], object]) -> None:
+    message = make()
+    if isinstance(message, c.Message):
+        assert type(message).parse(message.pack()) == message
+
+
+@given(st.integers(0, 0xFFFFFFFF), st.integers(-128, 127))
+def test_the_tick_that_set_points_were_taken_in_is_the_nearest_with_its_lowest_eight_bits(tick: int, ago: int) -> None:
+    assert c.CompactSnapshot(tick, 0, (tick + ago) & 0xFF, ((1, COMPACT),)).taken_tick == tick + ago
+
+
+@pytest.mark.parametrize(
+    ("error", "kept"), [(0, 0), (2047, 2047), (2048, 2047), (32767, 2047), (-2048, -2048), (-2049, -2048)]
+)
+def test_an_error_beyond_twelve_bits_is_told_as_the_largest_of_its_sign(error: int, kept: int) -> None:
+    found = c.CompactReading.of(c.JointReading(1000, 2000, error, -5))
+    assert (found.position, found.error, found.power) == (2000, kept, -5)
+    assert c.CompactReading.unpacked(found.packed) == found
+
+
+@pytest.mark.parametrize(("position", "error", "set_point"), [(2048, 0, 500), (4000, 96, 999), (4000, 500, 999)])
+def test_the_set_point_of_a_compact_reading_is_what_position_and_error_come_to(
+    position: int, error: int, set_point: int
+) -> None:
+    assert c.CompactReading(position, error, 3).whole == c.JointReading(set_point, position, error, 3)
+    mirrored = c.CompactReading(4096 - position, -error, 3).whole
+    assert mirrored.set_point == (500 if set_point == 500 else 0)
+
+
+@pytest.mark.parametrize(
+    ("payload", "says"),
+    [
+        (b"\x00\x00", "payload of 2 bytes, expected at least 3"),
+        (b"\x00", "payload of 1 bytes, expected at least 3"),
+    ],
+)
+def test_a_poke_without_a_byte_is_too_short(payload: bytes, says: str) -> None:
+    with pytest.raises(PayloadLengthError, match=says):
+        c.WriteBlock.parse(payload)
+    assert c.WriteBlock.parse(b"\x00\x20\x07") == c.WriteBlock(0x2000, b"\x07")
+
+
+def test_a_turn_whose_set_points_are_of_no_joint_has_nothing_behind_their_mask() -> None:
+    assert c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1, 0))) == c.MoveAndSample(9, 1)
+    with pytest.raises(PayloadLengthError, match="set points of no joint"):
+        c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1, 0, 0)))
+    with pytest.raises(PayloadLengthError, match="payload of 5 bytes, expected at least 6"):
+        c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1)))
+
+
+def test_a_session_has_another_number_than_none() -> None:
+    long = c.HelloReply(2, 0, 20_000, 8, 1, 5, 7).pack()
+    assert len(long) == 18
+    assert len(c.HelloReply(2, 0, 20_000, 8, 1).pack()) == 10
+    with pytest.raises(ProtocolError, match="a session has another number than 0"):
+        c.HelloReply.parse(long[:14] + bytes(4))
 
 
 def test_a_value_that_is_no_integer_is_refused_in_one_line() -> None:

@@ -183,3 +183,48 @@ def test_however_many_other_requests_come_between_the_next_advance_is_new(start:
     for sequence in range(start, start + reads, stride):
         assert order.judge(sequence & 0xFFFF, ReadStatus()) is Arrival.NEW
     assert order.judge((start + reads + 1) & 0xFFFF, Advance(1)) is Arrival.NEW
+
+
+@given(starts)
+def test_the_question_for_the_time_lets_none_pass_and_moves_nothing(start: int) -> None:
+    order = AdvanceOrder()
+    assert order.judge(start, Advance(0)) is Arrival.AGAIN
+    assert order.judge(start, Advance(1)) is Arrival.NEW
+    assert order.judge((start + 5) & 0xFFFF, Advance(0)) is Arrival.AGAIN
+    assert order.judge((start + 1) & 0xFFFF, Advance(1)) is Arrival.NEW
+
+
+@given(starts)
+def test_half_of_the_circle_is_ahead_and_the_other_half_behind(start: int) -> None:
+    for ahead, judged in ((1, Arrival.NEW), (0x8000, Arrival.NEW), (0x8001, Arrival.STALE), (0xFFFF, Arrival.STALE)):
+        order = AdvanceOrder()
+        order.judge(start, Advance(1))
+        assert order.judge((start + ahead) & 0xFFFF, Advance(1)) is judged
+
+
+@given(starts)
+def test_a_request_far_ahead_takes_the_last_advance_along_and_one_far_behind_does_not(start: int) -> None:
+    """After a request a third of the circle ahead, an advance two thirds ahead is new; without it, it would be old."""
+    for between, judged in ((0x5555, Arrival.NEW), (0xAAAA, Arrival.STALE)):
+        order = AdvanceOrder()
+        order.judge(start, Advance(1))
+        assert order.judge((start + between) & 0xFFFF, ReadStatus()) is Arrival.NEW
+        assert order.judge((start + 0x9000) & 0xFFFF, Advance(1)) is judged
+
+
+def test_an_unfinished_answer_is_forgotten_with_the_connection_and_what_was_damaged_is_not() -> None:
+    dialect = FramedDialect()
+    line = encode_frame(to_frame(3, HelloReply(2, 0, 20_000, 0, 1, 7, 70)))
+    dialect.feed(b"x" * 100 + b"\0" + line[:8])
+    dialect.reset()
+    assert dialect.feed(line[8:]) == []
+    assert dialect.feed(line) == [(3, HelloReply(2, 0, 20_000, 0, 1, 7, 70))]
+    assert dialect.damaged == 2, "one piece too long to be a frame, and the rest of the one that was forgotten"
+
+
+def test_an_answer_to_a_greeting_of_before_a_new_connection_begins_nothing() -> None:
+    dialect = FramedDialect()
+    dialect.encode(0, Hello(2, 7))
+    dialect.reset()
+    dialect.feed(encode_frame(to_frame(0, HelloReply(2, 0, 20_000, 0, 1, 7, 70))))
+    assert next(stamps(dialect)) == UNSTAMPED

@@ -58,6 +58,14 @@ def test_a_module_is_tried_by_the_tests_that_reach_it() -> None:
     assert "tests/protocol/test_memory_map.py" not in reaching("firmware_protocol/framing.py")
 
 
+def test_tools_beside_the_sources_of_the_bridge_are_tried_by_the_tests_of_the_bridge() -> None:
+    """They belong to no package, so that only a test that imports them, or the whole folder, can reach them."""
+    assert mirrored_folder("firmware_protocol/bridge/stack.py") == ROOT / "tests" / "firmware"
+    assert reaching("firmware_protocol/bridge/stack.py") == ("tests/firmware/test_sizes_and_stack.py",)
+    assert "tests/firmware/bbc_micro/test_disc_image.py" in reaching("firmware_protocol/bridge/bbc_micro/disc_image.py")
+    assert mirrored_folder("mock_controller/board/board.py").is_relative_to(ROOT / "tests" / "mock")
+
+
 PARTS = b"""
 LIMIT = 2
 

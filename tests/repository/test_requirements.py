@@ -15,7 +15,8 @@ FOR_INSTALLING = PYPROJECT["dependency-groups"]["installer"]
 FOR_DEVELOPMENT = [
     *FOR_USE,
     *FOR_INSTALLING,
-    *(line for line in PYPROJECT["dependency-groups"]["dev"] if line != {"include-group": "installer"}),
+    *(line for extra in PYPROJECT["project"]["optional-dependencies"].values() for line in extra),
+    *(line for name in ("dev", "docs") for line in PYPROJECT["dependency-groups"][name] if isinstance(line, str)),
 ]
 
 

@@ -55,13 +55,16 @@ class _Server(uvicorn.Server):
 
 
 @contextmanager
-def service_inside(folder: Path, clock: SystemClock, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
-    """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`."""
+def service_inside(
+    folder: Path, clock: SystemClock, monkeypatch: pytest.MonkeyPatch, database: str | None = None
+) -> Iterator[httpx.Client]:
+    """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, and
+    in `database`."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder / "run"))
     settings = Settings(
         robot=RobotSettings(port=MOCK),
         traces=TraceSettings(folder=folder / "traces"),
-        server=ServiceSettings(folder=folder / "service", connect_at_start=False),
+        server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
     )
     services = Services(settings, clock)
     gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True)

@@ -21,8 +21,9 @@ SECTOR, SECTORS = 256, 400
 
 def disc_image(files: dict[str, bytes]) -> bytes:
     """The bytes of a disc with these files in directory $, each loaded and started at LOAD_ADDRESS."""
-    names = TITLE.ljust(12)[:8].encode()
-    about = TITLE.ljust(12)[8:12].encode() + bytes((0, 8 * len(files), SECTORS >> 8, SECTORS & 0xFF))
+    title = TITLE.ljust(12).encode()
+    names = title[:8]
+    about = title[8:] + bytes((0, 8 * len(files), SECTORS >> 8, SECTORS & 0xFF))
     body, sector = b"", 2
     entries = []
     for name, data in files.items():

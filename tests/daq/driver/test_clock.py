@@ -1,10 +1,12 @@
-"""Time in lock-step: the controller's own, which passes only when somebody asks for it."""
+"""Time in lock-step is the controller's own, which passes only when somebody asks for it; else it is the computer's."""
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
-from daq.driver.clock import LockStepClock
+from daq.driver.clock import LockStepClock, RealClock
 from firmware_protocol.commands import Advance, Advanced, Request
 from tests.daq.link.scripted import ScriptedChannel, frame_of, scripted_link
 
@@ -71,3 +73,13 @@ def test_after_a_restart_of_the_board_the_clock_is_its_new_time() -> None:
     assert clock.now() == pytest.approx(0.047)
     clock.tick_seen(3)
     assert clock.now() == pytest.approx(0.067)
+
+
+def test_without_lock_step_the_clock_is_the_computer_s_and_waits_until_a_moment_has_come() -> None:
+    clock = RealClock()
+    before = time.monotonic()
+    begun = clock.now()
+    assert before <= begun <= time.monotonic()
+    clock.sleep_until(begun - 1.0)
+    clock.sleep_until(begun + 0.002)
+    assert clock.now() >= begun + 0.002

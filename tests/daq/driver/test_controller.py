@@ -13,10 +13,13 @@ from daq.driver import (
     NoSampleError,
     ProtocolVersionError,
 )
+from daq.driver.line_rate import bytes_of_a_compact_turn, bytes_of_a_turn
 from daq.link import Link, LinkState, LinkTimeoutError, RequestRefusedError
 from daq.transport import TransportError
 from firmware_protocol.commands import (
     AFTER_NEWEST,
+    Advance,
+    Advanced,
     Capability,
     ErrorsPositionsPowers,
     Gains,
@@ -48,7 +51,7 @@ from firmware_protocol.commands import (
     WriteSetPoints,
 )
 from firmware_protocol.joints import JointReading
-from tests.daq.link.scripted import frame_of, scripted_link
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, Zeros, frame_of, scripted_link
 
 HELLO = HelloReply(2, Capability.SAMPLE, 20_000, 8, 3, 0, 7)
 
@@ -405,3 +408,90 @@ def test_the_frozen_set_points_are_due_in_the_period_after_the_stop_s() -> None:
         controller.set_points({1: 500})
         controller.stop()
         assert controller.next_snapshot().set_points_missed is missed
+
+
+def test_the_greeting_tells_the_link_how_long_a_sample_may_take() -> None:
+    """A period of a second: the answer comes after 0.9 s, and is asked for once."""
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        slow = HelloReply(2, Capability.SAMPLE, 1_000_000, 8, 3, 0, 7)
+        shown = Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))
+        return [(0.9, frame_of(sequence, shown)) if isinstance(request, Sample) else (0.001, frame_of(sequence, slow))]
+
+    link, channel = scripted_link(answer)
+    assert Controller(link).next_snapshot().tick == 7
+    assert [type(request) for _, request in channel.asked].count(Sample) == 1
+    assert link.counters.timeouts == 0
+
+
+def test_the_end_of_a_block_closes_the_line() -> None:
+    link, channel = scripted_link(lambda sequence, _: [(0.001, frame_of(sequence, HELLO))])
+    with Controller(link) as controller:
+        assert channel.broken is None
+    assert channel.broken == "closed"
+    assert not controller.stop().sent
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "together", "every", "compact"),
+    [
+        (Capability.SAMPLE | Capability.COMPACT, True, 4, True),
+        (Capability.SAMPLE | Capability.COMPACT, False, 6, False),
+        (Capability.SAMPLE, True, 6, False),
+        (Capability.COMPACT, True, 1, True),
+    ],
+)
+def test_a_slow_line_gives_a_sample_every_so_many_periods_where_the_bridge_sees_them(
+    capabilities: Capability, together: bool, every: int, compact: bool
+) -> None:
+    """At 9600 baud. A memory that is read by the host gives one in every period, or none."""
+    hello = HelloReply(2, capabilities, 20_000, 8, 3, 0, 7)
+    channel = ScriptedChannel(lambda sequence, _: [(0.001, frame_of(sequence, hello))])
+    endpoint = ScriptedEndpoint([channel], bytes_per_second=960.0)
+    controller = Controller(Link(endpoint, now=channel.now, chance=Zeros()))
+    rate = controller.line_rate((1, 2, 3), (1, 2, 3), together=together)
+    assert (rate.joints, rate.moving, rate.every, rate.compact) == (3, 3, every, compact)
+    turn = bytes_of_a_compact_turn(3, 3) if compact else bytes_of_a_turn(3, 3)
+    assert rate.share * rate.every == pytest.approx(turn / 960.0 / 0.02)
+    assert controller.line_rate((1, 2, 3)).moving == 0
+    assert controller.line_rate().joints == 6
+
+
+class LockStepBoard:
+    """Its time stands still between requests; `time_us` is told to whoever asks."""
+
+    def __init__(self) -> None:
+        self.time_us = 1_000_000
+
+    def answer(self, sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        hello = HelloReply(2, Capability.SAMPLE | Capability.LOCK_STEP, 20_000, 8, 3, self.time_us & 0xFFFFFFFF, 7)
+        reply: Reply = hello
+        if isinstance(request, Advance):
+            self.time_us += request.microseconds
+            reply = Advanced(self.time_us, self.time_us // 20_000)
+        elif isinstance(request, Sample):
+            reply = Snapshot(self.time_us // 20_000, 0, ((1, JointReading(500, 2048, 0, 0)),))
+        return [(0.0, frame_of(sequence, reply))]
+
+
+def test_in_lock_step_the_clock_is_the_controller_s_and_is_asked_for_anew_by_a_greeting() -> None:
+    board = LockStepBoard()
+    link, _ = scripted_link(board.answer, lock_step=True)
+    controller = Controller(link)
+    assert controller.clock.now() == pytest.approx(1.0)
+    board.time_us = 1_600_000
+    assert controller.next_snapshot().host_time == pytest.approx(1.6), "a sample shows its period to be over"
+    board.time_us = 40_000
+    controller.hello()
+    assert controller.clock.now() == pytest.approx(0.04)
+    assert controller.next_snapshot().tick == 2
+
+
+def test_a_reply_s_time_on_the_line_is_none_in_lock_step() -> None:
+    board = LockStepBoard()
+    link, channel = scripted_link(board.answer, lock_step=True)
+    controller = Controller(link)
+    first = controller.next_snapshot()
+    controller.next_snapshot(first.tick + 3)
+    passed = [request.microseconds for _, request in channel.asked if isinstance(request, Advance)]
+    assert [us for us in passed if us] == [65_000], "three periods and a quarter"

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq.driver.double_read import MOST_READINGS, DoubleReader, Span, spans
-from daq.link import Link
+from daq.driver.double_read import MOST_READINGS, SETTLING_S, DoubleReader, Span, spans
+from daq.link import Link, LinkError
 from firmware_protocol.commands import Block, ReadBlock, Request
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
 from tests.daq.driver.memory_board import PERIOD_S, MemoryBoard
@@ -184,3 +184,55 @@ def test_the_set_point_of_a_reading_is_the_one_the_controller_used() -> None:
     assert joints is not None
     assert joints[0][1].set_point == 500
     assert joints[0][1].error == pytest.approx(8)
+
+
+def test_the_second_reading_begins_two_milliseconds_after_the_first_has_ended() -> None:
+    moments: list[float] = []
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, ReadBlock)
+        moments.append(channel.time)
+        return [(0.0015, frame_of(sequence, Block(bytes([5] * request.count))))]
+
+    channel = ScriptedChannel(answer)
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    reader = DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S)
+    assert reader.read((1, 2, 3)) is not None
+    assert moments == pytest.approx([0.0, 0.0015 + 0.002])
+    assert SETTLING_S == 0.002
+
+
+def test_a_block_of_another_length_than_asked_for_is_no_memory() -> None:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, ReadBlock)
+        return [(0.0, frame_of(sequence, Block(bytes(request.count - 1))))]
+
+    channel = ScriptedChannel(answer)
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    reader = DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S)
+    with pytest.raises(LinkError, match=r"block of 34 bytes from FC20, asked for 35"):
+        reader.read((1, 2, 3))
+
+
+def test_a_period_s_own_readings_and_the_last_one_s_are_not_torn() -> None:
+    """The memory changes between the readings of one period, not within one: nothing was torn."""
+    reader, link, _ = reader_of_bytes([5, 5, 5, 6, 6, 7, 8, 8])
+    for _ in range(2):
+        assert reader.read((1, 2, 3)) is not None
+    assert (link.counters.torn, reader.disturbed) == (0, True)
+    assert reader.read((1, 2, 3)) is not None
+    assert link.counters.torn == 1, "7 is neither of this period nor of the last"
+
+
+@pytest.mark.parametrize(("addresses", "longest", "found"), [([1, 3], 3, 1), ([1, 4], 3, 2), ([5, 1, 2, 9, 6], 2, 3)])
+def test_a_span_reaches_as_far_as_one_request(addresses: list[int], longest: int, found: int) -> None:
+    assert len(spans(addresses, longest)) == found
+
+
+@pytest.mark.parametrize(("position", "error", "set_point"), [(4090, 20, 999), (10, -30, 0), (4000, 95, 999)])
+def test_a_set_point_beyond_the_range_is_shown_as_its_end(position: int, error: int, set_point: int) -> None:
+    reader, _, channel = reader_of(MemoryBoard(lambda _: [(position, error, 0)] * 6))
+    channel.time = 2.5 * PERIOD_S
+    joints = reader.read((1,))
+    assert joints is not None
+    assert joints[0][1].set_point == set_point

@@ -6,11 +6,14 @@ import pytest
 
 from daq.driver.line_rate import (
     LARGEST_SHARE,
+    LineRate,
+    bound_ms,
     bytes_of_a_compact_turn,
     bytes_of_a_snapshot,
     bytes_of_a_turn,
     line_rate,
     stop_latency_s,
+    told_rates,
 )
 from firmware_protocol import commands as c
 from firmware_protocol.framing import encode_frame
@@ -72,3 +75,43 @@ def test_a_rate_is_told_with_its_joints_share_and_stop() -> None:
 def test_a_stop_waits_for_a_frame_of_the_largest_size() -> None:
     longest = on_the_line(c.WriteBlock(0xFC00, bytes(c.MAX_WRITE)), c.Stop())
     assert stop_latency_s(1920) == pytest.approx(longest / 1920 + 0.010)
+
+
+@pytest.mark.parametrize(
+    ("ending", "numbers"),
+    [("st", (21,)), ("nd", (2, 22)), ("rd", (3, 23)), ("th", (4, 10, 11, 12, 13, 20, 24, 110, 112, 120))],
+)
+def test_every_nth_period_is_written_as_english_writes_it(ending: str, numbers: tuple[int, ...]) -> None:
+    for every in numbers:
+        words = LineRate(3, 3, every, 0.5, PERIOD, 0.0).in_words
+        assert f", every {every}{ending} control period, 50 % of the line; " in words
+
+
+def test_the_longest_time_of_a_stop_is_told_in_milliseconds_that_it_does_not_exceed() -> None:
+    assert [bound_ms(s) for s in (0.0, 0.0449999, 0.045, 0.0450001, 0.0450021)] == [0, 45, 45, 46, 46]
+
+
+def test_a_stop_takes_the_bridge_ten_milliseconds_beside_its_time_on_the_line() -> None:
+    assert stop_latency_s(1e12) == pytest.approx(0.010)
+
+
+def test_rates_are_told_for_one_joint_for_the_major_axes_and_for_all() -> None:
+    found = told_rates(1920, PERIOD, can_be_compact=True)
+    assert [(rate.joints, rate.moving) for rate in found] == [(1, 1), (3, 3), (6, 6)]
+    assert found == tuple(line_rate(1920, PERIOD, joints, joints, can_be_compact=True) for joints in (1, 3, 6))
+    assert [rate.compact for rate in told_rates(1920, PERIOD, can_be_compact=False)] == [False] * 3
+
+
+def test_a_turn_without_set_points_is_never_compact() -> None:
+    assert not line_rate(960, PERIOD, 6, 0, can_be_compact=True).compact
+    assert line_rate(960, PERIOD, 6, 1, can_be_compact=True).compact
+
+
+def test_a_line_of_which_samples_take_the_largest_share_gives_one_in_every_period() -> None:
+    exactly = bytes_of_a_turn(3, 3) / (LARGEST_SHARE * PERIOD)
+    assert [line_rate(exactly * more, PERIOD, 3, 3, can_be_compact=True).compact for more in (0.99, 1.01)] == [
+        True,
+        False,
+    ]
+    assert [line_rate(exactly * more, PERIOD, 3, 3).every for more in (0.99, 1.01)] == [2, 1]
+    assert LARGEST_SHARE == 0.8

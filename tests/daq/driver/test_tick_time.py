@@ -32,3 +32,20 @@ def test_after_a_gap_longer_than_the_window_the_estimate_starts_anew() -> None:
     estimator = TickTime(0.02)
     estimator.arrived(1, 0.02)
     assert estimator.arrived(10_000, 300.0) == 300.0
+
+
+def test_the_quickest_sample_counts_for_as_many_ticks_as_the_window_has_and_not_one_more() -> None:
+    """The sample of tick 1 came at once, all later ones 3 ms after their ticks."""
+    estimator = TickTime(0.02)
+    estimator.arrived(1, 0.02)
+    estimates = {tick: estimator.arrived(tick, 0.02 * tick + 0.003) for tick in range(2, WINDOW_TICKS + 2)}
+    late = {tick: round(estimate - 0.02 * tick, 9) for tick, estimate in estimates.items()}
+    assert {tick for tick, by in late.items() if by == 0.0} == set(range(2, WINDOW_TICKS + 1))
+    assert late[WINDOW_TICKS + 1] == 0.003
+    assert WINDOW_TICKS == 500
+
+
+def test_a_tick_to_come_is_as_many_periods_later() -> None:
+    estimator = TickTime(0.02)
+    estimator.arrived(7, 5.0)
+    assert [estimator.time_of(tick) for tick in (6, 7, 10)] == pytest.approx([4.98, 5.0, 5.06])

@@ -107,6 +107,48 @@ def test_a_patient_recording_waits_for_the_disk_instead(tmp_path: Path) -> None:
     assert len(read_trace(tmp_path / "a.mcap")) == 300
 
 
+def test_a_patient_recording_hears_of_a_disk_that_fails_while_it_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The queue is full when the disk fails: what waits in it is refused, so that there is room for the next row."""
+    stalled, fails = threading.Event(), threading.Event()
+    sync = disk.sync
+
+    def fail(stream: object) -> None:
+        if threading.current_thread() is threading.main_thread():
+            return sync(stream)  # type: ignore[arg-type]
+        stalled.set()
+        assert fails.wait(60)
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(disk, "sync", fail)
+    writer = TraceWriter(tmp_path / "a.mcap", record(), JOINTS, sync_interval=0.0, queue_length=20, patience=600)
+    writer.sample(row(0))
+    assert stalled.wait(60)
+    for tick in range(1, 21):
+        writer.sample(row(tick))
+    fails.set()
+
+    told: list[str] = []
+
+    def record_on() -> None:
+        try:
+            for tick in range(21, 100):
+                writer.sample(row(tick))
+        except TraceError as error:
+            told.append(str(error))
+
+    recording = threading.Thread(target=record_on, daemon=True)
+    recording.start()
+    recording.join(60)
+    assert not recording.is_alive(), "it waits for room until its patience ends"
+    assert len(told) == 1
+    assert "cannot be written: Input/output error" in told[0]
+    with pytest.raises(TraceError, match="Input/output error"):
+        writer.close("complete")
+    assert part_path(tmp_path / "a.mcap").exists()
+
+
 def test_a_folder_that_does_not_exist_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(TraceError, match=r"absent/a\.mcap: cannot be made: No such file or directory"):
         TraceWriter(tmp_path / "absent" / "a.mcap", record(), JOINTS)

@@ -132,3 +132,40 @@ def test_an_empty_or_absent_trace_is_an_error(tmp_path: Path) -> None:
     assert findings(tmp_path / "a.mcap")["error", "trace"].endswith("is empty")
     with pytest.raises(TraceError, match="cannot be read"):
         verify(tmp_path / "absent.mcap")
+
+
+def noted(path: Path, check: str) -> list[str]:
+    return [f.message for f in verify(path).findings if (f.level, f.check) == ("note", check)]
+
+
+def test_arrival_is_told_between_percentiles_so_that_one_late_sample_does_not_count(tmp_path: Path) -> None:
+    """Samples arrive 0, 0.3 or 0.6 ms after their ticks; one in 201 comes half a second late."""
+    path = recorded(tmp_path / "a.mcap", list(range(201)), host_time=5000.0 + 4.0 + 0.5)
+    assert noted(path, "arrival") == [
+        "arrival against the board's clock: 0.60 ms between the 1st and the 99th percentile"
+    ]
+
+
+@pytest.mark.parametrize(("time", "outside"), [(0.0, 0), (0.04, 0), (0.0401, 1), (-0.001, 1)])
+def test_an_event_belongs_to_the_record_until_the_end_of_its_last_period(
+    tmp_path: Path, time: float, outside: int
+) -> None:
+    event = TraceEvent(time=time, kind="note", message="")
+    assert len(noted(recorded(tmp_path / "a.mcap", [0, 1], event=event), "events")) == outside
+
+
+def test_a_link_that_counted_as_many_as_are_missing_counted_right(tmp_path: Path) -> None:
+    made = recorded(tmp_path / "a.mcap", [0, 1, 4], counters={"missing_samples": 2})
+    assert set(findings(made)) == {("warning", "gaps")}
+    more = recorded(tmp_path / "b.mcap", [0, 1, 4], counters={"missing_samples": 3})
+    assert set(findings(more)) == {("warning", "gaps")}, "it may have lost some before the first and after the last"
+
+
+def test_a_joint_without_a_sensor_that_is_known_is_noted(tmp_path: Path) -> None:
+    with TraceWriter(tmp_path / "a.mcap", record(machine=None), JOINTS) as writer:
+        writer.sample(row(0, error=(9.0, 9.0, 9.0)))
+        path = writer.close("complete")
+    assert noted(path, "error") == [
+        f"joint {joint}: its sensor is not known, so error = set point − position was not checked" for joint in JOINTS
+    ]
+    assert verify(path).trustworthy

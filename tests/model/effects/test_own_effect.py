@@ -169,20 +169,6 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, fields: dict[str, s
     assert not own_effects()
 
 
-@pytest.mark.parametrize(
-    ("torque", "said"),
-    [
-        ("def torque(k, speed):\n    return -k * abs(speed) * speed\n", "by speed does not come out right"),
-        ("def torque(k, speed):\n    return k if speed > 0 else -k\n", "cannot be compiled in dual numbers"),
-        ("def torque(k):\n    return k + 1.0\n", "gives 1 N·m where"),
-    ],
-)
-def test_a_torque_without_exact_derivatives_is_refused(tmp_path: Path, torque: str, said: str) -> None:
-    load_effect_file(written(tmp_path, torque=torque))
-    with pytest.raises(SpecError, match=re.escape(said)):
-        simulate(rod().with_effect("pull", (1,)), SWING, SMOOTH)
-
-
 def test_files_that_are_none_and_names_that_are_taken(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="cannot be read"):
         load_effect_file(tmp_path / "none.py")

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
+from daq.contracts.quantity import Quantity
 from model.fitting.choice import chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.options import FitOptions, Prior
 from model.fitting.records import records_of, resolution, sensor_deviation
+from model.machine_model.model import base_model
 from tests.model.fitting.imagined import arm, machine
 from tests.model.fitting.test_records import record_of
 
@@ -45,6 +47,88 @@ def test_bounds_and_priors_may_be_given_or_left_out() -> None:
     assert mass.deviation is None
     with pytest.raises(SpecError, match="nothing to fit"):
         chosen_unknowns(arm(), FitOptions(held=("*",)))
+
+
+def test_a_number_that_is_exactly_known_is_not_found_unless_it_is_named() -> None:
+    """Its expected deviation is zero."""
+    load = machine().load
+    assert load is not None
+    model = base_model(machine().model_copy(update={"load": load.model_copy(update={"deviation": 0.0})}))
+    assert model.parameter("load.mass").deviation == 0.0
+    assert "load.mass" in {u.name for u in chosen_unknowns(arm(), FitOptions())}
+    assert "load.mass" not in {u.name for u in chosen_unknowns(model, FitOptions())}
+    (mass,) = chosen_unknowns(model, MASS)
+    assert mass.deviation is None, "nothing is expected of it"
+
+
+def test_what_is_held_is_held_even_where_it_is_named() -> None:
+    both = FitOptions(parameters=("load.mass", "joint2.motor.*"), held=("joint2.motor.resistance",))
+    names = {u.name for u in chosen_unknowns(arm(), both)}
+    assert "load.mass" in names
+    assert "joint2.motor.resistance" not in names
+    assert "joint2.motor.torque_constant" in names, "named, it is found though it fixes the scale of torque"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "says"),
+    [
+        ((1.0, 1.0), "lower bound 1 kg is not below the upper bound 1 kg"),
+        ((-0.001, 2.0), "bounds -0.001 to 2 kg leave what is possible, 0 to inf"),
+        ((None, 2.0), "bounds -inf to 2 kg leave what is possible, 0 to inf"),
+    ],
+)
+def test_bounds_are_in_order_and_within_what_is_possible(bounds: tuple[float | None, float], says: str) -> None:
+    with pytest.raises(SpecError, match=says):
+        chosen_unknowns(arm(), MASS.model_copy(update={"bounds": {"load.mass": bounds}}))
+
+
+def test_bounds_may_be_all_that_is_possible() -> None:
+    (mass,) = chosen_unknowns(arm(), MASS.model_copy(update={"bounds": {"load.mass": (0.0, None)}}))
+    assert (mass.low, mass.high) == (0.0, math.inf)
+
+
+def test_a_prior_may_be_taken_away_and_expectations_are_the_machine_s_and_not_the_model_s() -> None:
+    (mass,) = chosen_unknowns(arm(), MASS.model_copy(update={"priors": {"load.mass": None}}))
+    assert mass.deviation is None
+    heavier = arm().with_values({"load.mass": 2.0})
+    (mass,) = chosen_unknowns(heavier, MASS)
+    assert (mass.start, mass.expected) == (2.0, arm().parameter("load.mass").value)
+    free = MASS.model_copy(update={"use_priors": False, "priors": {"load.mass": Prior(expected=1.0, deviation=0.1)}})
+    (mass,) = chosen_unknowns(arm(), free)
+    assert (mass.expected, mass.deviation) == (1.0, 0.1), "a prior that is given counts all the same"
+
+
+def test_a_potentiometer_that_is_bent_already_is_bent_no_second_time() -> None:
+    bent = arm().with_effect("potentiometer_nonlinearity", (2,), {"bend_1": 0.01})
+    model, bends = with_bends(bent, FitOptions(sensor_bend=True, bend_terms=3), "position")
+    assert [u.joints for u in bends] == [(1,)] * 3 + [(3,)] * 3
+    assert model.parameter("joint2.potentiometer_nonlinearity.bend_1").value == 0.01
+    assert [u.parameter.part for u in bends[:3]] == ["bend_1", "bend_2", "bend_3"]
+
+
+def test_by_itself_a_fit_bends_the_potentiometers_whose_machine_states_a_linearity() -> None:
+    own = machine()
+
+    def bent(*joints: int) -> set[int]:
+        sensors = {j: own.joint(j).sensor for j in (1, 2, 3)}
+        made = [
+            joint.model_copy(
+                update={
+                    "sensor": sensors[number].model_copy(  # type: ignore[union-attr]
+                        update={"linearity": Quantity(value=0.01, unit="1", source="t") if number in joints else None}
+                    )
+                }
+            )
+            if number in sensors
+            else joint
+            for number, joint in enumerate(own.joints, start=1)
+        ]
+        model = base_model(own.model_copy(update={"joints": tuple(made)}))
+        return {joint for u in with_bends(model, FitOptions(), "position")[1] for joint in u.joints}
+
+    assert bent() == set()
+    assert bent(2) == {2}
+    assert bent(1, 3) == {1, 3}
 
 
 def test_potentiometers_bend_as_far_as_their_stated_linearity_lets_expect() -> None:

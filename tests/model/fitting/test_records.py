@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -100,3 +101,106 @@ def test_the_noise_of_a_signal_without_a_sensor_is_estimated_from_the_signal() -
     straight = np.ones_like(noisy) * [2.0, 0.0, -3.0]
     found = noise_floor([type(record)(record.inputs, straight, record.runs, "made")], arm().machine, "velocity")
     np.testing.assert_allclose(found, [2e-6, 1e-12, 3e-6])
+
+
+def joints_apart(*apart: float) -> Trace:
+    """A trace in which joint 1 travels 0.7 rad and the others are held; positions are so many rad off set points."""
+    made = record_of(list(range(131)), rise=0.7)
+    assert made.set_point is not None
+    points = made.set_point.copy()
+    points[:, 1:] = STARTS[0][1:]
+    return replace(made, set_point=points, position=points + np.array(apart))
+
+
+@pytest.mark.parametrize(("apart", "allowed"), [(0.349, True), (0.351, False), (-0.351, False)])
+def test_positions_lie_within_half_of_the_largest_travel_of_their_set_points(apart: float, allowed: bool) -> None:
+    """The largest travel is 0.7 rad, of joint 1."""
+    given = [joints_apart(0.0, apart, 0.0)]
+    if allowed:
+        assert records_of(given, machine(), "position")[0].samples > 0
+    else:
+        says = r"joint 2: set points \(to 0\.7\) and positions \(to .*\) are 0\.351 rad apart throughout"
+        with pytest.raises(TraceError, match=says):
+            records_of(given, machine(), "position")
+
+
+def test_a_sensor_of_speeds_is_not_held_against_set_points_of_positions() -> None:
+    own = machine()
+    first = own.joints[1]
+    assert first.sensor is not None
+    tachometer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"measures": "velocity"})})
+    mixed = own.model_copy(update={"joints": (own.joints[0], tachometer, *own.joints[2:])})
+    assert records_of([joints_apart(0.0, 5.0, 0.0)], mixed, "position")[0].samples > 0
+
+
+def test_without_a_motion_that_is_asked_for_nothing_says_how_far_positions_may_be() -> None:
+    made = joints_apart(0.0, 5.0, 0.0)
+    assert made.set_point is not None
+    still = replace(made, set_point=np.tile(made.set_point[0], (len(made), 1)))
+    with pytest.raises(TraceError, match="no motion: no joint of made moves by 4 counts of its sensor or more"):
+        records_of([still], machine(), "position")
+
+
+def test_an_arm_that_moves_and_was_not_asked_to_has_no_motion_to_fit() -> None:
+    made = record_of(list(range(131)))
+    assert made.set_point is not None
+    sagging = replace(made, set_point=np.tile(made.set_point[0], (len(made), 1)))
+    with pytest.raises(TraceError, match="no motion"):
+        records_of([sagging], machine(), "position")
+    asked = replace(made, position=np.tile(made.position[0], (len(made), 1)))
+    with pytest.raises(TraceError, match="no motion"):
+        records_of([asked], machine(), "position")
+
+
+def test_one_trace_with_a_motion_is_enough() -> None:
+    made = record_of(list(range(131)))
+    assert made.set_point is not None
+    still = np.tile(made.set_point[0], (len(made), 1))
+    named = made.record.model_copy(update={"trace_id": "other"})
+    second = replace(made, record=named, set_point=still, position=still)
+    assert [r.name for r in records_of([second, made], machine(), "position")] == ["other", "made"]
+    with pytest.raises(TraceError, match="trace made: given more than once; it would count double"):
+        records_of([made, second, made], machine(), "position")
+
+
+def test_a_gap_of_a_period_and_a_half_is_none() -> None:
+    made = record_of(list(range(100)))
+    time = made.time.copy()
+    time[50:] += 0.4 * PERIOD
+    near = records_of([replace(made, time=time, tick=None)], machine(), "position")
+    assert near[0].runs == (slice(20, 100),)
+    time[50:] += 0.2 * PERIOD
+    far = records_of([replace(made, time=time, tick=None)], machine(), "position")
+    assert far[0].runs == (slice(20, 50), slice(50, 100))
+
+
+def test_a_gap_before_the_comparison_begins_cuts_nothing() -> None:
+    (found,) = records_of([record_of([*range(10), *range(13, 203)])], machine(), "position")
+    assert found.runs == (slice(17, 200),), "0.4 s after the start is the seventeenth sample"
+
+
+def test_a_machine_s_traces_are_its_own() -> None:
+    made = record_of(list(range(100)))
+    own = replace(made, record=made.record.model_copy(update={"machine": machine()}))
+    assert records_of([own], machine(), "position")[0].name == "made"
+    with pytest.raises(TraceError, match="trace made: made on ma2000, the model describes bench"):
+        records_of([own], machine().model_copy(update={"name": "bench"}), "position")
+
+
+def test_speeds_are_compared_where_they_are_fitted() -> None:
+    made = record_of(list(range(100)))
+    speeds = np.gradient(made.position, PERIOD, axis=0)
+    with_speeds = replace(made, velocity=speeds)
+    (found,) = records_of([with_speeds], machine(), "velocity")
+    np.testing.assert_array_equal(found.measured, speeds)
+    (other,) = records_of([with_speeds], machine(), "position")
+    np.testing.assert_array_equal(other.measured, made.position)
+
+
+def test_where_the_drive_was_not_recorded_there_is_none_before_the_record() -> None:
+    made = record_of(list(range(100)))
+    (found,) = records_of([replace(made, drive=None)], machine(), "position")
+    assert not found.inputs.first_drive.any()
+    assert made.drive is not None
+    (open_loop,) = records_of([replace(made, set_point=None)], machine(), "position")
+    np.testing.assert_array_equal(open_loop.inputs.first_drive, made.drive[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -151,3 +152,51 @@ def test_seven_joints_are_simulated() -> None:
     still = np.zeros((20, 7))
     seven = Trace(made.record, tuple(range(1, 8)), made.time, still, drive=still)
     assert np.isfinite(simulate(model, seven, Options(loop="open")).position).all()
+
+
+@pytest.mark.parametrize("inner", [None, ((40.0, 30.0, 0.2),)], ids=["one loop", "cascade"])
+def test_the_drive_is_what_the_gains_make_of_the_readings(inner: tuple[tuple[float, ...], ...] | None) -> None:
+    """P e + I ∫e dt + D de/dt; in a cascade that is the speed asked for, and the same of its error the drive."""
+    machine = slide(gains=((6.0, 3.0, 0.1),), velocity_gains=inner)
+    found = run(machine, quantise=False)
+    error, speed = found.error[:, 0], np.diff(found.reading[:, 0], prepend=found.reading[0, 0]) / PERIOD
+    np.testing.assert_allclose(error, steps()[:, 0] - found.reading[:, 0], atol=1e-12)
+
+    def pid(e: Floats, p: float, i: float, d: float, before: float) -> Floats:
+        return np.asarray(p * e + i * np.cumsum(e) * PERIOD + d * np.diff(e, prepend=before) / PERIOD)
+
+    drive = pid(error, 6.0, 3.0, 0.1, error[0])
+    if inner is not None:
+        drive = pid(drive - speed, *inner[0], 0.0)
+    np.testing.assert_allclose(found.drive[:, 0], drive, rtol=1e-9, atol=1e-9)
+    assert np.ptp(found.position) > 0.1
+
+
+@pytest.mark.parametrize("periods", [0.0, 0.3, 1.0, 2.5, 12.7])
+def test_a_drive_acts_as_much_later_as_its_delay_says(periods: float) -> None:
+    """A carriage of 2.5 kg pushed by 3 N from then on; the drive before the record was the same as its first."""
+    model = base_model(machines.slide()).with_effect("input_delay", (1,), {"time": periods * PERIOD})
+    drive = np.full((40, 1), 2.0)
+    drive[0] = 0.0
+    found = simulate(model, record(np.zeros((40, 1)), drive=drive), Options(loop="open", quantise=False))
+    begun = PERIOD * (1.0 + periods)
+    np.testing.assert_allclose(found.velocity[:, 0], 1.2 * np.clip(found.time - begun, 0.0, None), atol=1e-12)
+    np.testing.assert_allclose(found.position[:, 0], 0.6 * np.clip(found.time - begun, 0.0, None) ** 2, atol=1e-12)
+
+
+def test_lost_set_points_leave_a_share_of_each_step_to_the_next_period() -> None:
+    model = base_model(slide()).with_effect("lost_set_points", (1,), {"share": 0.25})
+    found = simulate(model, record(steps()), Options(quantise=False))
+    before = np.vstack([steps()[:1], steps()[:-1]])
+    wanted = steps() - 0.25 * (steps() - before)
+    np.testing.assert_allclose(found.error, wanted - found.reading, atol=1e-12)
+
+
+def test_a_simulation_shows_itself_in_one_line_and_gives_its_signals_at_the_samples() -> None:
+    found = run(slide())
+    assert repr(found) == "<Simulation: 150 periods to 1.5 s, joints 1>"
+    np.testing.assert_array_equal(found.at_samples(found.position), found.position)
+    made = record(steps())
+    between = replace(made, time=made.time + 0.3 * PERIOD * (np.arange(150) % 2))
+    odd = simulate(base_model(slide()), between)
+    np.testing.assert_allclose(odd.at_samples(odd.time), between.time, atol=1e-9)

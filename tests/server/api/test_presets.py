@@ -39,3 +39,25 @@ def test_a_preview_shows_where_a_motion_breaks_a_limit_and_queues_nothing(servic
     row = min(range(len(preview["time"])), key=lambda index: abs(preview["time"][index] - found["time"]))
     assert abs(preview["set_points"][row][1] - found["value"]) < 1e-6
     assert service.robot.get("/queue").json()["queued"] == 0
+
+
+def test_an_experiment_with_computed_set_points_can_be_checked_and_queued(service: Service) -> None:
+    """As `daq run … --feedforward … --dry-run --json` prints it."""
+    ramp = {"kind": "ramp", "amplitude": 0.1, "duration": 0.4}
+    error = {"1": {"rms": 0.001, "largest": 0.002}}
+    spec = {
+        "trajectory": {"kind": "path", "times": [0, 0.5], "positions": [[3.141592654], [3.2]]},
+        "joints": [1],
+        "feedforward": {
+            "asked": {"trajectory": ramp, "joints": [1]},
+            "model": "11f907d95fc5",
+            "expected": error,
+            "before": error,
+        },
+    }
+    assert service.robot.post("/experiments/preview", json={"spec": spec}).json()["violations"] == []
+    queued = service.robot.post("/experiments", json={"spec": spec}).json()
+    assert queued["spec"]["feedforward"]["asked"]["trajectory"] == ramp
+    refused = service.robot.post("/experiments", json={"spec": {**spec, "trajectory": ramp}})
+    assert refused.status_code == 422
+    assert "feedforward is for a path of computed set points" in refused.text

@@ -130,7 +130,7 @@ def test_the_queue_is_paused_put_in_another_order_taken_back_and_resumed(paused:
         _submit(paused, name=name)
     rows = _waiting(form)
     expect(rows).to_have_text([re.compile("first"), re.compile("second"), re.compile("third")])
-    expect(form.get_by_text("Paused", exact=True)).to_be_visible()
+    expect(form.get_by_text("Paused:", exact=True)).to_be_visible()
     form.get_by_role("button", name="Run third earlier").click()
     expect(rows).to_have_text([re.compile("first"), re.compile("third"), re.compile("second")])
     form.get_by_role("button", name="Run first later").click()

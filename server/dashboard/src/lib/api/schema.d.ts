@@ -2138,7 +2138,8 @@ export interface components {
          *
          *     `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
          *     posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
-         *     record; None means every joint that the line has room for.
+         *     record; None means every joint that the line has room for. `feedforward` says for which motion a path's set points
+         *     were computed.
          */
         ExperimentSpec: {
             /**
@@ -2203,6 +2204,30 @@ export interface components {
              * @default
              */
             notes?: string;
+            feedforward?: components["schemas"]["Feedforward"] | null;
+        };
+        /**
+         * Feedforward
+         * @description Where a path's set points come from: they were computed so that the arm follows another experiment's motion.
+         *
+         *     `asked` is that experiment. Set points were computed with the model of this identity, learned from the trace of this
+         *     number, or both. `expected` is the error that the arm should have; `before` that of plain set points in the model's
+         *     simulation, or that of the trace which was learned from.
+         */
+        Feedforward: {
+            asked: components["schemas"]["PlainExperiment"];
+            /** Model */
+            model?: string | null;
+            /** Learned From */
+            learned_from?: string | null;
+            /** Expected */
+            expected: {
+                [key: string]: components["schemas"]["TrackingError"];
+            };
+            /** Before */
+            before: {
+                [key: string]: components["schemas"]["TrackingError"];
+            };
         };
         /**
          * Fidelity
@@ -3861,14 +3886,72 @@ export interface components {
             place?: number;
         };
         /**
-         * PlacedEffect
-         * @description An effect on joints; none: of the whole machine.
+         * PlainExperiment
+         * @description An experiment whose set points are those of its motion; its fields are described at ExperimentSpec.
          */
-        PlacedEffect: {
-            /** Effect */
-            effect: string;
-            /** Joints */
-            joints: number[];
+        PlainExperiment: {
+            /**
+             * Trajectory
+             * @default {
+             *       "kind": "ramp",
+             *       "amplitude": 0.3769911184307752,
+             *       "duration": 0.65
+             *     }
+             */
+            trajectory?: components["schemas"]["Ramp"] | components["schemas"]["Step"] | components["schemas"]["Staircase"] | components["schemas"]["SlowRamp"] | components["schemas"]["Sine"] | components["schemas"]["Multisine"] | components["schemas"]["Cubic"] | components["schemas"]["Via"] | components["schemas"]["PickAndPlace"] | components["schemas"]["Path"] | components["schemas"]["Pause"] | components["schemas"]["Sequence"];
+            /**
+             * Joints
+             * @default [
+             *       1,
+             *       2,
+             *       3
+             *     ]
+             */
+            joints?: number[];
+            /**
+             * Start
+             * @default {}
+             */
+            start?: {
+                [key: string]: number;
+            };
+            /**
+             * Gains
+             * @default {}
+             */
+            gains?: {
+                [key: string]: [
+                    number,
+                    number,
+                    number
+                ];
+            };
+            /**
+             * Settle
+             * @default 0.5
+             */
+            settle?: number;
+            /**
+             * Hold
+             * @default 2
+             */
+            hold?: number;
+            /**
+             * Repeats
+             * @default 1
+             */
+            repeats?: number;
+            /** Record */
+            record?: number[] | null;
+            /** Name */
+            name?: string | null;
+            /** Operator */
+            operator?: string | null;
+            /**
+             * Notes
+             * @default
+             */
+            notes?: string;
         };
         /**
          * PlainGain
@@ -5266,6 +5349,16 @@ export interface components {
              * @default []
              */
             events?: components["schemas"]["TraceEvent"][];
+        };
+        /**
+         * TrackingError
+         * @description Distance of a joint from the motion asked for: root mean square and largest, rad (m on a prismatic joint).
+         */
+        TrackingError: {
+            /** Rms */
+            rms: number;
+            /** Largest */
+            largest: number;
         };
         /**
          * TriedEffect

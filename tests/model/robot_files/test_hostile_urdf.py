@@ -1,0 +1,80 @@
+"""A URDF that nobody means is refused in one line that says what is wrong and where."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.errors import SpecError
+from model.machine_model.model import base_model
+from model.robot_files.machine_of_arm import machine_from_urdf
+from tests.model.robot_files.robots import HOSTILE, INERTIAL, TURNING, TWO_JOINTS, joint, link, robot
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "robot.urdf"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_urdf_is_refused_in_one_line(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, said = HOSTILE[name]
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SpecError) as refused:
+        base_model(machine_from_urdf(written(tmp_path, text)))
+    line = str(refused.value)
+    assert said in line
+    assert len(line) < 1000
+    assert line.isprintable()
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"]
+
+
+@pytest.mark.parametrize(
+    ("names", "hold", "tip", "said"),
+    [
+        (["elbow", "wrist"], {}, None, "has no joint 'wrist' that moves; it has shoulder, elbow"),
+        (["elbow", "elbow"], {}, None, "--joints elbow,elbow: name each joint once"),
+        ([], {}, None, "name each joint once"),
+        (["elbow"], {"elbow": 1.0}, None, "--hold elbow=1.0: it is one of the joints that move"),
+        (["elbow"], {"wrist": 1.0}, None, "--hold wrist=1.0: there is no such joint"),
+        (["elbow"], {"shoulder": float("nan")}, None, "--hold shoulder=nan: a finite position is needed"),
+        (["shoulder"], {}, "base", "--tip base: is no link that the last joint carries; it carries upper, lower"),
+    ],
+)
+def test_joints_that_make_no_arm_are_refused_in_one_line(
+    tmp_path: Path, names: list[str], hold: dict[str, float], tip: str | None, said: str
+) -> None:
+    with pytest.raises(SpecError) as refused:
+        machine_from_urdf(written(tmp_path, TWO_JOINTS), names, hold=hold, tip=tip)
+    assert said in str(refused.value)
+
+
+def test_a_joint_that_mimics_one_that_moves_is_refused_even_if_it_is_held(tmp_path: Path) -> None:
+    follower = joint("finger", "b", "c", content=f'{TURNING}<mimic joint="wrist" multiplier="2" offset="0.5"/>')
+    file = written(tmp_path, robot(*map(link, "abcd"), joint("wrist", "a", "b"), follower, joint("last", "b", "d")))
+    with pytest.raises(SpecError, match=r"joint 'finger' mimics 'wrist', which moves: .* hold it \(--hold finger=0\)"):
+        machine_from_urdf(file, ["wrist"])
+    assert "Held: finger at 0.3" in machine_from_urdf(file, ["wrist"], hold={"finger": 0.3, "last": 0.0}).notes
+    with pytest.raises(SpecError, match="joint 'finger' mimics 'wrist'; a model's joints are independent"):
+        machine_from_urdf(file, ["wrist", "finger"])
+    held = machine_from_urdf(file, ["last"], hold={"wrist": 0.25}).notes
+    assert "Held: wrist at 0.25, finger at 1." in held
+
+
+def test_missing_limits_are_none_and_said_to_be_missing(tmp_path: Path) -> None:
+    text = robot(link("a"), link("b"), joint("turn", "a", "b", content='<axis xyz="0 0 1"/>'))
+    machine = machine_from_urdf(written(tmp_path, text))
+    limits = machine.limits.joint(1)
+    assert (limits.low, limits.high, limits.speed) == (None, None, None)
+    assert "The URDF states no range of turn." in machine.notes
+
+
+def test_moments_that_no_real_body_has_are_told(tmp_path: Path) -> None:
+    unreal = INERTIAL.replace('"0.03"', '"0.3"')
+    machine = machine_from_urdf(written(tmp_path, robot(link("a"), link("b", unreal), joint("j", "a", "b"))))
+    assert "No real body has the moments that joint j carries (0.019" in machine.notes

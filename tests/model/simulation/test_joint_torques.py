@@ -1,0 +1,183 @@
+"""Torques of a joint beside the rigid-body ones, held against integrals and closed forms.
+
+Functions of compiled code are tried here as Python (`py_func`) where they call no other compiled one: the source is the
+same, and nothing has to be compiled.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from math import factorial
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from model import layout as at
+from model.arrays import Floats
+from model.simulation import joint_torques, period
+from model.simulation.period import QUEUE
+
+
+def plain(function: Any) -> Any:
+    """The function as Python."""
+    return function.py_func
+
+
+def joint(**columns: float) -> Floats:
+    row = np.zeros(at.PER_JOINT)
+    for name, value in columns.items():
+        row[getattr(at, name)] = value
+    return row
+
+
+# ---- the winding
+
+
+@pytest.mark.parametrize("x", [1e-9, 1e-3, 0.0499, 0.0501, 0.3, 2.0, 40.0])
+def test_the_functions_of_a_winding_are_means_of_its_exponential(x: float) -> None:
+    found = plain(joint_torques.winding_functions)(x)
+    for power, value in enumerate(found):
+        weight = partial(lambda n, s: np.exp(-x * s) * (1.0 - s) ** n / factorial(n), power)
+        exact, _ = quad(weight, 0.0, 1.0, epsabs=1e-13)
+        assert value == pytest.approx(exact, rel=1e-9)
+
+
+def test_the_functions_of_a_winding_are_smooth_where_the_series_ends() -> None:
+    below, above = (plain(joint_torques.winding_functions)(0.05 * (1 + e)) for e in (-1e-9, 1e-9))
+    np.testing.assert_allclose(below, above, rtol=1e-8)
+
+
+WINDING = joint(RESISTANCE=1.5, INDUCTANCE=0.012, GEAR=50.0, TORQUE_CONSTANT=0.04, BACK_EMF=0.04)
+WARM = 0.2
+
+
+def currents(begun: float, ended: float, volts: float, start: float, h: float, count: int = 2) -> Floats:
+    """L di/dt = u − R i − n K v(t) at so many moments of a step, with a speed that changes evenly; by an integrator of
+    another make."""
+    resistance = 1.5 * (1 + WARM)
+
+    def rate(t: float, i: Floats) -> Floats:
+        speed = begun + (ended - begun) * t / h
+        return np.asarray((volts - resistance * i - 50.0 * 0.04 * speed) / 0.012)
+
+    found = solve_ivp(
+        rate, (0.0, h), [start], t_eval=np.linspace(0.0, h, count), rtol=1e-10, atol=1e-12, method="DOP853"
+    )
+    return np.asarray(found.y[0])
+
+
+@pytest.mark.parametrize("h", [2e-4, 1e-3, 4e-3, 0.05])
+def test_the_current_after_a_step_is_that_of_a_speed_that_changes_evenly(h: float) -> None:
+    found = joint_torques.current_after(WINDING, WARM, 2.0, 12.0, 0.5, 0.9, h)
+    assert found == pytest.approx(currents(0.5, 0.9, 12.0, 2.0, h)[-1], rel=1e-7)
+
+
+@pytest.mark.parametrize("h", [1e-3, 0.05])
+def test_the_current_of_the_stages_has_the_impulse_and_the_way_of_the_exact_one(h: float) -> None:
+    """∫ i dt and ∫ (h − t) i dt over a step, by the weights of RK4 with a speed that changes evenly."""
+    speeds = (0.5, 0.7, 0.7, 0.9)
+    given = (WINDING, WARM, 2.0, 12.0, 0.5)
+    stages = [joint_torques.stage_current(*given, speed, stage, h) for stage, speed in enumerate(speeds)]
+    exact = currents(0.5, 0.9, 12.0, 2.0, h, 401)
+    share = np.linspace(0.0, 1.0, 401)
+    impulse, way = (float(np.trapezoid(exact * w, share)) for w in (np.ones(401), 1.0 - share))
+    assert (stages[0] + 2 * stages[1] + 2 * stages[2] + stages[3]) / 6 == pytest.approx(impulse, rel=1e-3)
+    assert (stages[0] + stages[1] + stages[2]) / 6 == pytest.approx(way, rel=1e-3)
+
+
+def test_a_settled_current_is_what_the_back_emf_leaves_of_the_volts() -> None:
+    assert joint_torques.steady_current(WINDING, WARM, 12.0, 0.5) == pytest.approx((12.0 - 0.04 * 50 * 0.5) / 1.8)
+    weak = WINDING.copy()
+    weak[at.FLUX_LOSS], weak[at.VISCOUS] = 0.1, 2e-4
+    assert joint_torques.motor_gain(weak, WARM) == pytest.approx(50 * 0.036 / 1.8)
+    assert joint_torques.motor_damping(weak, WARM) == pytest.approx(2500 * (0.036**2 / 1.8 + 2e-4))
+
+
+# ---- contacts
+
+
+@pytest.mark.parametrize("shape", [0.0, 0.5, 1.0])
+def test_friction_builds_up_over_the_presliding_distance(shape: float) -> None:
+    """dz/dx = (1 − shape · sign(x) · z)/distance, and never beyond 1; far out the end may be a little nearer."""
+    for begun in (-0.6, 0.0, 0.8):
+        for moved in (-0.4, -0.01, 0.01, 0.4, 3.0):
+            found = joint_torques.deflection(begun, moved, 1.0, shape)
+            steps = np.linspace(0.0, moved, 20_001)
+            z = begun
+            for step in np.diff(steps[::100]):
+                rate = 1.0 - shape * np.sign(moved) * z
+                z = float(np.clip(z + step * (1.0 - shape * np.sign(moved) * (z + 0.5 * step * rate)), -1.0, 1.0))
+            assert found == pytest.approx(z, abs=0.05 if abs(moved) > 0.5 else 3e-3)
+
+
+def test_a_transmission_carries_nothing_inside_its_play_and_pulls_nothing_together() -> None:
+    own = joint(GAP=0.02, COMPLIANCE=1e-3, CONTACT_COMPLIANCE=1e-3, TRANSMISSION_DAMPING=2.0)
+    assert [joint_torques.transmitted(own, twist, 1.0) for twist in (-0.0099, 0.0, 0.01)] == [0.0, 0.0, 0.0]
+    assert joint_torques.transmitted(own, 0.012, 0.5) == pytest.approx(0.002 / 2e-3 + 2.0 * 0.5)
+    assert joint_torques.transmitted(own, -0.012, 0.25) == pytest.approx(-0.002 / 2e-3 + 2.0 * 0.25)
+    assert joint_torques.transmitted(own, 0.012, -0.6) == 0.0, "damping would pull"
+
+
+# ---- a control period
+
+
+def changes(*extra: float, delay: float = 0.012) -> tuple[list[int], list[int], Floats]:
+    """Whole periods of delay, order and times of the joints' changes of drive, for a period of 20 ms."""
+    shared, joints = np.zeros(at.SHARED), np.array([joint(EXTRA_DELAY=each) for each in extra])
+    shared[at.DELAY], shared[at.PERIOD] = delay, 0.02
+    order, times = np.zeros(len(extra), dtype=np.int64), np.zeros(len(extra))
+    periods = plain(period.switching_times)(shared, joints, order, times)
+    return periods.tolist(), order.tolist(), times
+
+
+def test_drives_change_in_the_order_of_their_delays_within_a_period() -> None:
+    periods, order, times = changes(0.005, 0.0, 0.013)
+    assert (periods, order) == ([0, 0, 1], [2, 1, 0])
+    np.testing.assert_allclose(times, [0.017, 0.012, 0.005])
+
+
+def test_equal_delays_keep_the_order_of_the_joints() -> None:
+    assert changes(0.001, 0.001, 0.0, 0.001)[1] == [2, 0, 1, 3]
+    assert changes(0.0, 0.0, 0.0)[1] == [0, 1, 2]
+
+
+def test_a_delay_of_whole_periods_is_of_whole_periods() -> None:
+    periods, _, times = changes(0.0, 0.02, 0.06, delay=0.0)
+    assert periods == [0, 1, 3]
+    np.testing.assert_allclose(times, 0.0, atol=1e-15)
+
+
+def test_a_drive_acts_up_to_fourteen_periods_late_and_never_early() -> None:
+    periods, _, times = changes(0.279, 0.281, 0.5, -0.005, delay=0.0)
+    assert periods == [13, 14, 14, 0]
+    np.testing.assert_allclose(times, [0.019, 0.001, 0.22, -0.005], atol=1e-12)
+    assert QUEUE == 16
+
+
+@pytest.mark.parametrize(
+    ("duration", "step", "count"),
+    [(0.02, 1e-3, 20), (0.0201, 1e-3, 21), (1e-9, 1e-3, 1), (1e-3, 1e-3, 1), (0.1 * 3, 0.1, 3), (0.02, 0.5, 1)],
+)
+def test_a_stretch_has_as_few_equal_steps_as_its_longest_allows(duration: float, step: float, count: int) -> None:
+    assert plain(period.step_count)(duration, step) == count
+
+
+def test_any_winding_that_warms_makes_the_steps_of_a_run_its_own() -> None:
+    cold, warm = joint(), joint(HEATING=0.1)
+    assert [plain(period.warms)(np.array(rows)) for rows in ([cold, cold], [cold, warm], [warm, cold])] == [
+        False,
+        True,
+        True,
+    ]
+
+
+@pytest.mark.parametrize("column", period.EXTRA_TORQUES)
+def test_every_torque_that_is_added_is_one_that_the_run_computes(column: int) -> None:
+    joints = np.zeros((2, at.PER_JOINT))
+    joints[1, column] = -0.1
+    flags = np.array([at.HAS_STICTION, at.HAS_INDUCTANCE])
+    found = plain(period.extra_flags)(joints, flags)
+    assert found.tolist() == [at.HAS_STICTION, at.HAS_INDUCTANCE | at.HAS_EXTRA_TORQUE]
+    assert flags.tolist() == [at.HAS_STICTION, at.HAS_INDUCTANCE]
