@@ -3886,6 +3886,16 @@ export interface components {
             place?: number;
         };
         /**
+         * PlacedEffect
+         * @description An effect on joints; none: of the whole machine.
+         */
+        PlacedEffect: {
+            /** Effect */
+            effect: string;
+            /** Joints */
+            joints: number[];
+        };
+        /**
          * PlainExperiment
          * @description An experiment whose set points are those of its motion; its fields are described at ExperimentSpec.
          */
