@@ -49,6 +49,7 @@ from model.discrepancy.experiment_design.next_experiment import (
     converge_rivals,
     judge_experiments,
 )
+from model.discrepancy.experiment_design.prediction import starts_at_rest
 from model.discrepancy.experiment_design.search import MotionSearch, designed_motions
 from model.discrepancy.experiment_design.separation import ENOUGH, LEAST, Separations
 from model.discrepancy.options import DiagnosisOptions
@@ -123,12 +124,16 @@ def achieved(rivals: Rivals, new: Trace) -> float:
 
 
 def _again(point: Point, traces: Sequence[Trace]) -> Point:
-    """A rival fitted anew to more traces, from where it was."""
+    """A rival fitted anew to one more trace, from where it was and at rest."""
     observation, given = observe(point.model, traces)
     shared = point.only([k for k, u in enumerate(point.unknowns) if u.trace is None])
-    starts = given.only([k for k, u in enumerate(given.unknowns) if u.trace is not None])
-    values = np.concatenate([shared.values, starts.values])
-    return converge(point_at(observation, Calibration(point.model, (*shared.unknowns, *starts.unknowns), values)), 6)
+    known = point.by_name
+    starts = [u for u in given.unknowns if u.trace is not None]
+    new = [u for u in starts if u.name not in known]
+    values = [*(known[u.name] for u in starts if u.name in known), *starts_at_rest(observation, shared, new)]
+    unknowns = (*shared.unknowns, *(u for u in starts if u.name in known), *new)
+    begun = Calibration(point.model, unknowns, np.array([*shared.values, *values]))
+    return converge(point_at(observation, begun), 6)
 
 
 def studied(number: int, folder: Path) -> Json | None:

@@ -1,0 +1,36 @@
+"""What a prediction imagines: an arm that begins at rest, as the real one does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from model.discrepancy.experiment_design.prediction import Prediction, imagine
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import point_at
+from tests.model.discrepancy.experiment_design.test_next_experiment import EXPERIMENTS, plan, record
+from tests.model.fitting import imagined
+
+COUNT = 0.0015
+"""rad of a reading, nearly."""
+
+
+@pytest.mark.parametrize(
+    ("effect", "size"), [("potentiometer_offset", {"offset": 0.12}), ("potentiometer_gain", {"relative": -0.1})]
+)
+def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_point(
+    effect: str, size: dict[str, float]
+) -> None:
+    model = imagined.arm().with_effect(effect, (3,), size)
+    spec = EXPERIMENTS["ramp"].spec
+    observation, given = observe(model, [record(model, spec, 3)])
+    point = point_at(observation, given, np.zeros((len(given.unknowns), observation.samples)))
+    there = imagine(model, spec, plan)
+    assert there is not None
+    predicted = Prediction(there, point).recorded()
+    (own,) = predicted.there.observation.records
+    resting = slice(0, 20)
+    away = np.abs(own.measured[resting] - own.inputs.set_points[resting])
+    assert away.max() < 6 * COUNT
+    begins = dict(zip((u.name for u in predicted.begun.unknowns), predicted.begun.values, strict=True))
+    assert abs(begins["initial.trace1.joint3.position"]) > 0.02
