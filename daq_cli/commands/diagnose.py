@@ -94,6 +94,10 @@ def diagnose(
             help="Write the experiment asked for here (.json, for `daq run spec`).",
         ),
     ] = None,
+    design: Annotated[
+        bool,
+        typer.Option("--design", help="Search for a motion of its own to ask for; it takes some 10 s more."),
+    ] = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -121,15 +125,17 @@ def diagnose(
 
     if not acquire and (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
-        found = jobs.diagnose(begin, named, held_out, options, out, report)
+        found = jobs.diagnose(begin, named, held_out, options, out, report, design=design)
         _save(found, out, next_file)
         _print_result(found, out, None, next_file, as_json=json)
         return
     if acquire:
-        ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, ConsentPrompt(yes), once)
+        ended = diagnose_and_acquire(
+            robot, begin.machine, fitted_to, folder, budget, ConsentPrompt(yes), once, design=design
+        )
         found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
-        found = once(fitted_to, experiment_chooser(begin.machine))
+        found = once(fitted_to, experiment_chooser(begin.machine, design=design))
     _save(found, out, next_file)
     page = None if report is None else _written(found, fitted_to, held, report)
     _print_result(found, out, page, next_file, as_json=json)

@@ -42,7 +42,9 @@ def class_words(found: Inseparable, budget: float | None = None) -> str:
         f"{found.separation:.1f} standard deviations apart ({found.needed:g} would tell them)"
     )
     law = "one class" if found.shares is None else LAWS[found.shares]
-    return f"{members_words(found)} are {law}, which no motion tells apart: {most}{_told_by(found.told_by)}"
+    return (
+        f"{members_words(found)} are {law}, which no motion that was tried tells apart: {most}{_told_by(found.told_by)}"
+    )
 
 
 def called(found: Inseparable) -> str:
