@@ -51,8 +51,9 @@ def diagnose_and_acquire(
     """Diagnoses, runs the experiment asked for, and diagnoses again, as long as `next_to_run` names one.
 
     `budget` is the robot time in s, `machine` that of the examined model. Experiments are planned for the configured
-    machine, within its present limits; with `design`, motions are designed for the question, too. Raises SpecError for another machine, and what connecting raises, before
-    anything is computed; a later failure is returned with the answer.
+    machine, within its present limits; with `design`, motions are designed for the question, too. Raises SpecError for
+    another machine, and what connecting raises, before anything is computed; a later failure is returned with the
+    answer.
     """
     arm = robot.machine
     _check_same_machine(arm, machine)
