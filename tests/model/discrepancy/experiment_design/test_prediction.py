@@ -16,12 +16,13 @@ COUNT = 0.0015
 
 
 @pytest.mark.parametrize(
-    ("effect", "size"), [("potentiometer_offset", {"offset": 0.12}), ("potentiometer_gain", {"relative": -0.1})]
+    ("effect", "joint", "size"),
+    [("potentiometer_offset", 3, {"offset": 0.12}), ("potentiometer_gain", 2, {"relative": -0.1})],
 )
 def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_point(
-    effect: str, size: dict[str, float]
+    effect: str, joint: int, size: dict[str, float]
 ) -> None:
-    model = imagined.arm().with_effect(effect, (3,), size)
+    model = imagined.arm().with_effect(effect, (joint,), size)
     spec = EXPERIMENTS["ramp"].spec
     observation, given = observe(model, [record(model, spec, 3)])
     point = point_at(observation, given, np.zeros((len(given.unknowns), observation.samples)))
@@ -33,4 +34,4 @@ def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_po
     away = np.abs(own.measured[resting] - own.inputs.set_points[resting])
     assert away.max() < 6 * COUNT
     begins = dict(zip((u.name for u in predicted.begun.unknowns), predicted.begun.values, strict=True))
-    assert abs(begins["initial.trace1.joint3.position"]) > 0.02
+    assert abs(begins[f"initial.trace1.joint{joint}.position"]) > 0.02

@@ -41,7 +41,7 @@ def test_a_group_that_no_motion_tells_apart_is_named_as_its_class(answer: Diagno
     assert headline(named) == (
         "a torque against the motion on joint 2: Coulomb friction or stiction or Stribeck friction"
     )
-    assert "a torque against the motion, which no motion tells apart" in summary(named)
+    assert "a torque against the motion, which no motion that was tried tells apart" in summary(named)
     for other in (untold.model_copy(update={"shares": None}), untold.model_copy(update={"members": members[1:]})):
         left = undecided.model_copy(update={"inseparable": (other,)})
         assert headline(left) == "one of: Coulomb friction on joint 2 or stiction on joint 2"
