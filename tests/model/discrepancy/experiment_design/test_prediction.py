@@ -35,3 +35,11 @@ def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_po
     assert away.max() < 6 * COUNT
     begins = dict(zip((u.name for u in predicted.begun.unknowns), predicted.begun.values, strict=True))
     assert abs(begins[f"initial.trace1.joint{joint}.position"]) > 0.02
+
+
+def test_starts_have_the_same_freedom_when_a_model_with_bent_potentiometers_is_observed_again() -> None:
+    trace = record(imagined.arm(), EXPERIMENTS["ramp"].spec, 3)
+    _, first = observe(imagined.arm(), [trace])
+    _, again = observe(first.model, [trace])
+    starts = [[(u.low, u.deviation) for u in given.unknowns if u.trace is not None] for given in (first, again)]
+    assert starts[0] == starts[1]

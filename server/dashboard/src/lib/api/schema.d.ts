@@ -1744,6 +1744,11 @@ export interface components {
              * @default 3
              */
             most_steps?: number;
+            /**
+             * Design
+             * @default false
+             */
+            design?: boolean;
             /** Name */
             name?: string | null;
         };
