@@ -41,9 +41,9 @@ def test_two_torques_in_proportion_to_speed_are_one_class_that_a_current_tells()
     assert called(found) == "a torque in proportion to speed on joint 1: viscous friction or weakened magnet"
     assert class_words(found, 60.0) == (
         "viscous friction on joint 1 and weakened magnet on joint 1 are a torque in proportion to speed, which no "
-        "motion that was tried tells apart: of 110 motions within the limits and 60 s, the best sets two of them 1.2 standard "
-        "deviations apart (3 would tell them). What would tell them: a current clamp on the motor's lead, or a coast "
-        "with the drive's leads open"
+        "motion that was tried tells apart: of 110 motions within the limits and 60 s, the best sets two of them 1.2 "
+        "standard deviations apart (3 would tell them). What would tell them: a current clamp on the motor's lead, or "
+        "a coast with the drive's leads open"
     )
 
 
