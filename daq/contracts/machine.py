@@ -351,6 +351,17 @@ class Machine(FrozenRecord):
             raise SpecError(f"machine {self.name}: joint {joint} has no sensor, so no calibration")
         return JointCalibration(joint, sensor.range.value, sensor.at_zero.value, sensor.direction)
 
+    def drive_sign(self, joint: int) -> int:
+        """Sign of the drive for a positive output of the board's controller, on joint `joint` (from 1).
+
+        The controller works in counts, so on any arm that comes to rest a positive output makes the counts grow: a
+        sensor that counts down, or a gear that turns the motion round, belongs to a motor that is connected the other
+        way.
+        """
+        sensor, drive = self.joint(joint).sensor, self.joint(joint).drive
+        counting = 1 if sensor is None else sensor.direction
+        return counting if (drive.gain if isinstance(drive, PlainGain) else drive.gear_ratio).value > 0 else -counting
+
     def joint(self, number: int) -> Joint:
         """Joint `number` (from 1). Raises SpecError when there is none."""
         if not 1 <= number <= len(self.joints):

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from daq.driver import Controller
-from firmware_protocol.commands import Reply, Request, Sample
+from firmware_protocol.commands import Reply, Request, Sample, Snapshot
 
 JOINTS = (1, 2, 3)
 
@@ -29,6 +29,32 @@ def test_every_nth_period_comes_evenly_with_its_set_points(options: str, compact
         assert (counters.missing_samples, counters.missed_set_points, counters.retries) == (0, 0, 0)
         last = controller.next_snapshot(joints=JOINTS)
         assert last.set_points == towards
+
+
+@pytest.mark.parametrize("baud", [9600, 19200, 38400])
+@pytest.mark.parametrize("options", ["", "&no_compact=1"], ids=["compact", "plain"])
+def test_a_sample_tells_from_which_period_on_its_set_points_were_used(baud: int, options: str) -> None:
+    """Held against the bridge's ring, which has every period."""
+    joints = (1, 2, 3, 4, 5, 6)
+    with Controller.connect(f"mock://?lock_step=1&seed=3&baud={baud}{options}") as controller:
+        every = controller.line_rate(joints, joints).every
+        snapshot = controller.next_snapshot(joints=joints)
+        here, seen = snapshot.set_points, []
+        for step in range(1, 20 // every + 3):
+            towards = {joint: posture + step for joint, posture in here.items()}
+            snapshot = controller.next_snapshot(snapshot.tick + every - 1, joints, towards)
+            seen.append(snapshot)
+        ring = [snapshot.tick - 16]  # of the 32 kept: while they are asked for, the line lets some become too old
+        used: dict[int, int] = {}
+        while ring[-1] < snapshot.tick:
+            (reply,) = controller.link.exchange(Sample(ring[-1], 0x01))
+            assert isinstance(reply, Snapshot)
+            ring.append(reply.tick)
+            used.setdefault(reply.joints[0][1].set_point, reply.tick)
+    assert {later - earlier for earlier, later in pairwise(ring)} == {1}
+    told = {one.set_points[1]: one.taken for one in seen if one.taken is not None and one.taken > ring[1]}
+    assert told
+    assert told == {posture: used[posture] for posture in told}
 
 
 def test_a_question_waits_until_the_periods_before_are_over() -> None:
