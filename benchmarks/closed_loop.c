@@ -13,15 +13,22 @@ enum { SUM, LAST_ERROR, MEMORY = 5 };
 
 static inline double clamped(double x, double limit) { return x > limit ? limit : (x < -limit ? -limit : x); }
 static inline double outside(double x, double w) { return x > w ? x - w : (x < -w ? x + w : 0.0); }
+static inline double torque_constant(const double *j) { return j[TORQUE_CONSTANT] * (1.0 - j[FLUX_LOSS]); }
+static inline double back_emf(const double *j) { return j[BACK_EMF] * (1.0 - j[FLUX_LOSS]); }
 static inline double motor_gain(const double *j, double rise) {
-  return j[GEAR] * j[TORQUE_CONSTANT] / (j[RESISTANCE] * (1.0 + rise));
+  return j[GEAR] * torque_constant(j) / (j[RESISTANCE] * (1.0 + rise));
 }
 static inline double motor_damping(const double *j, double rise) {
-  const double e = j[BACK_EMF];
-  return j[GEAR] * j[GEAR] * (j[TORQUE_CONSTANT] * e / (j[RESISTANCE] * (1.0 + rise)) + j[VISCOUS]);
+  return j[GEAR] * j[GEAR] * (torque_constant(j) * back_emf(j) / (j[RESISTANCE] * (1.0 + rise)) + j[VISCOUS]);
 }
 static inline double steady_current(const double *j, double rise, double volts, double speed) {
-  return (volts - j[BACK_EMF] * j[GEAR] * speed) / (j[RESISTANCE] * (1.0 + rise));
+  return (volts - back_emf(j) * j[GEAR] * speed) / (j[RESISTANCE] * (1.0 + rise));
+}
+static inline double deflection(double z, double moved, double soft, double shape) {
+  if (shape == 0) return clamped(z + moved * soft, 1.0);
+  const double x = fabs(moved) * soft, y = shape * x, rise = 1.0 + y * (0.5 + y * (1.0 / 6.0)), kept = 1.0 / (1.0 + y * rise);
+  const double gain = x * rise * kept;
+  return clamped(z * kept + (moved >= 0 ? gain : -gain), 1.0);
 }
 static inline void winding_functions(double x, double *f) {
   if (x < 0.05) {
@@ -80,7 +87,7 @@ static double special(const double *j, long flags, int stage, double t, double h
                       const double *s, double volts) {
   const double steady = steady_current(j, s[RISE], volts, v);
   const double now = flags & HAS_INDUCTANCE ? stage_current(j, s, volts, begun, v, stage, h) : steady;
-  const double k = j[GEAR] * j[TORQUE_CONSTANT], through = k * now - j[GEAR] * j[GEAR] * j[VISCOUS] * v;
+  const double k = j[GEAR] * torque_constant(j), through = k * now - j[GEAR] * j[GEAR] * j[VISCOUS] * v;
   return k * (now - steady) + extra_torque(j, flags, t, q, v, z, s[STUCK], through);
 }
 
@@ -132,7 +139,7 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
       level[2] = p[2][COULOMB] + p[2][COULOMB_ARM] * fabs(along3);
       double torque[N], y[N], m[9];
       for (int j = 0; j < N; j++) {
-        y[j] = clamped(z[j] + dq[j] * soft[j], 1.0);
+        y[j] = deflection(z[j], dq[j], soft[j], p[j][PRESLIDING_SHAPE]);
         torque[j] = drive[j] - damping[j] * u[j] - y[j] * level[j];
       }
       if (is_special)
@@ -151,7 +158,7 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
       dq[j] = h / 6.0 * qs[j];
       q[j] += dq[j];
       v[j] += h / 6.0 * vs[j];
-      z[j] = clamped(z[j] + dq[j] * soft[j], 1.0);
+      z[j] = deflection(z[j], dq[j], soft[j], p[j][PRESLIDING_SHAPE]);
     }
     if (is_special)
       for (int j = 0; j < N; j++) {
@@ -173,9 +180,9 @@ static double warmed(double rise, double hot, double volts, double begun, double
 static double board_pid(double error, const double *g, const double *j, long quantise, double *memory) {
   double share = memory[SUM] / 64.0;
   if (quantise) share = floor(share);
-  double power = g[6] * (1.0 + j[GAIN_ERROR]) * (g[0] * error + share + g[2] * (error - memory[LAST_ERROR]));
+  double power = g[GAIN_SCALE] * (1.0 + j[GAIN_ERROR]) * (g[GAIN_P] * error + share + g[GAIN_D] * (error - memory[LAST_ERROR]));
   if (quantise) power = floor(power + 0.5);
-  const double growth = g[1] * error;
+  const double growth = g[GAIN_I] * error;
   if (!((power >= 127 && growth > 0) || (power <= -127 && growth < 0))) memory[SUM] += growth;
   memory[LAST_ERROR] = error;
   return clamped(power, 127.0);
@@ -211,7 +218,7 @@ void run(long periods, const double *set_points, const double *noise, const doub
       const double now = set_points[k * N + j], before = set_points[(k > 0 ? k - 1 : 0) * N + j];
       const double error = now - p[j][LOST] * (now - before) - read;
       if (k == 0) memory[j][LAST_ERROR] = error;
-      const double power = board_pid(error, gains + 7 * j, p[j], quantise, memory[j]);
+      const double power = board_pid(error, gains + GAINS * j, p[j], quantise, memory[j]);
       const double values[6] = {s[j][POSITION], s[j][SPEED], p[j][AT_ZERO] + p[j][RAD_PER_COUNT] * read,
                                 error * p[j][RAD_PER_COUNT], power, power * p[j][VOLTS_PER_COUNT]};
       for (int o = 0; o < 6; o++) out[(o * periods + k) * N + j] = values[o];

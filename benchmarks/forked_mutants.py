@@ -47,14 +47,16 @@ class Orders:
     mutants: tuple[Mutant, ...]
     longest_s: float
     answer: Path
+    leave_out_failing: bool = False
 
 
 @dataclass
 class Findings:
-    """Seconds of each test; each mutant that was killed, with the test that failed ("" at the time limit); and those
-    that survived. The others could not be tried here."""
+    """Seconds of each test; the tests that fail without any fault; each mutant that was killed, with the test that
+    failed ("" at the time limit); and those that survived. The others could not be tried here."""
 
     seconds: dict[str, float] = field(default_factory=dict)
+    failing: list[str] = field(default_factory=list)
     broken: str = ""
     killed: dict[Mutant, str] = field(default_factory=dict)
     survived: list[Mutant] = field(default_factory=list)
@@ -66,7 +68,7 @@ class _Without:
 
     seconds: dict[str, float] = field(default_factory=dict)
     callers: dict[tuple[str, str], list[str]] = field(default_factory=lambda: defaultdict(list))
-    failed: str = ""
+    failing: list[str] = field(default_factory=list)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -76,12 +78,12 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
         return None
     orders: Orders = pickle.loads(Path(os.environ[ORDERS]).read_bytes())
     files = {str(session.config.rootpath / mutant.file) for mutant in orders.mutants}
-    without = _in_a_fork(lambda: _watched(session.items, files, orders.longest_s), BASELINE_LIMIT_S)
+    without = _in_a_fork(lambda: _watched(session.items, files, orders), BASELINE_LIMIT_S)
     findings = Findings()
-    if without is None or without.failed:
-        findings.broken = without.failed if without else "no end within the time limit"
+    if without is None or (without.failing and not orders.leave_out_failing):
+        findings.broken = without.failing[0] if without else "no end within the time limit"
     else:
-        findings.seconds = without.seconds
+        findings.seconds, findings.failing = without.seconds, without.failing
         for mutant in orders.mutants:
             _try(session, mutant, without, orders, findings)
     orders.answer.write_bytes(pickle.dumps(findings))
@@ -228,24 +230,45 @@ class _Failures:
             self.names.append(report.nodeid)
 
 
-def _watched(items: list[pytest.Item], files: set[str], longest_s: float) -> _Without:
+def _watched(items: list[pytest.Item], files: set[str], orders: Orders) -> _Without:
     """Runs every test. Those that took too long run once more, since the first time may have gone into compiling."""
     without = _Without()
     failures = _Failures()
     items[0].config.pluginmanager.register(failures)
     for item, following in zip(items, [*items[1:], None], strict=True):
         called: set[CodeType] = set()
-        with _calls_into(files, called):
+        limit_s = 2.0 * orders.longest_s if orders.leave_out_failing else 0.0
+        with _calls_into(files, called), _interrupted(limit_s):
             without.seconds[item.nodeid] = _seconds(item, following)
-        if without.seconds[item.nodeid] > longest_s:
+        if without.seconds[item.nodeid] > orders.longest_s and not failures.names:
             without.seconds[item.nodeid] = _seconds(item, following)
+        if failures.names:
+            without.failing.append(item.nodeid)
+            failures.names.clear()
+            if not orders.leave_out_failing:
+                break
+            del without.seconds[item.nodeid]
+            continue
         for code in called:
             without.callers[code.co_filename, code.co_qualname.partition(".<locals>")[0]].append(item.nodeid)
-        if failures.names:
-            without.failed = failures.names[0]
-            break
     without.callers = {function: sorted(set(tests)) for function, tests in without.callers.items()}
     return without
+
+
+@contextmanager
+def _interrupted(after_s: float) -> Iterator[None]:
+    """Fails what takes longer; 0: nothing does."""
+
+    def fail(_signal: int, _frame: FrameType | None) -> NoReturn:
+        raise TimeoutError(f"longer than {after_s:g} s")
+
+    before = signal.signal(signal.SIGALRM, fail)
+    signal.setitimer(signal.ITIMER_REAL, after_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _seconds(item: pytest.Item, following: pytest.Item | None) -> float:

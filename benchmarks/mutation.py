@@ -21,6 +21,8 @@ killed.
 --kills       print each killed mutant too, with the test that failed; on a busy machine a test that waits for a
               process or a clock may have failed without noticing the fault
 --line N      only those that begin at this line; for one file
+--uncompiled  without a compiler, for the compiled code of the model: its functions run in Python, a hundred times
+              slower and with nothing to compile; tests that fail like this, or take too long, are left out
 --quick       only in forks of one process (see `forked_mutants`), which leaves out what is decided at import, compiled
               code and other processes; a survivor here may still be noticed by a test that starts a process
 """
@@ -71,6 +73,7 @@ GRACE_S = 20.0
 """Time that a mutant has beyond three times what the unchanged tests take; the start of pytest varies by seconds."""
 COMPILING_S = 240.0
 """The same for a mutant of the model, whose compiled functions have to be compiled anew."""
+UNCOMPILED = {"NUMBA_DISABLE_JIT": "1"}
 FORKS_LIMIT_S = 7200.0
 """Time limit of the unchanged tests and of all mutants that are tried in forks."""
 _TIMES = count(1_000_000_000, 10)
@@ -88,15 +91,17 @@ class Tests:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Seconds that each unchanged test takes, by the name that selects it, and the most that one may take."""
+    """Seconds that each unchanged test takes, by the name that selects it, the most that one may take, and those that
+    fail."""
 
     seconds: dict[str, float]
     longest_s: float
+    failing: tuple[str, ...] = ()
 
     def tests(self, files: tuple[str, ...]) -> Tests:
         """The tests of some files, the quickest file first, without the tests that take too long."""
         times = dict.fromkeys(files, 0.0)
-        deselected = []
+        deselected = [test for test in self.failing if test.partition("::")[0] in times]
         for test, seconds in self.seconds.items():
             file = test.partition("::")[0]
             if file in times and seconds > self.longest_s:
@@ -258,14 +263,17 @@ def run_tests(
         return code, failed[0].strip() if failed else ""
 
 
-def tried_in_forks(tree: Path, files: Iterable[str], mutants: list[Mutant], longest_s: float) -> Findings:
+def tried_in_forks(
+    tree: Path, files: Iterable[str], mutants: list[Mutant], longest_s: float, uncompiled: bool = False
+) -> Findings:
     """Measures the unchanged tests, and tries the mutants in forks of that process; see `forked_mutants`. Raises
-    MutationError when a test fails.
+    MutationError when a test fails, unless nothing is compiled.
     """
     orders, answer = tree / "mutation-orders", tree / "mutation-findings"
-    orders.write_bytes(pickle.dumps(Orders(tuple(mutants), longest_s, answer)))
+    orders.write_bytes(pickle.dumps(Orders(tuple(mutants), longest_s, answer, uncompiled)))
     answer.unlink(missing_ok=True)
-    code, failed = run_tests(tree, ["-p", Findings.__module__, *files], FORKS_LIMIT_S, {ORDERS: str(orders)})
+    more = {ORDERS: str(orders), **(UNCOMPILED if uncompiled else {})}
+    code, failed = run_tests(tree, ["-p", Findings.__module__, *files], FORKS_LIMIT_S, more)
     if code == 5:  # pytest: there was no test
         return Findings()
     findings: Findings | None = pickle.loads(answer.read_bytes()) if answer.exists() else None
@@ -275,7 +283,7 @@ def tried_in_forks(tree: Path, files: Iterable[str], mutants: list[Mutant], long
     return findings
 
 
-def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
+def outcome(tree: Path, mutant: Mutant, tests: Tests, uncompiled: bool = False) -> Outcome:
     """Runs the tests of a copy against one mutant, and puts the file back."""
     if not tests.files:
         return Outcome(mutant, "no tests")
@@ -284,8 +292,8 @@ def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
     _write(file, mutant.applied(unchanged), next(_TIMES) * 10**9)
     try:
         arguments = [*tests.files, *(f"--deselect={name}" for name in tests.deselected)]
-        grace = COMPILING_S if mutant.file.startswith("model/") else GRACE_S
-        code, failed = run_tests(tree, arguments, 3.0 * tests.seconds + grace)
+        grace = COMPILING_S if mutant.file.startswith("model/") and not uncompiled else GRACE_S
+        code, failed = run_tests(tree, arguments, 3.0 * tests.seconds + grace, UNCOMPILED if uncompiled else {})
     finally:
         _write(file, unchanged, changed_at)
     return Outcome(mutant, {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed"), failed)
@@ -296,7 +304,9 @@ def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
     os.utime(file, ns=(changed_at_ns, changed_at_ns))
 
 
-def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool, quick: bool) -> list[Outcome]:
+def run_all(
+    mutants: list[Mutant], processes: int, longest_s: float, kills: bool, quick: bool, uncompiled: bool = False
+) -> list[Outcome]:
     """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once.
 
     With `kills` it prints each killed one as well, with the test that failed. With `quick` it tries nothing but in
@@ -326,7 +336,8 @@ def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool
                 ended = Outcome(mutant, "killed" if failed else "timed out", failed)
             else:
                 with a_tree() as tree:
-                    ended = outcome(tree, mutant, Baseline(found.seconds, longest_s).tests(reaching(mutant.file)))
+                    baseline = Baseline(found.seconds, longest_s, tuple(found.failing))
+                    ended = outcome(tree, mutant, baseline.tests(reaching(mutant.file)), uncompiled)
             if ended.lives or kills:
                 print(f"{ended.ending}: {mutant}{f'  ({ended.failed})' if ended.failed else ''}", flush=True)
             return ended
@@ -334,7 +345,7 @@ def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool
         def try_in_forks(group: list[Mutant]) -> Findings:
             with a_tree() as tree:
                 files = dict.fromkeys(file for mutant in group for file in reaching(mutant.file))
-                return tried_in_forks(tree, files, group, longest_s)
+                return tried_in_forks(tree, files, group, longest_s, uncompiled)
 
         groups: dict[Path, list[Mutant]] = {}
         for mutant in mutants:
@@ -359,6 +370,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--kills", action="store_true")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--uncompiled", action="store_true")
     return parser.parse_args()
 
 
@@ -383,7 +395,9 @@ def main() -> int:
         every = [mutant for mutants in chosen.values() for mutant in mutants]
         ended = {
             each.mutant: each
-            for each in run_all(every, options.processes, options.longest, options.kills, options.quick)
+            for each in run_all(
+                every, options.processes, options.longest, options.kills, options.quick, options.uncompiled
+            )
         }
     except MutationError as error:
         print(f"error: {error}", file=sys.stderr)

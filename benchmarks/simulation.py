@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ from numpy.typing import NDArray
 from benchmarks.figures import Figure, at_least, at_most, show
 from daq.contracts.machine import load_machine
 from model import layout as at
+from model.drives import controller as pid
+from model.drives.magnet import torque_constant
 from model.dynamics.rod_arm import RodArm
 from model.machine_model.model import Model, base_model
 from model.simulation.batch import BatchRun, available_cores
@@ -78,8 +81,8 @@ def main() -> int:
 
 def _one_run(model: Model, inputs: RunInputs, prepared: Prepared) -> list[Figure]:
     """One run beside C and MuJoCo, and its derivatives."""
-    ours, c = _ours(model, prepared, 1), _c_runs(model, prepared, 1)
-    _check_agreement(ours, c)
+    ours, c = our_runs(model, prepared, 1), c_runs(model, prepared, 1)
+    check_agreement(ours, c)
     one, rival, plant = _best_in_turn(lambda: ours(1), lambda: c(1), _mujoco_run(inputs))
     parameters = [model.parameter(name) for name in JACOBIAN]
     jacobian = _best(lambda: sensitivities(model, inputs, parameters), REPEATS)
@@ -120,13 +123,17 @@ def _spread(model: Model, count: int) -> NDArray[np.float64]:
     return vectors
 
 
-def _ours(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDArray[np.float64]]:
+def our_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDArray[np.float64]]:
+    """Simulates on so many cores, and returns the outputs of all runs."""
     initials, which = np.tile(prepared.initial, (count, 1, 1)), np.zeros(count, np.int64)
     return BatchRun(model, (prepared,), which, _spread(model, count), initials, LONGEST_STEP).run
 
 
-def _c_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDArray[np.float64]]:
-    library = _compile_c()
+def c_runs(
+    model: Model, prepared: Prepared, count: int, optimised: str = "-O3"
+) -> Callable[[int], NDArray[np.float64]]:
+    """The same in C."""
+    library = _compile_c(optimised)
     periods = len(prepared.set_points)
     vectors = _spread(model, count)
     shared = np.ascontiguousarray(vectors[:, : at.SHARED])
@@ -178,21 +185,27 @@ def _initial_deflection(model: Model, prepared: Prepared) -> NDArray[np.float64]
     body = rod_arm_body(model.vector[: at.SHARED].copy(), joints, model.flags)
     levels, posture = np.zeros(3), prepared.initial[:, 0].copy()
     rod_arm_levels(posture, joints, body, prepared.settings, levels)
-    gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
-    return np.clip((gain * prepared.first_drive - rod_arm_gravity(posture, joints, body)) / levels, -1.0, 1.0)
+    levels += np.where(np.array(model.flags) & at.HAS_STICTION, joints[:, at.BREAKAWAY], 0.0)
+    gain = [joint[at.GEAR] * torque_constant(joint) / joint[at.RESISTANCE] for joint in joints]
+    return np.clip((np.array(gain) * prepared.first_drive - rod_arm_gravity(posture, joints, body)) / levels, -1.0, 1.0)
 
 
-def _compile_c() -> Any:
-    folder = Path(tempfile.mkdtemp(prefix="ma2000-benchmark-"))
+@cache
+def _compile_c(optimised: str) -> Any:
     columns = {n: v for n, v in vars(at).items() if n.isupper() and isinstance(v, int)}
-    (folder / "layout.h").write_text("".join(f"#define {n} {v}\n" for n, v in columns.items()), encoding="utf-8")
-    library = folder / "closed_loop.so"
-    command = ["gcc", "-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", f"-I{folder}", f"-I{FOLDER}"]
-    subprocess.run([*command, str(FOLDER / "closed_loop.c"), "-o", str(library), "-lm"], check=True)
-    return ctypes.CDLL(str(library))
+    columns |= {"GAIN_P": pid.P, "GAIN_I": pid.I, "GAIN_D": pid.D, "GAIN_SCALE": pid.SCALE, "GAINS": pid.GAINS}
+    options = [optimised, "-march=native", "-fno-math-errno", "-shared", "-fPIC"]
+    with tempfile.TemporaryDirectory(prefix="ma2000-benchmark-") as name:
+        folder = Path(name)
+        (folder / "layout.h").write_text("".join(f"#define {n} {v}\n" for n, v in columns.items()), encoding="utf-8")
+        library = folder / "closed_loop.so"
+        command = ["gcc", *options, f"-I{folder}", f"-I{FOLDER}", str(FOLDER / "closed_loop.c")]
+        subprocess.run([*command, "-o", str(library), "-lm"], check=True)
+        return ctypes.CDLL(str(library))  # stays loaded without its file
 
 
-def _check_agreement(ours: Callable[[int], Any], c: Callable[[int], Any]) -> None:
+def check_agreement(ours: Callable[[int], Any], c: Callable[[int], Any]) -> None:
+    """Raises AssertionError where the two move the arm differently."""
     difference = float(np.abs(ours(1)[0, OUT_POSITION] - c(1)[0, OUT_POSITION]).max())
     if not difference < 1e-9:
         raise AssertionError(f"the C and numba versions disagree by {difference} rad")
@@ -247,7 +260,7 @@ def _mujoco_run(inputs: RunInputs) -> Callable[[], NDArray[np.float64]]:
 
 def _scaling(model: Model, prepared: Prepared) -> list[Figure]:
     """Many runs on every core."""
-    ours, c = _ours(model, prepared, BATCH), _c_runs(model, prepared, BATCH)
+    ours, c = our_runs(model, prepared, BATCH), c_runs(model, prepared, BATCH)
     cores = available_cores()
     ways = [(name, run, n) for n in (1, cores) for name, run in (("numba", ours), ("C", c))]
     turns = [[_best(lambda r=run, n=n: r(n), 1) for _, run, n in ways] for _ in range(4)]

@@ -22,8 +22,6 @@ GAIN_MAX = 20
 """Adjustable P, I and D run from 0 to 20; they are not the physical gains (section 6.4)."""
 DAC_MAX = 127
 """Largest magnitude of the 8-bit DAC's signed input."""
-FOLLOWING_ERROR_LIMIT = 127
-"""ADC counts of positional error at which the source's host stops sending set points (section 6.5)."""
 
 
 def posture_to_counts(posture: int) -> int:
@@ -124,7 +122,3 @@ class DriveScale:
     def counts_to_volts(self, counts: float) -> float:
         """Volts at the motor for DAC counts, before any supply limit."""
         return counts * self.full_scale_v * self.amplifier_gain / DAC_MAX
-
-    def volts_to_counts(self, volts: float) -> float:
-        """DAC counts, not rounded, for volts at the motor."""
-        return volts * DAC_MAX / (self.full_scale_v * self.amplifier_gain)

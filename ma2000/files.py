@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from daq.traces import reader, store
+from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.csv_table import import_csv
 
 
@@ -16,12 +18,22 @@ def read_trace(path: Path | str) -> Trace:
     return import_csv(path) if path.suffix == ".csv" else reader.read_trace(path)
 
 
-def read_traces(folder: Path | str, pattern: str = "*.mcap") -> tuple[Trace, ...]:
+def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) -> tuple[Trace, ...]:
     """Every trace of a folder whose file's name matches, in the order of names, which is that of time.
 
-    Raises TraceError for a file that cannot be read.
+    A query selects by what files say of themselves, before samples are read: `outcome="complete"`, `robot="bench 2"`,
+    and so on, one or more of the fields of `daq.traces.catalogue.TraceSummary`.
+
+    Raises TraceError for a file that cannot be read, SpecError for a query of a field that there is not.
     """
-    return tuple(map(read_trace, _sorted(Path(folder).glob(pattern))))
+    paths = _sorted(Path(folder).glob(pattern))
+    known = TraceSummary.model_fields
+    for name in query:
+        if name not in known:
+            raise SpecError(f"read_traces: {name}: traces are selected by {', '.join(known)}")
+    if query:
+        paths = [path for path in paths if all(getattr(summary_of(path), key) == query[key] for key in query)]
+    return tuple(map(read_trace, paths))
 
 
 def write_trace(trace: Trace, path: Path | str) -> Path:

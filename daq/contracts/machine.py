@@ -369,6 +369,13 @@ class Machine(FrozenRecord):
         return self.joints[number - 1]
 
 
+def joint_names(machine: Machine | None, joints: tuple[int, ...]) -> tuple[str, ...]:
+    """Names of joints: the machine's, or joint_1 and so on where it is not known or has fewer."""
+    if machine is None or max(joints) > len(machine.joints):
+        return tuple(f"joint_{joint}" for joint in joints)
+    return tuple(machine.joint(joint).name for joint in joints)
+
+
 def parse_machine(text: str, origin: str = "machine file") -> Machine:
     """A machine from TOML text; `origin` names the file in errors. Raises SpecError with one line."""
     try:

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from daq.contracts import tables
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Gain
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
+from daq.contracts.sketch import html_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-TRACE_FORMAT = 1
-"""Version of the trace's metadata; a reader refuses newer ones."""
+TRACE_FORMAT = 2
+"""Version of the trace's metadata and topics; a reader refuses newer ones. Format 1 had events and joint states in
+JSON."""
 
 Outcome = Literal["complete", "stopped", "fault", "interrupted"]
 EventKind = Literal[
@@ -142,6 +149,18 @@ class Trace:
         span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
         joints = ", ".join(map(str, self.joints))
         return f"<Trace {record.trace_id}: {name}, {len(self.time)} samples in {span}, joints {joints}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: facts and a small picture."""
+        return html_of(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A table with one row a sample, indexed by time (s); units in `attrs`. Raises MissingExtraError."""
+        return tables.to_pandas(self)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Arrays over time and joint, with units and circumstances as attributes. Raises MissingExtraError."""
+        return tables.to_xarray(self)
 
     def __post_init__(self) -> None:
         count = len(self.time)

@@ -14,7 +14,7 @@ MIB = 1 << 20
 class TraceLimits(FrozenRecord):
     """What a reader of traces accepts at most; section `[traces.limits]` of the configuration.
 
-    The defaults hold nine hours of six joints at 50 Hz, and a chunk twenty times as large as the largest that a
+    The defaults hold fourteen hours of six joints at 50 Hz, and a chunk forty times as large as the largest that a
     recording writes.
     """
 

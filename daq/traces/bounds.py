@@ -25,6 +25,8 @@ SMALLEST_STEP = 1e-9
 """Smallest difference (s) between two times; MCAP's time stamps count ns."""
 LARGEST_TICK = 2**53
 """Largest tick (control periods), of either sign: the whole numbers that a float64 holds exactly; 285 years of 1 µs."""
+LARGEST_JOINT = 99
+"""Largest number of a joint that an event may name."""
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-6, 86400.0
 """Bounds (s) of a control period: a loop at 1 MHz, one sample a day."""
 
@@ -83,10 +85,15 @@ def check_signals(signals: Mapping[str, NDArray[Any] | None], origin: str) -> No
 
 
 def check_record(record: TraceRecord, events: tuple[TraceEvent, ...], origin: str) -> None:
-    """Raises TraceError for a control period or the time of an event that no rig can have."""
+    """Raises TraceError for a control period, or the time, tick or joint of an event, that no rig can have."""
     if record.period is not None and not SHORTEST_PERIOD <= record.period <= LONGEST_PERIOD:
         line = f"period = {record.period:g} s, allowed is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
         raise TraceError(f"{origin}: {line}")
     for event in events:
         if not abs(event.time) <= LARGEST_TIME:
             raise TraceError(f"{origin}: event {event.kind!r}: time = {event.time:g} s, {allowed('time')}")
+        if event.tick is not None and abs(event.tick) > LARGEST_TICK:
+            raise TraceError(f"{origin}: event {event.kind!r}: tick = {str(event.tick)[:20]}, {allowed('tick')}")
+        if event.joint is not None and not 0 <= event.joint <= LARGEST_JOINT:
+            line = f"joint = {str(event.joint)[:20]}, allowed is 0 to {LARGEST_JOINT}"
+            raise TraceError(f"{origin}: event {event.kind!r}: {line}")

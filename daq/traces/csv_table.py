@@ -6,27 +6,23 @@ import csv
 import io
 import json
 import math
-import os
 import re
 from array import array
 from collections.abc import Iterable
-from datetime import UTC, datetime
+from datetime import UTC
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from daq.contracts.documents import parse_toml, shown
-from daq.contracts.errors import DaqError, SpecError, TraceError
-from daq.contracts.frozen import FrozenRecord
-from daq.contracts.machine import load_machine, shipped_machines
-from daq.contracts.trace import Floats, Moment, Outcome, Trace, TraceRecord
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import shipped_machines
+from daq.contracts.trace import Floats, Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
+from daq.traces.description import Description, read_file, toml_path
 from daq.traces.naming import trace_id_of
-from daq.traces.recording import software
-from firmware_protocol.invalid import first_invalid
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
 """Signals that a joint may have; a column is named by the signal, `_` and the joint's number. `position` is needed, or
@@ -38,27 +34,11 @@ INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
 
 
-class CsvDescription(FrozenRecord):
-    """The TOML beside a CSV file. `machine` is the name of a shipped machine or a path from the TOML's folder."""
+class CsvDescription(Description):
+    """The TOML beside a CSV file."""
 
-    source: Literal["mock", "real", "imported"] = "imported"
-    machine: str | None = None
-    robot: str | None = None
     joints: tuple[Annotated[int, Field(ge=1, le=99)], ...] | None = None
     """Joints to take from the columns; all of them when None."""
-    drive_unit: Literal["V", "A", "N·m", "N"] | None = None
-    period: Annotated[float, Field(gt=0)] | None = None
-    created: Moment | None = None
-    outcome: Outcome | None = None
-    operator: str | None = None
-    notes: str = ""
-
-
-def toml_path(path: Path) -> Path:
-    """The TOML beside a CSV file. Raises TraceError for what can be no file's name, such as `.` and `/`."""
-    if not path.name:
-        raise TraceError(f"{path}: is a folder; name a .csv file")
-    return path.with_suffix(".toml")
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
@@ -94,10 +74,8 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     a missing or unknown column, text, NaN, time that does not increase, rows of unequal length.
     """
     path = Path(path)
-    data = _read(path, limits.file_bytes, "file_bytes")
-    toml = toml_path(path)
-    description_data = _read(toml, limits.metadata_bytes, "metadata_bytes") if os.path.exists(toml) else None
-    description = _description(toml, description_data)
+    data = read_file(path, limits.file_bytes, "file_bytes")
+    description, described = CsvDescription.read(path, limits)
     header, table, rows = _read_table(path, data, limits)
     joints = _joints(path, header, description)
     _check_bounds(path, header, table, rows)
@@ -109,7 +87,7 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
             raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
-    record = _record(path, description, trace_id_of(data, *([] if description_data is None else [description_data])))
+    record = description.record(path, description.load_machine(path), trace_id_of(data, *described))
     if "position" not in signals:
         signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
@@ -122,31 +100,6 @@ def _integrate(time: Floats, velocity: Floats) -> Floats:
     """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
     steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
     return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
-
-
-def _record(path: Path, description: CsvDescription, identity: str) -> TraceRecord:
-    """`identity` is that of the file and the TOML beside it, so that a model fitted to them goes on naming them."""
-    machine = None
-    if description.machine is not None:
-        named = description.machine in shipped_machines()
-        try:
-            machine = load_machine(description.machine if named else str(path.parent / description.machine))
-        except DaqError as error:
-            raise TraceError(f"{toml_path(path)}: machine: {error}") from error
-    own_name = machine.name if machine else path.stem
-    return TraceRecord(
-        trace_id=identity,
-        created=description.created or datetime.now(UTC),
-        software=software(),
-        source=description.source,
-        robot=own_name if description.robot is None else description.robot,
-        machine=machine,
-        operator=description.operator,
-        period=description.period,
-        drive_unit=description.drive_unit,
-        notes=description.notes,
-        outcome=description.outcome,
-    )
 
 
 def _joints(path: Path, header: list[str], description: CsvDescription) -> tuple[int, ...]:
@@ -251,33 +204,6 @@ def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) ->
             finite = False
         if not finite:
             raise TraceError(f"{path}: row {number}, column {name!r}: {text!r} is not a finite number")
-
-
-def _read(path: Path, most: int, limit: str) -> bytes:
-    try:
-        with disk.open_regular(path) as stream:
-            return disk.read_at_most(stream, most, str(path), limit)
-    except OSError as error:
-        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
-
-
-def _description(path: Path, data: bytes | None) -> CsvDescription:
-    if data is None:
-        return CsvDescription()
-    try:
-        description = CsvDescription.model_validate(parse_toml(data.decode("utf-8"), str(path)))
-    except ValidationError as error:
-        first = first_invalid(error)
-        raise TraceError(f"{path}: {first.where()}: {first.message} (got {shown(first.value)})") from error
-    except UnicodeDecodeError as error:
-        raise TraceError(f"{path}: is not text in UTF-8") from error
-    except SpecError as error:
-        raise TraceError(str(error)) from error
-    if description.created is not None and description.created.tzinfo is None:
-        raise TraceError(
-            f"{path}: created: {description.created.isoformat()} has no time zone; write Z behind it for UTC"
-        )
-    return description
 
 
 def _description_text(trace: Trace) -> str:

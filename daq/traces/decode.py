@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +12,19 @@ from numpy.typing import NDArray
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import layout, set_points_taken
+from daq.traces import cdr, layout, set_points_taken
 from daq.traces.scan import UNREADABLE, Scan, payloads, require
 
 Samples = NDArray[Any]
 """Samples of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
+
+
+_JOINT_TOPICS = (layout.JOINT_TOPIC, layout.FORMAT_1_JOINT_TOPIC)
+_EVENT_DECODERS: dict[tuple[str, str], Callable[[bytes], TraceEvent]] = {
+    (layout.EVENT_SCHEMA, "cdr"): cdr.event_of,
+    (layout.FORMAT_1_EVENT_SCHEMA, "json"): layout.event_of_format_1,
+}
+"""Reader of the events, by schema and encoding."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +87,12 @@ class _Decoder:
         self._records_left = limits.records - found.records
         self._event_count, self._most_events = 0, limits.events
         channels = _channels(found)
-        self._joints = [channels.get(f"{layout.JOINT_TOPIC}{joint}") for joint in joints]
+        self._joints = [
+            channels.get(f"{layout.JOINT_TOPIC}{joint}", channels.get(f"{layout.FORMAT_1_JOINT_TOPIC}{joint}"))
+            for joint in joints
+        ]
         self._events = channels.get(layout.EVENTS_TOPIC)
+        self._event_of = _event_decoder(found, self._events)
         self._taken = set_points_taken.channel_in(found)
 
     @property
@@ -101,7 +114,7 @@ class _Decoder:
         events = parts[self._events] if self._events is not None else []
         self._event_count += len(events)
         require(self._event_count, self._most_events, "there are more than {} events", "events")
-        return Decoded(samples, taken, tuple(layout.event_of(message) for message in events))
+        return Decoded(samples, taken, tuple(map(self._event_of, events)))
 
 
 def _require_same_ticks(samples: tuple[NDArray[Any], ...]) -> None:
@@ -115,7 +128,7 @@ def _channels(found: Scan) -> dict[str, int]:
     for channel in found.channels.values():
         schema = found.schemas.get(channel.schema_id)
         name = schema.name if schema else ""
-        if channel.topic.startswith(layout.JOINT_TOPIC) and (name, channel.message_encoding) != (
+        if channel.topic.startswith(_JOINT_TOPICS) and (name, channel.message_encoding) != (
             layout.JOINT_SCHEMA,
             "cdr",
         ):
@@ -123,6 +136,21 @@ def _channels(found: Scan) -> dict[str, int]:
         if channels.setdefault(channel.topic, channel.id) != channel.id:
             raise ValueError(f"topic {channel.topic} has two channels")
     return channels
+
+
+def _event_decoder(found: Scan, channel: int | None) -> Callable[[bytes], TraceEvent]:
+    """What reads the messages of the events' channel. Raises ValueError for a channel of other messages."""
+    if channel is None:
+        return cdr.event_of
+    schema = found.schemas.get(found.channels[channel].schema_id)
+    named = schema.name if schema else "", found.channels[channel].message_encoding
+    decoder = _EVENT_DECODERS.get(named)
+    if decoder is None:
+        topic = layout.EVENTS_TOPIC
+        raise ValueError(
+            f"topic {topic} has schema {named[0]!r} in {named[1]!r}, expected {layout.EVENT_SCHEMA!r} in CDR"
+        )
+    return decoder
 
 
 def _samples(parts: list[bytes]) -> Samples:

@@ -17,20 +17,31 @@ import numpy as np
 from pydantic_core import from_json
 
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import EventKind, TraceEvent, TraceRecord
+from daq.contracts.trace import TraceEvent
+from daq.traces.cdr import HEADER
 
 SUFFIX = ".mcap"
 PART_SUFFIX = ".mcap.part"
 """A trace that is being recorded, or whose recording ended without a close."""
 
+PROFILE = "ros2"
+"""MCAP's profile of what a recording writes: every topic is in CDR and has a schema in ROS 2's language."""
+
 JOINT_STATES_TOPIC = "/joint_states"
 EVENTS_TOPIC = "/events"
-JOINT_TOPIC = "/joint/"
-"""Topic of one joint, followed by its number, from 1."""
+LOG_TOPIC = "/rosout"
+"""The events once more, where tools of ROS 2 look for what is logged."""
+JOINT_TOPIC = "/samples/joint_"
+"""Topic of one joint, followed by its number, from 1. No part of a topic's name in ROS 2 may begin with a digit."""
 
 JOINT_SCHEMA = "ma2000_daq/msg/JointSample"
-JOINT_STATES_SCHEMA = "foxglove.JointStates"
-EVENT_SCHEMA = "foxglove.Log"
+JOINT_STATES_SCHEMA = "sensor_msgs/msg/JointState"
+EVENT_SCHEMA = "ma2000_daq/msg/Event"
+LOG_SCHEMA = "rcl_interfaces/msg/Log"
+
+FORMAT_1_JOINT_TOPIC = "/joint/"
+FORMAT_1_EVENT_SCHEMA = "foxglove.Log"
+"""What traces of format 1 had instead: other names of topics, and events in JSON."""
 
 START_METADATA = "daq.record"
 """Metadata record at the start: `record` (TraceRecord as JSON), `joints` and `signals` (separated by spaces)."""
@@ -59,7 +70,6 @@ ALL_SIGNALS = (
 )
 """Columns of a trace."""
 
-CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _JOINT_SAMPLE = struct.Struct("<4s2dq5diI")
 JOINT_SAMPLE_BYTES = _JOINT_SAMPLE.size
 JOINT_SAMPLE_DTYPE = np.dtype(
@@ -79,17 +89,11 @@ JOINT_SAMPLE_DTYPE = np.dtype(
 )
 """schemas/JointSample.msg in CDR: a 4-byte header, then every field on its natural boundary, without padding."""
 
-_LEVELS: dict[EventKind, int] = {
-    **dict.fromkeys(("limit", "pause", "retry", "missing", "missed_set_point", "stop"), 3),
-    **dict.fromkeys(("restart", "link_lost", "fault"), 4),
-}
-_INFORMATION = 2
-
 
 @cache
-def schema(file: str) -> bytes:
-    """A schema that ships, by the name of its file."""
-    return (resources.files("daq.traces") / "schemas" / file).read_bytes()
+def schema(name: str) -> bytes:
+    """The definition of a message and of those in it, as it is written into every trace."""
+    return (resources.files("daq.traces") / "schemas" / f"{name.rpartition('/')[2]}.msg").read_bytes()
 
 
 def nanoseconds(moment: datetime) -> int:
@@ -98,15 +102,10 @@ def nanoseconds(moment: datetime) -> int:
     return whole * 1_000_000_000 + moment.microsecond * 1000
 
 
-def timestamp(utc_ns: int) -> dict[str, int]:
-    """A moment as Foxglove's JSON schemas write it."""
-    return {"sec": utc_ns // 1_000_000_000, "nsec": utc_ns % 1_000_000_000}
-
-
 def joint_sample(row: SampleRow, column: int) -> bytes:
     """The sample of one joint: `column` is its index in the row."""
     return _JOINT_SAMPLE.pack(
-        CDR_LITTLE_ENDIAN,
+        HEADER,
         row.time,
         row.host_time,
         row.tick,
@@ -120,28 +119,8 @@ def joint_sample(row: SampleRow, column: int) -> bytes:
     )
 
 
-def joint_states(row: SampleRow, utc_ns: int, names: tuple[str, ...], effort: bool) -> bytes:
-    """All joints of a row as foxglove.JointStates; `effort` where the drive is a torque or a force."""
-    joints: list[dict[str, object]] = []
-    for column, name in enumerate(names):
-        joint: dict[str, object] = {"name": name, "position": row.position[column]}
-        if row.velocity:
-            joint["velocity"] = row.velocity[column]
-        if effort and not math.isnan(row.drive[column]):
-            joint["effort"] = row.drive[column]
-        joints.append(joint)
-    return compact({"timestamp": timestamp(utc_ns), "joints": joints})
-
-
-def event_message(event: TraceEvent, utc_ns: int) -> bytes:
-    """An event as foxglove.Log, with its own fields beside."""
-    log = {"timestamp": timestamp(utc_ns), "level": _LEVELS.get(event.kind, _INFORMATION), "name": event.kind}
-    own = event.model_dump(exclude_none=True, exclude={"kind"})
-    return compact(log | {"file": "", "line": 0} | own)
-
-
-def event_of(message: bytes) -> TraceEvent:
-    """The event in a message of the events' topic. Raises ValueError for anything else."""
+def event_of_format_1(message: bytes) -> TraceEvent:
+    """The event in a foxglove.Log, with its own fields beside. Raises ValueError for anything else."""
     fields = json_object(message)
     own = {key: fields[key] for key in ("time", "message", "tick", "joint") if key in fields}
     return TraceEvent.model_validate(own | {"kind": fields.get("name")})
@@ -153,14 +132,6 @@ def json_object(text: str | bytes) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError("it is no JSON object")  # noqa: TRY004  # what is wrong is the text, not a type here
     return found
-
-
-def joint_names(record: TraceRecord, joints: tuple[int, ...]) -> tuple[str, ...]:
-    """Names of joints for JointStates: the machine's, else joint_1 and so on."""
-    machine = record.machine
-    if machine is None or max(joints) > len(machine.joints):
-        return tuple(f"joint_{joint}" for joint in joints)
-    return tuple(machine.joint(joint).name for joint in joints)
 
 
 def compact(data: object) -> bytes:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from daq.contracts.errors import TraceError
+from daq.contracts.sketch import JOINT_COLOURS
 from daq.contracts.trace import EventKind, Floats, Trace, TraceEvent
 from daq.traces import disk
 
@@ -26,9 +27,6 @@ SUFFIXES = (".png", ".svg", ".pdf", ".html")
 INK = "#222222"
 QUIET = "#8a8a8a"
 SET_POINT = "#555555"
-JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B")
-"""Colours of the joints: those of Okabe and Ito, which colour-blind readers can distinguish; yellow darkened for
-paper."""
 ALARM = "#B00020"
 GAP = "#f3d9a4"
 JOINTS_ABREAST = 3

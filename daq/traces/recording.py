@@ -9,19 +9,27 @@ from typing import IO
 from mcap.writer import CompressionType, Writer
 
 from daq.contracts.errors import TraceError
+from daq.contracts.machine import joint_names
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
-from daq.traces import layout, set_points_taken
+from daq.contracts.trace import TRACE_FORMAT, Outcome, TraceEvent, TraceRecord
+from daq.traces import cdr, layout, set_points_taken
+from daq.traces.cdr import JointStates
+from daq.traces.scan import Scan
 
 ONE_CHUNK_A_FLUSH = 1 << 40
 """Chunk size (bytes) that is never reached: chunks end only at `flush`, never inside a row."""
 
 
-def open_mcap(stream: IO[bytes]) -> Writer:
+def open_mcap(stream: IO[bytes], profile: str = layout.PROFILE) -> Writer:
     """The MCAP writer for all traces: zstd, one chunk per flush, checksums over chunks and the data section."""
     writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(library=software())
+    writer.start(profile, software())
     return writer
+
+
+def profile_of(found: Scan) -> str:
+    """The profile for a copy: traces of format 1 have topics in JSON, which are not of ROS 2."""
+    return layout.PROFILE if all(one.message_encoding == "cdr" for one in found.channels.values()) else ""
 
 
 def outcome_metadata(
@@ -58,10 +66,11 @@ class Recording:
         self._first: SampleRow | None = None
         self._events = 0
         self._start_ns = layout.nanoseconds(record.created)
-        self._names = layout.joint_names(record, joints)
-        self._effort = record.drive_unit in ("N·m", "N") and "drive" in signals
+        self._names = joint_names(record.machine, joints)
+        self._encoder = JointStates(self._names, record.drive_unit in ("N·m", "N") and "drive" in signals)
         self._mcap = open_mcap(stream)
-        start = record.model_copy(update={"outcome": None, "counters": {}})
+        self._schemas: dict[str, int] = {}
+        start = record.model_copy(update={"format": TRACE_FORMAT, "outcome": None, "counters": {}})
         self._mcap.add_metadata(
             layout.START_METADATA,
             {
@@ -73,16 +82,24 @@ class Recording:
         for name, data in attachments.items():
             media_type = "application/toml" if name.endswith(".toml") else "application/octet-stream"
             self._mcap.add_attachment(self._start_ns, self._start_ns, name, media_type, data)
-        states = self._mcap.register_schema(layout.JOINT_STATES_SCHEMA, "jsonschema", layout.schema("JointStates.json"))
-        sample = self._mcap.register_schema(layout.JOINT_SCHEMA, "ros2msg", layout.schema("JointSample.msg"))
-        log = self._mcap.register_schema(layout.EVENT_SCHEMA, "jsonschema", layout.schema("Log.json"))
-        self._states = self._mcap.register_channel(layout.JOINT_STATES_TOPIC, "json", states)
+        self._states = self._channel(layout.JOINT_STATES_TOPIC, layout.JOINT_STATES_SCHEMA)
         self._joints = [
-            self._mcap.register_channel(f"{layout.JOINT_TOPIC}{joint}", "cdr", sample, {"name": name})
+            self._channel(f"{layout.JOINT_TOPIC}{joint}", layout.JOINT_SCHEMA, name)
             for joint, name in zip(joints, self._names, strict=True)
         ]
-        self._log = self._mcap.register_channel(layout.EVENTS_TOPIC, "json", log)
-        self._taken = set_points_taken.register(self._mcap) if set_points_taken.SIGNAL in signals else None
+        self._event = self._channel(layout.EVENTS_TOPIC, layout.EVENT_SCHEMA)
+        self._log = self._channel(layout.LOG_TOPIC, layout.LOG_SCHEMA)
+        self._taken: int | None = None
+        if set_points_taken.SIGNAL in signals:
+            self._taken = self._channel(set_points_taken.TOPIC, set_points_taken.SCHEMA)
+
+    def _channel(self, topic: str, schema: str, joint: str | None = None) -> int:
+        """Registers a topic; `joint` is the name of the joint that it is of."""
+        number = self._schemas.get(schema)
+        if number is None:
+            number = self._mcap.register_schema(schema, "ros2msg", layout.schema(schema))
+            self._schemas[schema] = number
+        return self._mcap.register_channel(topic, "cdr", number, {} if joint is None else {"name": joint})
 
     def row(self, row: SampleRow) -> None:
         """Adds one control period.
@@ -93,7 +110,7 @@ class Recording:
         first = self._first = self._first or row
         published = self._stamp(row.time)
         logged = self._stamp(first.time + row.host_time - first.host_time)
-        states = layout.joint_states(row, published, self._names, self._effort)
+        states = self._encoder.message(row, published)
         self._mcap.add_message(self._states, logged, states, published, self.samples)
         for column, channel in enumerate(self._joints):
             self._mcap.add_message(channel, logged, layout.joint_sample(row, column), published, self.samples)
@@ -103,9 +120,10 @@ class Recording:
         self.last_time = row.time
 
     def event(self, event: TraceEvent) -> None:
-        """Adds an event."""
+        """Adds an event, and the same for tools that show a log."""
         moment = self._stamp(event.time)
-        self._mcap.add_message(self._log, moment, layout.event_message(event, moment), moment, self._events)
+        self._mcap.add_message(self._event, moment, cdr.event_message(event, moment), moment, self._events)
+        self._mcap.add_message(self._log, moment, cdr.log_message(event, moment), moment, self._events)
         self._events += 1
 
     def _stamp(self, time: float) -> int:

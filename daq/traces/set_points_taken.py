@@ -9,11 +9,10 @@ import struct
 from typing import Any
 
 import numpy as np
-from mcap.writer import Writer
 from numpy.typing import NDArray
 
 from daq.contracts.sample import SampleRow
-from daq.traces import layout
+from daq.traces.cdr import HEADER
 from daq.traces.scan import Scan
 
 TOPIC = "/set_points"
@@ -23,19 +22,13 @@ SIGNAL = "taken"
 DTYPE = np.dtype([("cdr", "S4"), ("tick", "<i8"), ("taken", "<i8")])
 """schemas/SetPointsTaken.msg in CDR."""
 
-_SCHEMA = "ma2000_daq/msg/SetPointsTaken"
+SCHEMA = "ma2000_daq/msg/SetPointsTaken"
 _MESSAGE = struct.Struct("<4s2q")
-
-
-def register(mcap: Writer) -> int:
-    """Adds the topic to a file that is being written; its channel."""
-    schema = mcap.register_schema(_SCHEMA, "ros2msg", layout.schema("SetPointsTaken.msg"))
-    return mcap.register_channel(TOPIC, "cdr", schema)
 
 
 def message(row: SampleRow) -> bytes:
     """The message that belongs to a sample."""
-    return _MESSAGE.pack(layout.CDR_LITTLE_ENDIAN, row.tick, row.taken)
+    return _MESSAGE.pack(HEADER, row.tick, row.taken)
 
 
 def channel_in(found: Scan) -> int | None:
@@ -45,8 +38,8 @@ def channel_in(found: Scan) -> int | None:
         return None
     schema = found.schemas.get(channel.schema_id)
     name = schema.name if schema else ""
-    if (name, channel.message_encoding) != (_SCHEMA, "cdr"):
-        raise ValueError(f"topic {TOPIC} has schema {name!r}, expected {_SCHEMA!r} in CDR")
+    if (name, channel.message_encoding) != (SCHEMA, "cdr"):
+        raise ValueError(f"topic {TOPIC} has schema {name!r}, expected {SCHEMA!r} in CDR")
     return channel.id
 
 

@@ -152,7 +152,7 @@ class TraceWriter:
         if self._closed:
             raise TraceError(f"{self.path}: is closed already")
         try:
-            self._queue.put(item, block=self._patience > 0, timeout=self._patience)
+            self._queue.put(item, timeout=self._patience)
         except queue.Full:
             raise self._fail(f"the disk is {self._queue.maxsize} samples and events behind") from None
 

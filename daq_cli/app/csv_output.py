@@ -28,7 +28,8 @@ def check_csv(path: Path) -> None:
     """Raises SpecError when the TOML beside the CSV would replace another one, such as a machine or a configuration."""
     from pydantic import ValidationError
 
-    from daq.traces.csv_table import CsvDescription, toml_path
+    from daq.traces.csv_table import CsvDescription
+    from daq.traces.description import toml_path
 
     toml = toml_path(path)
     if toml == path:

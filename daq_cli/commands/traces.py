@@ -11,6 +11,7 @@ from daq.contracts import exit_codes
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, console, print_json, print_table, printable
 from daq_cli.robot.access import robot_of
+from daq_cli.robot.answers import BagChoice
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace, TraceRecord
@@ -176,16 +177,18 @@ def export(
     context: typer.Context,
     trace: TraceArgument = "last",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The .csv file to write; a .toml file is put beside it.")
+        Path | None, typer.Option("--output", "-o", help="A .csv file (a .toml is put beside it), .parquet or .nc.")
     ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a trace as plain CSV, with a TOML file for the data that have no column."""
+    """Write a trace as plain CSV, with a TOML file for the data that have no column, or as Parquet or netCDF."""
+    from daq.traces.tables import NETCDF, PARQUET, export_table
     from daq_cli.app.csv_output import write_csv
 
     path, found = _read(context, trace, folder)
-    _print_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
+    write = export_table if output is not None and output.suffix in (PARQUET, NETCDF) else write_csv
+    _print_file(path, write(found, output or path.with_suffix(".csv")), as_json=json)
 
 
 def _print_file(made_from: Path, file: Path, *, as_json: bool) -> None:
@@ -201,16 +204,20 @@ def import_(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N. "
-            "A .toml of its name says what columns cannot: drive_unit, machine, robot."
+            help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N; or a bag of ROS 2 or ROS 1 "
+            "with joint states. A .toml of its name says what these cannot: drive_unit, machine, robot."
         ),
     ],
+    topic: Annotated[str | None, typer.Option(help="Of a bag: the topic of the joint states.")] = None,
+    joints: Annotated[str | None, typer.Option(help="Of a bag: names of joints, separated by commas.")] = None,
+    received: Annotated[bool, typer.Option("--received", help="Of a bag: the times of reception.")] = False,
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
     """Import a trace of another rig or tool."""
     robot = robot_of(context)
-    made = robot.import_trace(file, folder)
+    names = None if joints is None else tuple(name.strip() for name in joints.split(","))
+    made = robot.import_trace(file, folder, BagChoice(topic, names, received))
     if json:
         print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:

@@ -32,6 +32,15 @@ class ResetDone:
 
 
 @dataclass(frozen=True)
+class BagChoice:
+    """What is taken from a bag: the topic, the names of the joints, and whether the times are those of reception."""
+
+    topic: str | None = None
+    joints: tuple[str, ...] | None = None
+    received: bool = False
+
+
+@dataclass(frozen=True)
 class ImportedTrace:
     """An imported trace: its number, its file, and one line on where it is."""
 

@@ -15,7 +15,7 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError, ReachError, SafetyError, SpecError, TraceError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
+from daq_cli.robot.answers import BagChoice, ImportedTrace, ResetDone, RobotState
 
 if TYPE_CHECKING:
     from daq.acquisition.messages import Finished
@@ -197,14 +197,14 @@ class LocalRobot:
 
         return find_trace(folder, wanted, self.call.trace_limits)
 
-    def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: BagChoice) -> ImportedTrace:
         """Writes the trace into the folder. Raises SpecError, TraceError."""
-        from daq.traces.csv_table import import_csv
         from daq.traces.naming import trace_path
         from daq.traces.store import write_trace
+        from daq_cli.robot.imports import foreign_trace
 
         place = folder or self.call.trace_folder
-        found = import_csv(file, self.call.trace_limits)
+        found = foreign_trace(file, self.call.trace_limits, choice)
         try:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:

@@ -6,7 +6,6 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -16,7 +15,6 @@ from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from model.validation import differentiation
 
 Series = tuple[float, ...]
 
@@ -82,22 +80,6 @@ def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
     return torques_along(
         model, run.time, run.position, run.velocity, acceleration, f"simulation of {trace.record.trace_id}"
     )
-
-
-def torques_of_trace(model: Model, trace: Trace, width: float = 2.0) -> TorqueAnalysis:
-    """Torques along a measured motion, smoothed by a kernel of standard deviation `width` samples.
-
-    Raises SpecError for a trace with gaps or uneven sampling.
-    """
-    columns = [trace.column(j) for j in model.machine.modelled_joints]
-    steps = np.diff(trace.time)
-    if len(trace) < 5 or steps.max() > 1.2 * steps.min():
-        raise SpecError(f"trace {trace.record.trace_id}: torques along it need even sampling without gaps")
-    period = float(np.median(steps))
-    position = differentiation.smoothed(trace.position[:, columns], width)
-    speed = differentiation.speeds(position, period)
-    acceleration = differentiation.accelerations(position, period)
-    return torques_along(model, trace.time, position, speed, acceleration, f"trace {trace.record.trace_id}")
 
 
 def torques_along(

@@ -1,1 +1,1 @@
-"""Geometry of a serial chain: its description, D-H transforms, positions and Jacobians."""
+"""Geometry of a serial chain."""

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 SHOWN, PROBED_SHOWN, PROBED_ALONE = 10, 4, 8
 """Most candidates in a picture: fitted ones; probed ones beside them; probed ones where none was fitted."""
-MOST_TICKS = 5
 Key = tuple[str, tuple[int, ...]]
 
 

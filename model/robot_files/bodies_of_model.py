@@ -12,8 +12,8 @@ from model import layout as at
 from model.arrays import Floats
 from model.drives.magnet import back_emf_constant, torque_constant
 from model.effects.library import effect
-from model.kinematics.denavit_hartenberg import transform
 from model.machine_model.model import Model
+from model.robot_files.denavit_hartenberg import transform
 from model.simulation.chain_of_model import chain_of
 
 IN_BODIES = frozenset((at.MASS_ADDED, at.PAYLOAD, at.TILT_X, at.TILT_Y, at.SHIFT))
@@ -83,7 +83,7 @@ def outgoing_arm(model: Model) -> OutgoingArm:
     links, taken = [], set[str]()
     for i, joint in enumerate(numbers):
         theta, d, a, alpha = (float(value) for value in chain.geometry[i])
-        rest = transform(theta, d, a, alpha).real  # from the link's D–H frame to one at its joint, before θ
+        rest = transform(theta, d, a, alpha)  # from the link's D–H frame to one at its joint, before θ
         described, limit = machine.joints[i], machine.limits.joint(i + 1)
         mass, centre, inertia = _about_centre(chain.inertial[i])
         gear, resistance = float(joint[at.GEAR]), float(joint[at.RESISTANCE])

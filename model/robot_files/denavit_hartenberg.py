@@ -53,6 +53,19 @@ class Frames:
     notes: tuple[str, ...]
 
 
+def transform(theta: float, d: float, a: float, alpha: float) -> Floats:
+    """A of one joint (thesis 3.7): coordinates in its frame become those in the frame before. rad and m."""
+    ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    return np.array(
+        [
+            [ct, -ca * st, sa * st, a * ct],
+            [st, ca * ct, -sa * ct, a * st],
+            [0.0, sa, ca, d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
 def frames_of(points: Sequence[Floats], directions: Sequence[Floats], tip: Floats, names: Sequence[str]) -> Frames:
     """D–H frames of an arm.
 

@@ -19,7 +19,7 @@ from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
 from model.simulation.bodies import chain_body, rod_arm_body
 from model.simulation.closed_form_motion import friction_levels
-from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible
+from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, uncompiled
 
 
 @internal
@@ -110,7 +110,7 @@ def _of(kind: Any, *tags: type) -> bool:
 
 def body_of(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
     """What the equations of motion read, from the parameters."""
-    raise NotImplementedError("for compiled code")
+    return uncompiled(_body_of, kind, shared, joints, flags)
 
 
 @overload(body_of, jit_options=OPTIONS)
@@ -130,7 +130,7 @@ def _body_of(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
 
 def accelerate(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, a: Any) -> Any:
     """Fills `a` with accelerations for joint torques."""
-    raise NotImplementedError("for compiled code")
+    return uncompiled(_accelerate, kind, q, v, torque, joints, body, a)
 
 
 @overload(accelerate, jit_options=OPTIONS)
@@ -150,7 +150,7 @@ def _accelerate(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, 
 
 def friction_levels_of(kind: Any, q: Any, joints: Any, body: Any, settings: Any, out: Any) -> Any:
     """Fills `out` with the levels of Coulomb friction, N·m."""
-    raise NotImplementedError("for compiled code")
+    return uncompiled(_friction_levels_of, kind, q, joints, body, settings, out)
 
 
 @overload(friction_levels_of, jit_options=OPTIONS)
@@ -170,7 +170,7 @@ def _friction_levels_of(kind: Any, q: Any, joints: Any, body: Any, settings: Any
 
 def gravity_of(kind: Any, q: Any, joints: Any, body: Any) -> Any:
     """Gravity torques, N·m."""
-    raise NotImplementedError("for compiled code")
+    return uncompiled(_gravity_of, kind, q, joints, body)
 
 
 @overload(gravity_of, jit_options=OPTIONS)

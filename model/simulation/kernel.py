@@ -46,12 +46,12 @@ from model.simulation.period import (
     warms,
 )
 from model.simulation.run_arrays import Arm, RecordArrays, RunArrays, record_row
-from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry
+from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry, uncompiled
 
 
 def advance_of(kind: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, arm: Any, work: Any) -> None:
     """Advances `state` over a stretch of constant motor volts."""
-    raise NotImplementedError("for compiled code")
+    uncompiled(_advance_of, kind, state, volts, start, duration, steps, arm, work)
 
 
 @overload(advance_of, jit_options=OPTIONS)

@@ -32,6 +32,18 @@ class AnyChain(NamedTuple):
     tag: int
 
 
+class _Type(NamedTuple):
+    """The type of a tag, as numba shows it to what chooses an implementation."""
+
+    instance_class: type
+
+
+def uncompiled(choose: Callable[..., Any], kind: Any, *arguments: Any) -> Any:
+    """Does in Python what an overload would have compiled for a tag: for NUMBA_DISABLE_JIT=1, under which a run can be
+    stepped through, and a fault in it is tried without the compiler."""
+    return choose(_Type(type(kind)), *arguments)(kind, *arguments)
+
+
 def entry(function: Callable[..., Any]) -> Any:
     """Compile an entry from Python: cached on disk, and other threads run beside it."""
     return compiled(function, nogil=True)

@@ -39,14 +39,13 @@ SYMBOLS = (
 
 DATA_SHEET_BACK_EMF_2 = 0.0334
 """K_b of the Escap motor, V·s/rad (table 7.1)."""
-DATA_SHEET_BACK_EMF_1_3 = 0.0208
-"""K_b of the Maxon motors, V·s/rad, as it follows from K_T in SI units; the source starts at 0.030 instead."""
 
 RESISTANCE = (5.49, 4.5, 5.49)
 TORQUE_CONSTANT = (0.0208, 0.033, 0.0208)
 ROTOR_INERTIA = (18.3e-7, 32e-7, 18.3e-7)
 GEAR = (600.0, 635.5, 1000.0 / 3.0)
-"""Table 7.1 and appendix C: Ω, N·m/A, kg·m², motor turns per joint turn, joints 1 to 3."""
+"""Table 7.1 and appendix C: Ω, N·m/A, kg·m², motor turns per joint turn, joints 1 to 3. In SI units K_b of the Maxon
+motors is their K_T, 0.0208 V·s/rad; the source starts at 0.030 instead."""
 
 
 @dataclass(frozen=True)

@@ -212,6 +212,16 @@ def test_a_request_far_ahead_takes_the_last_advance_along_and_one_far_behind_doe
         assert order.judge((start + 0x9000) & 0xFFFF, Advance(1)) is judged
 
 
+@given(starts)
+def test_the_last_advance_lags_behind_by_the_window_at_most(start: int) -> None:
+    """By 16384, as the protocol says."""
+    for ahead, judged in ((16384, Arrival.AGAIN), (16385, Arrival.STALE)):
+        order = AdvanceOrder()
+        order.judge(start, Advance(1))
+        order.judge((start + ahead) & 0xFFFF, ReadStatus())
+        assert order.judge(start, Advance(1)) is judged
+
+
 def test_an_unfinished_answer_is_forgotten_with_the_connection_and_what_was_damaged_is_not() -> None:
     dialect = FramedDialect()
     line = encode_frame(to_frame(3, HelloReply(2, 0, 20_000, 0, 1, 7, 70)))

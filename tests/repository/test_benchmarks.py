@@ -13,6 +13,12 @@ from benchmarks.feedforward import LEARNED, figures, hidden_effects
 from benchmarks.fitting import REPEATS, Run, beside_ours, best_in_turn
 from benchmarks.stop_latency import stop_command
 from benchmarks.undetected_damage import BOUND, WITHIN, Rate, verdict
+from daq.contracts.machine import load_machine
+from model.machine_model.model import base_model
+from model.simulation.prepared import Options, prepare
+from tests.firmware.compiled import need
+from tests.model.simulation.effect_cases import everything
+from tests.model.simulation.records import ramp_inputs
 
 
 @pytest.mark.parametrize("name", ["startup", "main-job"])
@@ -86,6 +92,20 @@ def test_a_missed_target_of_the_simulation_is_its_exit_code(monkeypatch: pytest.
     for value, code in ((1.0, 0), (2.0, 1)):
         monkeypatch.setattr(simulation, "_one_run", lambda *_, value=value: [at_most("a run", value, 1.3, "× C")])
         assert simulation.main() == code
+
+
+def test_the_simulation_in_c_that_ours_is_timed_against_compiles_and_moves_every_arm_as_ours_does() -> None:
+    from benchmarks.simulation import c_runs, check_agreement, our_runs
+
+    need("gcc")
+    bare = base_model(load_machine("ma2000"))
+    prepared = prepare(bare, ramp_inputs(bare.machine, duration=0.5), Options())
+    full = everything(bare, ("backlash", "joint_compliance"))  # not in C: transmissions that give
+    in_c = c_runs(bare, prepared, 1, "-O0")
+    check_agreement(our_runs(bare, prepared, 1), in_c)
+    check_agreement(our_runs(full, prepared, 1), c_runs(full, prepared, 1, "-O0"))
+    with pytest.raises(AssertionError, match="disagree by"):
+        check_agreement(our_runs(full, prepared, 1), in_c)
 
 
 def test_arms_that_follow_badly_miss_the_targets_of_following_a_motion() -> None:

@@ -4,7 +4,7 @@ from types import FunctionType
 
 from benchmarks.forked_mutants import change_of
 from benchmarks.mutants import Mutant, mutants_of
-from benchmarks.mutation import ROOT, equivalents, mirrored_folder, reaching
+from benchmarks.mutation import ROOT, Baseline, equivalents, mirrored_folder, reaching
 
 SOURCE = b'''"""Text 1."""
 LIMIT: float = 2.0
@@ -80,6 +80,12 @@ class Box:
     def half(self):
         return self.size / 5
 """
+
+
+def test_tests_that_fail_without_any_fault_or_take_too_long_are_left_out_and_the_quickest_file_comes_first() -> None:
+    baseline = Baseline({"a.py::x": 2.0, "a.py::y": 9.0, "b.py::x": 1.0, "c.py::x": 0.1}, 5.0, ("b.py::y", "c.py::y"))
+    chosen = baseline.tests(("a.py", "b.py"))
+    assert (chosen.files, chosen.deselected, chosen.seconds) == (("b.py", "a.py"), ("b.py::y", "a.py::y"), 3.0)
 
 
 def test_only_the_code_of_functions_can_be_changed_in_a_process_that_has_imported_them() -> None:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -10,7 +11,8 @@ from tests.repository.tracked import ROOT, tracked_files
 PAGE = "server/dashboard/"
 NOT_INSTALLED = (PAGE, "firmware_protocol/bridge/")
 """What the page and the bridges on boards are built from."""
-PACKAGES = ("firmware_protocol", "daq", "mock_controller", "model", "server")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PACKAGES = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
 
 
 def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> None:
@@ -22,7 +24,7 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     tracked = {str(path.relative_to(ROOT)) for path in tracked_files()}
     expected = {name for name in tracked if name.startswith(tuple(f"{package}/" for package in PACKAGES))}
     expected -= {name for name in expected if name.startswith(NOT_INSTALLED)}
-    assert any(name.endswith(".toml") for name in expected)
+    assert {Path(name).suffix for name in expected} >= {".py", ".toml", ".msg"}
     assert expected - packed == set()
     assert not any(name.startswith("tests/") for name in packed)
     page = {name.removeprefix(PAGE) for name in packed if name.startswith(PAGE)}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from daq.contracts.errors import SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotState
+from daq_cli.robot.answers import BagChoice, ImportedTrace, ResetDone, RobotState
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
@@ -124,11 +124,13 @@ class RemoteRobot:
 
         return fetched_trace(self.call, folder, wanted)
 
-    def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
-        """Uploads the file to the service, which has a folder of its own."""
+    def import_trace(self, file: Path, folder: Path | None, choice: BagChoice) -> ImportedTrace:
+        """Uploads the file to the service, which has a folder of its own; of a bag, the trace that is made of it."""
+        from daq_cli.robot.imports import to_upload
+
         del folder
-        with remote_robot(self.call) as robot:
-            entry = robot.traces.upload(file)
+        with to_upload(file, self.call.trace_limits, choice) as made, remote_robot(self.call) as robot:
+            entry = robot.traces.upload(made)
         return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}")
 
     def program(self, name: Path) -> Program:

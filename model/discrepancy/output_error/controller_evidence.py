@@ -21,7 +21,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.observation import Observation, Signals
-from model.discrepancy.output_error.sampled_controller import controller_numbers, with_errors
+from model.discrepancy.output_error.sampled_controller import controller_numbers
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
 
@@ -56,12 +56,12 @@ def check_controller(
     """Violations on the modelled joints; none where the traces do not hold the controller's numbers.
 
     Args:
+        traces: with the errors that the controller formed (`with_errors` of `sampled_controller`).
         model: its stated gain errors are what the power is compared with; None: the gains are as configured. A finding
             gives the whole error of a gain, the stated one included.
     """
     if isinstance(machine.controller, NoController):
         return ()
-    traces = with_errors(traces, machine)
     found: list[ControllerFinding | None] = []
     for joint in machine.modelled_joints:
         stated = 0.0 if model is None else float(model.vector[at.slot(joint, at.GAIN_ERROR)])
@@ -78,7 +78,6 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
     """
     if not traces or isinstance(machine.controller, NoController):
         return ()
-    traces = with_errors(traces, machine)
     joints = [_JointRecords(tuple(traces), machine, joint) for joint in machine.modelled_joints]
     checks = {
         ControllerEffect.WRONG_GAIN: all(own.error_and_power is not None for own in joints),

@@ -92,19 +92,21 @@ def _farthest(drive: Floats, resolution: float) -> Floats:
 
 def with_errors(traces: Sequence[Trace], machine: Machine) -> tuple[Trace, ...]:
     """The traces with the errors that the controller formed, where they hold none and their drive tells them."""
-    found = []
-    for trace in traces:
-        numbers = [controller_numbers(trace, machine, j) for j in trace.joints if j in machine.modelled_joints]
-        if trace.error is None and trace.set_point is not None and numbers and all(n is not None for n in numbers):
-            error = trace.set_point - trace.position
-            for joint, known in zip((j for j in trace.joints if j in machine.modelled_joints), numbers, strict=True):
-                if known is not None:
-                    column = trace.column(joint)
-                    error[:, column] = known.used - trace.position[:, column]
-            found.append(replace(trace, error=error))
-        else:
-            found.append(trace)
-    return tuple(found)
+    return tuple(_with_errors(trace, machine) for trace in traces)
+
+
+def _with_errors(trace: Trace, machine: Machine) -> Trace:
+    joints = [joint for joint in trace.joints if joint in machine.modelled_joints]
+    if trace.error is not None or trace.set_point is None or not joints:
+        return trace
+    error = trace.set_point - trace.position
+    for joint in joints:
+        known = controller_numbers(trace, machine, joint)
+        if known is None:
+            return trace
+        column = trace.column(joint)
+        error[:, column] = known.used - trace.position[:, column]
+    return replace(trace, error=error)
 
 
 class _Law:

@@ -70,9 +70,9 @@ def diagnose_by_simulation(
     """The answer to traces with set points from a machine with a controller, as `workflow.diagnose` describes."""
     begun = time.perf_counter()
     progress(0.0, "checking the controller's own numbers")
+    traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
     findings = check_controller(traces, model.machine, model)
     excluded = settled_by_records(traces, model.machine)
-    traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
     if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
         # The set points that were used are known to the count.
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))

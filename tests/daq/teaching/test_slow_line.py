@@ -13,7 +13,7 @@ from daq.teaching.performer import FollowingPerformer
 from tests.daq.teaching.stand_in import MA2000
 
 
-@pytest.fixture(params=[38400, 9600])
+@pytest.fixture(scope="module", params=[38400, 9600])
 def controller(request: pytest.FixtureRequest) -> Iterator[Controller]:
     with Controller.connect(f"mock://?lock_step=1&baud={request.param}") as controller:
         yield controller

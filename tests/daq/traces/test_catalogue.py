@@ -115,6 +115,18 @@ def test_a_folder_without_traces_has_an_empty_list(tmp_path: Path) -> None:
         list_traces(tmp_path / "absent")
 
 
+def test_a_recording_of_another_program_is_listed_as_no_trace(tmp_path: Path) -> None:
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        other = Writer(stream)
+        other.start("ros2", "rosbag2")
+        other.add_metadata("rosbag2", {"a": "b"})
+        other.finish()
+    (listed,) = list_traces(tmp_path)
+    assert listed.state == "unreadable"
+    assert listed.problem is not None
+    assert listed.problem.endswith("a.mcap: is an MCAP file, but not a trace: it has no metadata 'daq.record'")
+
+
 def test_a_link_to_itself_is_listed_with_its_problem(tmp_path: Path) -> None:
     link = tmp_path / "x.mcap"
     link.symlink_to(link)

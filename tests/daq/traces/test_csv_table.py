@@ -80,6 +80,16 @@ def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -
     }
 
 
+def test_a_machine_that_is_not_shipped_is_not_named_beside_the_table(tmp_path: Path) -> None:
+    """A name alone would not be found again."""
+    trace = read_trace(write(tmp_path / "a.mcap", 3))
+    assert trace.record.machine is not None
+    own = trace.record.machine.model_copy(update={"name": "crane"})
+    made = dataclasses.replace(trace, record=trace.record.model_copy(update={"machine": own}))
+    export_csv(made, tmp_path / "b.csv")
+    assert "machine" not in tomllib.loads((tmp_path / "b.toml").read_text())
+
+
 def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
     path.write_bytes(b"\xef\xbb\xbftime, position_1 ,drive_1\r\n0,1,2\r\n0.5,1e-3, -4\r\n\r\n")

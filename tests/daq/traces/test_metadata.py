@@ -60,12 +60,22 @@ def test_metadata_that_lack_something_say_what() -> None:
         signals_of({}, "a")
 
 
-@pytest.mark.parametrize(("text", "joints"), [("1", (1,)), ("3 1 99", (3, 1, 99)), ("1 2 3 4 5 6", (1, 2, 3, 4, 5, 6))])
+@pytest.mark.parametrize(
+    ("text", "joints"),
+    [
+        ("1", (1,)),
+        ("3 1 99", (3, 1, 99)),
+        ("1 2 3 4 5 6", (1, 2, 3, 4, 5, 6)),
+        ("10  11  12  13  14", (10, 11, 12, 13, 14)),
+    ],
+)
 def test_joints_keep_their_order(text: str, joints: tuple[int, ...]) -> None:
     assert joints_of({"joints": text}, LIMITS, "a") == joints
 
 
-@pytest.mark.parametrize("text", ["", "0", "1 1", "100", "01", "1 x", "1 2 3 4 5 6 7", "1 " * 40])
+@pytest.mark.parametrize(
+    "text", ["", "0", "1 1", "100", "01", "1 x", "1 2 3 4 5 6 7", "1 " * 40, "10  11  12  13   14"]
+)
 def test_what_is_no_list_of_joints_is_refused(text: str) -> None:
     with pytest.raises(TraceError, match=r"are not 1 to 6 different numbers of joints \(traces.limits.joints\)"):
         joints_of({"joints": text}, LIMITS, "a")

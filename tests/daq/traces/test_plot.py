@@ -11,8 +11,9 @@ from matplotlib.patches import Rectangle
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.sketch import JOINT_COLOURS
 from daq.contracts.trace import Trace, TraceEvent
-from daq.traces.plot import ALARM, JOINT_COLOURS, QUIET, figure_of, plot_trace
+from daq.traces.plot import ALARM, QUIET, figure_of, plot_trace
 from daq.traces.reader import read_trace
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import JOINTS, record, row, write
@@ -47,7 +48,8 @@ def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace)
     assert measured.get_color() == JOINT_COLOURS[1]
     values = np.asarray(measured.get_ydata(), dtype=float)
     np.testing.assert_allclose(values[np.isfinite(values)], np.degrees(trace.position[:, 1]))
-    assert np.isnan(values).sum() == 1
+    assert np.flatnonzero(np.isnan(values)).tolist() == [30], "behind the last sample before the gap"
+    assert np.asarray(measured.get_xdata())[30] == trace.time[29]
 
 
 def test_only_the_joints_that_the_experiment_moves_are_drawn_unless_others_are_asked_for(trace: Trace) -> None:

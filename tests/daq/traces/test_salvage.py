@@ -63,7 +63,7 @@ def check_salvaged(path: Path, samples: int) -> None:
         summary = reader.get_summary()
         assert summary is not None
         assert summary.statistics is not None
-        assert len(list(reader.iter_messages("/joint/2"))) == samples
+        assert len(list(reader.iter_messages("/samples/joint_2"))) == samples
         assert [attachment.name for attachment in reader.iter_attachments()] == ["config.toml"]
 
 
@@ -159,6 +159,7 @@ def test_a_folder_is_salvaged_though_one_file_of_it_cannot_be(tmp_path: Path, sy
     found = salvage_folder(tmp_path)
     assert [result.path and result.path.name for result in found] == ["a.mcap", None, None, None]
     assert [result.problem is None for result in found] == [True, False, False, False]
+    assert [(result.samples, result.dropped_bytes) for result in found[1:]] == [(0, 0)] * 3
     put_aside = {"b.mcap.part.unreadable", "c.mcap.part.unreadable"}
     assert {entry.name for entry in tmp_path.iterdir()} == {"a.mcap", "d.mcap.part"} | put_aside
     assert (tmp_path / "c.mcap.part.unreadable").read_bytes() == synced[0][:60]
@@ -166,7 +167,7 @@ def test_a_folder_is_salvaged_though_one_file_of_it_cannot_be(tmp_path: Path, sy
 
 def test_a_part_file_of_a_newer_version_stays_as_it_is(tmp_path: Path, synced: tuple[bytes, list[int]]) -> None:
     part = tmp_path / "a.mcap.part"
-    newer = synced[0].replace(b'{"format":1,', b'{"format":9,')
+    newer = synced[0].replace(b'{"format":2,', b'{"format":9,')
     part.write_bytes(newer)
     with pytest.raises(TraceError, match="format 9 of a newer version"):
         salvage(part)

@@ -39,6 +39,11 @@ def test_a_step_has_its_overshoot_its_rise_time_and_its_errors() -> None:
     assert found.largest_drive == 7
 
 
+def test_the_way_of_a_slow_motion_is_that_to_its_last_set_point() -> None:
+    found = figures([10, 11.5, 15, 18.5, 20], [10, 12, 15, 18, 20])
+    assert found.rise_time == pytest.approx(0.3), "the 10 % and 90 % of ten degrees"
+
+
 def test_a_step_downwards_overshoots_downwards() -> None:
     found = figures([10, 5, 0.5, -3, 1], [10, 0, 0, 0, 0])
     assert found.overshoot == pytest.approx(3)

@@ -1,14 +1,18 @@
 """What verify finds in traces that are right, and in traces with one thing wrong."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.writer import Writer
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Outcome, TraceEvent
+from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage
+from daq.traces.store import write_trace
 from daq.traces.verify import verify
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import JOINTS, record, row, write
@@ -95,6 +99,13 @@ def test_an_event_beyond_the_record_is_noted(tmp_path: Path) -> None:
     assert [(f.level, f.message) for f in notes] == [
         ("note", "1 events lie outside the record, the first 'note' at 1.000 s")
     ]
+
+
+def test_a_tick_that_comes_twice_is_named(tmp_path: Path) -> None:
+    """Another program may write such a file; ours refuses the sample."""
+    trace = read_trace(write(tmp_path / "a.mcap", 4))
+    path = write_trace(replace(trace, tick=np.array([0, 1, 1, 2])), tmp_path / "b.mcap")
+    assert findings(path)["error", "ticks"] == "tick 1 follows 1"
 
 
 def test_a_file_without_an_index_can_be_trusted_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

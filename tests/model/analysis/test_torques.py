@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from daq.contracts.errors import SpecError
 from model.analysis.sensitivity import sensitivity_curves
-from model.analysis.torques import TorqueAnalysis, largest, torques_along, torques_of_run, torques_of_trace
+from model.analysis.torques import TorqueAnalysis, largest, torques_along, torques_of_run
 from model.dynamics import recursive
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
@@ -64,19 +63,11 @@ def test_a_thin_rod_about_its_own_joint_is_one_quarter_rotation(model: Model) ->
     assert own.rotation[0] / (own.rotation[0] + own.translation[0]) == pytest.approx(0.25)
 
 
-def test_a_measured_motion_gives_what_its_simulation_gives(model: Model) -> None:
+def test_a_model_s_own_motion_is_analysed_under_the_name_of_its_trace(model: Model) -> None:
     trace = ramp_trace(model)
-    run, measured = torques_of_run(model, trace), torques_of_trace(model, trace)
-    np.testing.assert_allclose(measured.gravity[1].whole, run.gravity[1].whole, atol=0.05)
-    assert measured.source == f"trace {trace.record.trace_id}"
-
-
-def test_uneven_sampling_is_refused(model: Model) -> None:
-    trace = ramp_trace(model)
-    gap = np.delete(np.arange(len(trace)), slice(20, 30))
-    broken = type(trace)(trace.record, trace.joints, trace.time[gap], trace.position[gap])
-    with pytest.raises(SpecError, match="even sampling"):
-        torques_of_trace(model, broken)
+    run = torques_of_run(model, trace)
+    assert run.source == f"simulation of {trace.record.trace_id}"
+    assert len(run.time) == len(run.gravity[1].whole)
 
 
 def test_sensitivity_curves_are_the_change_of_the_readings(model: Model) -> None:

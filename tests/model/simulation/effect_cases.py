@@ -71,6 +71,21 @@ CASES = (
 )
 
 
+def everything(base: Model, left_out: tuple[str, ...]) -> Model:
+    """All other effects on every joint, at the sizes of their cases. The waist's centre of mass stays on its axis: the
+    closed form knows no other place, and the recursive form does."""
+    model = base
+    for case in (case for case in CASES if case.effect not in left_out):
+        if library()[case.effect].whole_machine:
+            model = model.with_effect(case.effect, (), case.values[0])
+            continue
+        if not any(use.name == case.effect for use in base.effects):
+            model = model.with_effect(case.effect, (1, 2, 3))
+        sizes = {(joint, name): value for joint in (1, 2, 3) for name, value in case.values[joint - 1].items()}
+        model = model.with_values({f"joint{j}.{case.effect}.{name}": value for (j, name), value in sizes.items()})
+    return model.with_values({"joint1.centre_of_mass.shift": 0.0})
+
+
 class Bench:
     """The arm on a ramp up and down, with an effect and without, simulated and in continuous time.
 

@@ -7,11 +7,10 @@ import pytest
 
 from model.discrepancy.output_error.observation import STEP as STEP_OF_DIAGNOSES
 from model.effects.library import library
-from model.machine_model.model import Model
 from model.simulation.prepared import LONGEST_STEP as STEP_OF_FITS
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from tests.model.simulation.effect_cases import CASES, COUNT, Bench, Case
+from tests.model.simulation.effect_cases import CASES, COUNT, Bench, Case, everything
 
 LARGEST_ERROR, LARGEST_SHARE = 0.02, 0.05
 """Counts of the sensor, and share of the effect's own size."""
@@ -41,21 +40,6 @@ def test_an_effect_is_integrated_to_a_twentieth_of_its_own_size(bench: Bench, ca
 CORNERS = ("stiction", "backlash", "joint_compliance")
 EITHER = ("motor_inductance", "resistance_drift")
 """Not together: a winding warms by the current that its speed settles to, whatever its inductance."""
-
-
-def everything(base: Model, left_out: tuple[str, ...]) -> Model:
-    """All other effects on every joint, at the sizes of their cases. The waist's centre of mass stays on its axis: the
-    closed form knows no other place, and the recursive form does."""
-    model = base
-    for case in (case for case in CASES if case.effect not in left_out):
-        if library()[case.effect].whole_machine:
-            model = model.with_effect(case.effect, (), case.values[0])
-            continue
-        if not any(use.name == case.effect for use in base.effects):
-            model = model.with_effect(case.effect, (1, 2, 3))
-        sizes = {(joint, name): value for joint in (1, 2, 3) for name, value in case.values[joint - 1].items()}
-        model = model.with_values({f"joint{j}.{case.effect}.{name}": value for (j, name), value in sizes.items()})
-    return model.with_values({"joint1.centre_of_mass.shift": 0.0})
 
 
 @pytest.mark.parametrize("general", [False, True], ids=["closed form", "recursive"])

@@ -21,8 +21,8 @@ from model.simulation.period import QUEUE
 
 
 def plain(function: Any) -> Any:
-    """The function as Python."""
-    return function.py_func
+    """The function as Python; it is that already where nothing is compiled."""
+    return getattr(function, "py_func", function)
 
 
 def joint(**columns: float) -> Floats:

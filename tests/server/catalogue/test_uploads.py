@@ -17,6 +17,7 @@ from server.bounded.messages import Limits, ReadUpload
 from server.bounded.process import answer_order
 from server.bounded.workers import ExhaustedError, Workers
 from server.problems import ProblemError
+from tests.daq.traces.test_formats import FORMAT_1
 from tests.server.service import Service
 
 MCAP, CSV = {"Content-Type": "application/octet-stream"}, {"Content-Type": "text/csv"}
@@ -39,6 +40,17 @@ def test_a_hostile_file_is_refused_in_one_line(service: Service, content: bytes,
     assert "\n" not in problem["detail"]
     assert str(service.folder) not in answer.text
     assert not list((service.folder / "traces").glob(".upload-*"))
+
+
+def test_a_trace_of_format_1_is_kept_byte_for_byte_and_read(service: Service) -> None:
+    answer = service.robot.post("/traces", content=FORMAT_1.read_bytes(), headers=MCAP)
+    assert answer.status_code == 201, answer.text
+    trace = f"/traces/{answer.json()['id']}"
+    details = service.robot.get(trace).json()
+    assert (details["record"]["format"], details["entry"]["samples"]) == (1, 40)
+    assert [event["kind"] for event in details["events"]] == ["start", "limit"]
+    assert service.robot.get(f"{trace}/data.mcap").content == FORMAT_1.read_bytes()
+    assert service.robot.delete(trace).status_code == 204
 
 
 @pytest.fixture

@@ -80,7 +80,7 @@ def test_a_dead_zone_is_found() -> None:
 
 
 def test_a_sound_controller_gives_no_finding_and_settles_its_effects(sound: outside_arm.OutsideArm) -> None:
-    made = [outside_arm.record(sound, 11)]
+    made = with_errors([outside_arm.record(sound, 11)], MACHINE)
     assert check_controller(made, MACHINE) == ()
     assert set(settled_by_records(made, MACHINE)) == {"wrong_gain", "lost_set_points"}
 
@@ -90,7 +90,7 @@ def test_lost_set_points_are_proved_by_the_drive(sound: outside_arm.OutsideArm, 
     arm = replace(sound.changed("lost", 2, 0.05), limit=limit)
     machine = outside_arm.machine(limit=limit)
     made = outside_arm.record(arm, 11)
-    (found,) = check_controller([made], machine)
+    (found,) = check_controller(with_errors([made], machine), machine)
     assert (found.effect, found.joint) == ("lost_set_points", 2)
     assert found.value == pytest.approx(0.05, abs=0.02)
     restored = with_used_set_points(with_errors([made], machine)[0])
@@ -102,7 +102,8 @@ def test_lost_set_points_are_proved_by_the_drive(sound: outside_arm.OutsideArm, 
 
 @pytest.mark.parametrize("factor", [0.9, 1.05, 1.4])
 def test_a_wrong_gain_is_measured_by_the_drive(sound: outside_arm.OutsideArm, factor: float) -> None:
-    (found,) = check_controller([outside_arm.record(sound.changed("factor", 3, factor), 11)], MACHINE)
+    made = with_errors([outside_arm.record(sound.changed("factor", 3, factor), 11)], MACHINE)
+    (found,) = check_controller(made, MACHINE)
     assert (found.effect, found.joint) == ("wrong_gain", 3)
     assert found.value == pytest.approx(factor - 1, abs=0.005), "a rounding that repeats itself while the joint rests"
 
@@ -111,6 +112,7 @@ def test_the_drive_of_another_controller_proves_nothing(sound: outside_arm.Outsi
     made = outside_arm.record(sound, 11)
     assert made.drive is not None
     late = replace(made, drive=np.roll(made.drive, 1, axis=0))
+    assert with_errors([late], MACHINE)[0] is late
     assert check_controller([late], MACHINE) == ()
     assert settled_by_records([late], MACHINE) == ()
 

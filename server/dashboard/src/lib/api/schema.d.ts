@@ -5264,7 +5264,7 @@ export interface components {
         TraceRecord: {
             /**
              * Format
-             * @default 1
+             * @default 2
              */
             format?: number;
             /** Trace Id */

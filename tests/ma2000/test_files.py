@@ -1,0 +1,20 @@
+"""A folder of traces as a data set."""
+
+from pathlib import Path
+
+import pytest
+
+import ma2000
+from daq.contracts.errors import SpecError
+from tests.daq.traces.samples import write
+
+
+def test_traces_of_a_folder_are_selected_by_what_they_say_of_themselves(tmp_path: Path) -> None:
+    for name, robot in (("a", "left"), ("b", "right"), ("c", "left")):
+        write(tmp_path / f"{name}.mcap", 5, robot=robot, notes=name)
+    assert [trace.record.notes for trace in ma2000.read_traces(tmp_path)] == ["a", "b", "c"]
+    assert [trace.record.notes for trace in ma2000.read_traces(tmp_path, notes="b")] == ["b"]
+    assert [trace.record.notes for trace in ma2000.read_traces(tmp_path, outcome="complete", samples=5)] == list("abc")
+    assert ma2000.read_traces(tmp_path, outcome="fault") == ()
+    with pytest.raises(SpecError, match="read_traces: robo: traces are selected by path, state, size, trace_id"):
+        ma2000.read_traces(tmp_path, robo="left")
