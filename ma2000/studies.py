@@ -53,14 +53,18 @@ def diagnose(
     holdout: Sequence[Trace] = (),
     options: DiagnosisOptions | None = None,
     *,
+    design: bool = False,
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Diagnosis:
     """Where a model and traces disagree, which effects are missing, and what to measure next.
 
+    Args:
+        design: what to measure next may be a motion that is designed for the candidates; it takes some 10 s more.
+
     Raises TraceError, SpecError for input that cannot give an answer; CancelledError when asked to end.
     """
-    chooser = experiment_chooser(model.machine)
+    chooser = experiment_chooser(model.machine, design=design)
     return workflow.diagnose(model, traces, holdout, options, progress, cancel, chooser)
 
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts import exit_codes
+from daq.contracts.errors import SpecError
 from daq_cli.app import completion
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
-from daq_cli.app.output_file import replacing
+from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -40,6 +41,15 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
+
+
+def _spec_file(path: Path | None) -> Path | None:
+    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
+    if path is not None:
+        if path.suffix != ".json":
+            raise SpecError(f"--next {path}: an experiment is written as .json")
+        check_folder(path, "--next")
+    return path
 
 
 @app.command()
@@ -76,6 +86,18 @@ def diagnose(
         bool, typer.Option("--acquire", help="Run the experiment that the diagnosis asks for, and diagnose again.")
     ] = False,
     budget: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Robot time for --acquire in s.")] = 60.0,
+    next_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--next",
+            callback=_spec_file,
+            help="Write the experiment asked for here (.json, for `daq run spec`).",
+        ),
+    ] = None,
+    design: Annotated[
+        bool,
+        typer.Option("--design", help="Search for a motion of its own to ask for; it takes some 10 s more."),
+    ] = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -103,35 +125,43 @@ def diagnose(
 
     if not acquire and (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
-        found = jobs.diagnose(begin, named, held_out, options, out, report)
-        _save(found, out)
-        _print_result(found, out, None, as_json=json)
+        found = jobs.diagnose(begin, named, held_out, options, out, report, design=design)
+        _save(found, out, next_file)
+        _print_result(found, out, None, next_file, as_json=json)
         return
     if acquire:
-        ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, ConsentPrompt(yes), once)
+        ended = diagnose_and_acquire(
+            robot, begin.machine, fitted_to, folder, budget, ConsentPrompt(yes), once, design=design
+        )
         found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
-        found = once(fitted_to, experiment_chooser(begin.machine))
-    _save(found, out)
+        found = once(fitted_to, experiment_chooser(begin.machine, design=design))
+    _save(found, out, next_file)
     page = None if report is None else _written(found, fitted_to, held, report)
-    _print_result(found, out, page, as_json=json)
+    _print_result(found, out, page, next_file, as_json=json)
     if failure is not None:
         raise failure
     if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
         raise typer.Exit(exit_codes.OF_OUTCOME[outcome])
 
 
-def _save(found: Diagnosis, out: Path | None) -> None:
-    """Writes the model, if requested, before the report is made, which may fail."""
+def _save(found: Diagnosis, out: Path | None, next_file: Path | None) -> None:
+    """Writes the model and the experiment that is asked for, if requested, before the report is made, which may
+    fail."""
     from model.machine_model.model_file import save_model
 
     if out is not None:
         with replacing(out) as part:
             save_model(found.model_after, part)
+    if next_file is not None and found.next_experiment is not None:
+        with replacing(next_file) as part:
+            part.write_text(found.next_experiment.spec.model_dump_json(indent=1) + "\n", "utf-8")
 
 
-def _print_result(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
-    """Prints the answer and the files of the model and the report."""
+def _print_result(
+    found: Diagnosis, out: Path | None, page: Path | None, next_file: Path | None, *, as_json: bool
+) -> None:
+    """Prints the answer and the files of the model, the experiment and the report."""
     from daq_cli.models.diagnosis_text import answer_text
 
     if as_json:
@@ -140,6 +170,9 @@ def _print_result(found: Diagnosis, out: Path | None, page: Path | None, *, as_j
         print(answer_text(found))
     if out is not None:
         console().print(f"model {found.model_after.identity}: {out}")
+    if next_file is not None:
+        asked = found.next_experiment is not None
+        console().print(f"daq run spec {next_file}" if asked else f"no experiment is asked for: no {next_file}")
     if page is not None:
         console().print(f"report: {page}")
 

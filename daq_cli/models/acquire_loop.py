@@ -45,12 +45,15 @@ def diagnose_and_acquire(
     budget: float,
     consent: ConsentPrompt,
     diagnose: Diagnose,
+    *,
+    design: bool = False,
 ) -> LoopEnd:
     """Diagnoses, runs the experiment asked for, and diagnoses again, as long as `next_to_run` names one.
 
     `budget` is the robot time in s, `machine` that of the examined model. Experiments are planned for the configured
-    machine, within its present limits. Raises SpecError for another machine, and what connecting raises, before
-    anything is computed; a later failure is returned with the answer.
+    machine, within its present limits; with `design`, motions are designed for the question, too. Raises SpecError for
+    another machine, and what connecting raises, before anything is computed; a later failure is returned with the
+    answer.
     """
     arm = robot.machine
     _check_same_machine(arm, machine)
@@ -58,7 +61,7 @@ def diagnose_and_acquire(
     runs: list[Acquired] = []
     every = list(traces)
     failure: DaqError | None = None
-    found = diagnose(every, experiment_chooser(arm, budget))
+    found = diagnose(every, experiment_chooser(arm, budget, design=design))
     while failure is None and (asked := next_to_run(found, runs, budget)) is not None:
         left = time_left(runs, budget)
         console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}")
@@ -66,7 +69,8 @@ def diagnose_and_acquire(
             run, trace = _run(robot, arm, asked, folder or robot.call.trace_folder, consent)
             runs.append(run)
             if run.outcome == "complete":
-                found = diagnose([*every, trace], experiment_chooser(arm, time_left(runs, budget)))
+                left = time_left(runs, budget)
+                found = diagnose([*every, trace], experiment_chooser(arm, left, design=design))
                 every.append(trace)
             else:
                 console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")

@@ -158,8 +158,10 @@ class ServiceJobs:
         options: DiagnosisOptions,
         out: Path | None,
         report: Path | None,
+        *,
+        design: bool = False,
     ) -> Diagnosis:
-        """The diagnosis; the model that it makes has the name of the file `out`."""
+        """The diagnosis; the model that it makes has the name of the file `out`. design: the next experiment, too."""
         from server.jobs.results import DiagnosisJobResult
 
         request = DiagnoseRequest(
@@ -169,6 +171,7 @@ class ServiceJobs:
             effects=options.effects,
             joints=options.joints,
             most_steps=options.most_steps,
+            design=design,
             name=None if out is None else model_name(out.name),
         )
         found = self._done(request, report)

@@ -15,7 +15,7 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.frozen import FrozenRecord
-from daq.contracts.machine import NoController
+from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace, TraceRecord
 from model.arrays import Floats
 from model.fitting.covariance import inverse
@@ -110,7 +110,7 @@ def experiment_information(
     """
     trace = imagined_trace(model, spec, plan)
     problem = fit_problem(model, [trace], options)
-    _check_followed(model, trace)
+    check_followed(model, trace)
     values = np.array([u.start for u in problem.unknowns])
     floor = [white(d) for d in problem.floor]
     data = whitened(problem, problem.evaluate(values, derivatives=True), floor)
@@ -145,28 +145,37 @@ def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
     return Trace(record, joints, time, wanted, set_point=wanted, drive=np.zeros_like(wanted), tick=tick)
 
 
-def _check_followed(model: Model, trace: Trace) -> None:
+def check_followed(model: Model, trace: Trace) -> None:
     """Raises SpecError when the arm would fall so far behind that set points pause."""
-    most = model.machine.limits.following_error_counts
-    if most is None:
+    if model.machine.limits.following_error_counts is None:
         return
-    error = np.abs(simulate(model, trace, Options(quantise=False)).error)
-    period, wanted = trace.record.period, trace.set_point
-    assert period is not None  # of an imagined trace
-    assert wanted is not None
-    for column, joint in enumerate(model.machine.modelled_joints):
-        sensor = model.machine.joint(joint).sensor
+    assert trace.set_point is not None  # of an imagined trace
+    error = simulate(model, trace, Options(quantise=False)).error
+    if (why := falls_behind(model.machine, trace.set_point, error)) is not None:
+        raise SpecError(why)
+
+
+def falls_behind(machine: Machine, set_points: Floats, error: Floats) -> str | None:
+    """Why set points might pause, where the modelled joints have these errors (k, n) behind their set points (k, n),
+    rad, on an arm that is a little slower; None where they would not."""
+    most = machine.limits.following_error_counts
+    if most is None or isinstance(machine.controller, NoController):
+        return None
+    period = machine.controller.period.value
+    for column, joint in enumerate(machine.modelled_joints):
+        sensor = machine.joint(joint).sensor
         if sensor is None:
             continue
-        speed = model.machine.limits.joint(joint).speed
+        speed = machine.limits.joint(joint).speed
         smooth = FOLLOWING_SHARE / 2 * most if speed is None else speed * period / resolution(sensor)
-        counts = error[:, column] / resolution(sensor)
-        change = np.abs(np.diff(wanted[:, column], prepend=wanted[0, column])) / resolution(sensor)
+        counts = np.abs(error[:, column]) / resolution(sensor)
+        change = np.abs(np.diff(set_points[:, column], prepend=set_points[0, column])) / resolution(sensor)
         if (worst := _falls_behind(counts, change, smooth, most)) is not None:
-            raise SpecError(
+            return (
                 f"joint {joint} would fall {counts[worst]:.0f} counts behind; set points pause at {most}, and a margin "
                 "is kept"
             )
+    return None
 
 
 def _falls_behind(error: Floats, change: Floats, smooth: float, most: float) -> int | None:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.frozen import FrozenRecord
-from model.discrepancy.grounds import ControllerProof, Method, Note, Reason, Refusal
+from model.discrepancy.grounds import ControllerProof, Measurement, Method, Note, Reason, Refusal, SharedLaw
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -262,6 +262,30 @@ class NextExperiment(FrozenRecord):
     """nats that it would add on the arm's parameters, where there are no candidates to separate."""
 
 
+class PlacedEffect(FrozenRecord):
+    """An effect on joints; none: of the whole machine."""
+
+    effect: str
+    joints: tuple[int, ...]
+
+
+class Inseparable(FrozenRecord):
+    """Candidates that no admissible motion tells apart: one class of effects.
+
+    `separation`: the most that any of the `tried` motions set two of them apart, in deviations, and on which
+    `experiment`; a motion that tells them apart would have `needed`. `shares`: the law that they have in common, None
+    where none is known that all of them have. `told_by`: measurements that would tell them; empty without such a law.
+    """
+
+    members: tuple[PlacedEffect, ...]
+    separation: float
+    needed: float
+    experiment: str
+    tried: int
+    shares: SharedLaw | None = None
+    told_by: tuple[Measurement, ...] = ()
+
+
 class Suspicion(FrozenRecord):
     """An effect that more of the same motion would show or refute: its evidence, held-out records included, the
     evidence `needed` to name it, and the `seconds` that are still to be recorded for that."""
@@ -308,6 +332,8 @@ class Diagnosis(FrozenRecord):
     """The ranking of the last step, where nothing was added in it: what was tried against what is left."""
     remaining: tuple[RemainingShape, ...] = ()
     next_experiment: NextExperiment | None = None
+    inseparable: tuple[Inseparable, ...] = ()
+    """Candidates that no motion within the limits tells apart, class by class."""
     acquired: tuple[Acquired, ...] = ()
     """Experiments that were asked for and run, in order; their traces are among `traces`."""
     model_before: Model

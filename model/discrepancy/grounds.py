@@ -43,6 +43,7 @@ NoteKind = Literal[
     "not-looked-for",
     "not-separable",
     "nothing-held-out",
+    "one-class",
     "positions-of-links",
     "resting-left-out",
     "stated-numbers-moved",
@@ -52,6 +53,31 @@ NoteKind = Literal[
     "torque-left",
     "unfinished-record",
 ]
+SharedLaw = Literal[
+    "torque-with-speed",
+    "torque-against-motion",
+    "torque-with-position",
+    "torque-of-weight",
+    "torque-per-volt",
+    "late-drive",
+    "play-and-give",
+    "reading-over-range",
+    "torque-at-one-rate",
+]
+"""What effects have in common that motions alone may not tell apart."""
+Measurement = Literal[
+    "current-clamp",
+    "coast-with-drive-open",
+    "force-gauge",
+    "weighed-parts",
+    "spirit-level",
+    "loosened-cables",
+    "protractor",
+    "dial-gauge",
+    "oscilloscope",
+    "stopped-arm",
+]
+"""A measurement beside the arm's own readings."""
 RefusalKind = Literal["diverges", "error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"]
 
 

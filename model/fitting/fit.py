@@ -13,7 +13,7 @@ from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.fitting.choice import chosen_unknowns, friction_forms, start_postures, with_bends
+from model.fitting.choice import BEND, chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.covariance import sandwich
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
 from model.fitting.least_squares import Search, Solution, solve
@@ -100,7 +100,7 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     wider, bends = with_bends(model, options, signal) if not simple else (model, ())
     postures: tuple[Unknown, ...] = ()
     if options.start_posture and signal == "position" and not simple:
-        postures = start_postures(model.machine, records, bool(bends))
+        postures = start_postures(model.machine, records, any(use.name == BEND for use in wider.effects))
     forms = friction_forms(wider) if options.friction_form and not simple else ()
     loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
     every = (*unknowns, *bends, *forms, *postures)

@@ -8,11 +8,11 @@ from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import (
     Acquired,
     Diagnosis,
-    NextExperiment,
     RemainingShape,
     Step,
     clear_shape,
 )
+from model.discrepancy.explanation.class_words import class_words
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
 from model.effects.names import capitalised
@@ -55,7 +55,7 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     sections.append(_remaining(found, of))
     if found.acquired:
         sections.append(_acquired(found.acquired))
-    sections.append(_next(found.next_experiment, found.verdict))
+    sections.append(_next(found))
     if found.notes:
         sections.append(Section("What to know about this answer", (Points(found.notes),)))
     title = capitalised(headline(found))
@@ -174,10 +174,12 @@ def _acquired(runs: Sequence[Acquired]) -> Section:
     return Section("What was run", (Table(("experiment", "robot time", "outcome", "trace", "why"), rows, caption),))
 
 
-def _next(experiment: NextExperiment | None, verdict: str) -> Section:
-    title = "What to run next"
+def _next(found: Diagnosis) -> Section:
+    title, experiment = "What to run next", found.next_experiment
     if experiment is None:
-        text = "No further experiment is asked for." if verdict == "named" else "Nothing is left to tell apart."
+        if found.inseparable:
+            return Section(title, tuple(Text(sentence(class_words(c)), "warning") for c in found.inseparable))
+        text = "No further experiment is asked for." if found.verdict == "named" else "Nothing is left to tell apart."
         return Section(title, (Text(text, "quiet"),))
     rows = [("on the arm", f"{experiment.duration:.1f} s")]
     if experiment.separates:

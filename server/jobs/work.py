@@ -217,7 +217,7 @@ class _Worker:
             options,
             lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text),
             self.mailbox,
-            chooser=experiment_chooser(begin.machine),
+            chooser=experiment_chooser(begin.machine, design=request.design),
         )
         comparison, given = None, None
         controlled = not isinstance(begin.machine.controller, NoController)

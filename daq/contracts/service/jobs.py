@@ -90,6 +90,8 @@ class DiagnoseRequest(Wire):
     """Candidate effects; None for all known ones."""
     joints: tuple[JointNumber, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+    design: bool = False
+    """Whether the next experiment may be a motion that is designed for the candidates; it takes longer."""
     name: ModelName | None = None
 
 

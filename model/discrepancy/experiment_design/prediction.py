@@ -6,19 +6,21 @@ far as that allows, and its initial posture is unknown anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from daq.contracts.errors import DaqError
-from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
+from model import layout as at
 from model.arrays import Floats
 from model.design.information import imagined_trace
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
+from model.drives.sensor import sensed_angle
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
@@ -30,6 +32,8 @@ NOISE_SEED = 2
 """Seed of the readings' noise in an imagined run: without noise, friction would hold where the real arm creeps."""
 LOOSE = 1e-9
 """Relative precision that stands for none, so that matrices can be inverted."""
+ROUNDS = 20
+"""Rounds in which the angle to a reading is found; each leaves the share by which the potentiometer's scale is off."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +54,19 @@ class Imagined:
         return len(inputs) * inputs.period
 
 
-def imagine(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | None:
+Imaginer = Callable[[OfferedExperiment, Point, int], Imagined | None]
+"""An experiment as a diagnosis with a point's model would see it, with noise of a seed; None where it cannot be run or
+takes too long."""
+
+
+def imagine(model: Model, spec: ExperimentSpec, plan: Planner, noise_seed: int = NOISE_SEED) -> Imagined | None:
     """The experiment on the grid of control periods; None where the planner refuses it, or nothing would move."""
     try:
         observation, given = observe(model, [imagined_trace(model, spec, plan)])
     except DaqError:
         return None
     counts = observation.deviations / observation.unit
-    drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.prepared[0].noise.shape)
+    drawn = np.random.default_rng(noise_seed).standard_normal(observation.prepared[0].noise.shape)
     observation = observation.with_drive_as_input(False)  # nothing has been recorded yet
     return Imagined(observation, tuple(u for u in given.unknowns if u.trace is not None), (drawn * counts,))
 
@@ -72,10 +81,10 @@ class Prediction:
     @cached_property
     def begun(self) -> Calibration:
         """The point with those of its unknowns that belong to no trace, because they keep their values on the next one,
-        and with the starts."""
+        and with the starts, at rest."""
         shared = self.point.only([k for k, u in enumerate(self.point.unknowns) if u.trace is None])
         starts = self.there.starts
-        values = np.concatenate([shared.values, np.array([u.start for u in starts])])
+        values = np.concatenate([shared.values, starts_at_rest(self.there.observation, shared, starts)])
         return Calibration(shared.model, (*shared.unknowns, *starts), values)
 
     def named(self, derivatives: Floats) -> dict[str, Floats]:
@@ -132,3 +141,29 @@ class Prediction:
         diagonal = np.diag(whole)
         whole[np.diag_indices(size)] += LOOSE * np.where(diagonal > 0, diagonal, 1.0)
         return whole
+
+
+def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequence[Unknown]) -> Floats:
+    """Values of the starts of an observation's last record with which the arm's readings begin where the record does:
+    there its controller holds it.
+
+    An arm that began at the angles that are read would first make up for the error of its potentiometers, a motion that
+    no record holds; and a fit that begins there ends in another minimum.
+    """
+    vector, _ = observation.state(shared)
+    read = observation.records[-1].inputs.initial[:, 0]
+    found = []
+    for start in starts:
+        (joint,) = start.joints
+        first = at.slot(joint, 0)
+        angle = _angle_read_as(read[joint - 1], vector[first : first + at.PER_JOINT])
+        found.append(float(np.clip(angle - read[joint - 1], start.low, start.high)))
+    return np.array(found)
+
+
+def _angle_read_as(wanted: float, joint: Floats) -> float:
+    """The angle (rad) at which a potentiometer reads the angle `wanted`. joint: its numbers in the model's vector."""
+    angle = wanted
+    for _ in range(ROUNDS):
+        angle += wanted - sensed_angle(angle, joint)
+    return float(angle)

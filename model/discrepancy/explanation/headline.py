@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from model.discrepancy.diagnosis import Diagnosis, Step
+from collections.abc import Sequence
+
+from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
+from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
 from model.discrepancy.explanation.renderer import size_words, suspicion_words
 from model.effects.names import effect_on
@@ -20,14 +23,17 @@ def headline(found: Diagnosis) -> str:
             return "nothing that the held-out traces confirm"
         return "the model explains these traces within their noise and its tolerances"
     shown = [s for s in found.steps if s.adopted and (s.main_joints or not s.joints)]
-    findings = [_group(s) if s.group else _finding(s) for s in shown]
+    findings = [_group(s, found.inseparable) if s.group else _finding(s) for s in shown]
     if found.verdict == "unknown-effect":
         findings.append("none of the known effects explains what is left")
     return "; ".join(findings) or "several effects that these traces cannot tell apart"
 
 
-def _group(step: Step) -> str:
-    """The first members of a group, and how many more there are."""
+def _group(step: Step, classes: Sequence[Inseparable]) -> str:
+    """The class that all members of a group belong to; else the first members, and how many more there are."""
+    whole = class_of_group(step.group, classes)
+    if whole is not None:
+        return called(whole)
     names = [effect_on(c.effect, c.joints) for c in step.group]
     more = [] if len(names) <= SHOWN else [f"{len(names) - SHOWN} more"]
     return f"one of: {' or '.join(names[:SHOWN] + more)}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from model.discrepancy.diagnosis import Inseparable
+from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.grounds import Note, NoteKind
 from model.effects.names import effect_name
 
@@ -37,7 +39,9 @@ def _errors_follow_record(v: Values) -> str:
 
 
 def _no_experiment_left(v: Values) -> str:
-    return f"no experiment within the limits{_within(v)} is left that could tell {' from '.join(v['candidates'])}"
+    return (
+        f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
+    )
 
 
 def _not_looked_for(v: Values) -> str:
@@ -46,11 +50,16 @@ def _not_looked_for(v: Values) -> str:
 
 def _not_separable(v: Values) -> str:
     pairs = "; ".join(f"{one} and {other} ({most:.1f} at most)" for one, other, most in v["pairs"])
-    return f"no experiment within the limits{_within(v)} separates these by {v['least']:g} standard deviations: {pairs}"
+    limits = f"the limits{within(v['budget'])}"
+    return f"no experiment within {limits} separates these by {v['least']:g} standard deviations: {pairs}"
 
 
 def _nothing_held_out(_: Values) -> str:
     return "no held-out trace was given: nothing here has been shown on data it was not fitted to"
+
+
+def _one_class(v: Values) -> str:
+    return class_words(Inseparable.model_validate({k: v[k] for k in Inseparable.model_fields}), v["budget"])
 
 
 def _positions_of_links(_: Values) -> str:
@@ -113,10 +122,6 @@ def _rounded(value: float, unit: str) -> str:
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
-def _within(v: Values) -> str:
-    return "" if v["budget"] is None else f" and {v['budget']:.0f} s"
-
-
 WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
     "drive-timing": _drive_timing,
@@ -125,6 +130,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "not-looked-for": _not_looked_for,
     "not-separable": _not_separable,
     "nothing-held-out": _nothing_held_out,
+    "one-class": _one_class,
     "positions-of-links": _positions_of_links,
     "resting-left-out": _resting_left_out,
     "stated-numbers-moved": _stated_numbers_moved,

@@ -19,6 +19,7 @@ from model.discrepancy.diagnosis import (
     DifferencePlace,
     FoundValue,
     Gap,
+    Inseparable,
     NextExperiment,
     Phase,
     RemainingShape,
@@ -28,6 +29,7 @@ from model.discrepancy.diagnosis import (
     clear_shape,
     in_order,
 )
+from model.discrepancy.explanation.class_words import class_of_group, class_words
 from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.pattern_words import pattern_words
@@ -159,7 +161,7 @@ def summary(answer: Diagnosis) -> str:
         case "unknown-effect":
             return _unknown(answer)
         case "named" | "ambiguous":
-            parts = [_undecided(s.group, s.where) if s.group else reason_text(s) for s in adopted]
+            parts = [_undecided(s.group, s.where, answer.inseparable) if s.group else reason_text(s) for s in adopted]
             rest = ["Something is left that none of the known effects explains."] if answer.remaining else []
             return " ".join([*parts, *rest])
 
@@ -231,13 +233,16 @@ def _nothing(rejected: Step | None) -> str:
     )
 
 
-def _undecided(group: Sequence[Candidate], where: Where) -> str:
-    """Why several effects are named: they explain the same, within what their evidence can tell apart."""
+def _undecided(group: Sequence[Candidate], where: Where, classes: Sequence[Inseparable]) -> str:
+    """Why several effects are named: they explain the same, within what their evidence can tell apart, or on every
+    motion."""
     if len(group) < 2:
         raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
     named = ", ".join(f"{_called(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
     apart = max(c.evidence for c in group) - min(c.evidence for c in group)
-    return f"{where.summary} These explain it, with evidence that differs by no more than {apart:.0f}: {named}."
+    text = f"{where.summary} These explain it, with evidence that differs by no more than {apart:.0f}: {named}."
+    whole = class_of_group(group, classes)
+    return text if whole is None else f"{text} {sentence(class_words(whole))}"
 
 
 def _unknown(answer: Diagnosis) -> str:

@@ -89,7 +89,7 @@ def diagnose_by_simulation(
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
-    answer = _answer(case, search, proved, chooser)
+    answer = _answer(case, search, proved, chooser, cancel)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
 
@@ -221,7 +221,9 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
     return rank(case, better, progress, cancel), better
 
 
-def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: ExperimentChooser | None) -> Diagnosis:
+def _answer(
+    case: Case, found: _Search, proved: tuple[Step, ...], chooser: ExperimentChooser | None, cancel: Cancel
+) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
     joints = _unexplained_joints(case, found, looked)
@@ -233,14 +235,14 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
     remaining = case.remaining(end) if answered == "unknown-effect" else ()
-    asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces)
+    asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces, cancel)
     notes = (
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
         *on_unfinished((*case.traces, *case.held_traces)),
         *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
-        *(() if asked.note is None else (asked.note,)),
+        *asked.notes,
     )
     held = case.held_errors(*case.held_residuals(case.given, end))
     unknown = answered == "unknown-effect"
@@ -266,6 +268,7 @@ def _answer(case: Case, found: _Search, proved: tuple[Step, ...], chooser: Exper
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),
         notes_data=notes,
         next_experiment=asked.experiment,
+        inseparable=asked.inseparable,
     )
     return with_sentences(answer)
 

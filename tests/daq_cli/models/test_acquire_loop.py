@@ -183,7 +183,8 @@ def test_the_answer_is_printed_and_the_exit_code_is_that_of_the_last_run(
 ) -> None:
     run = Acquired(experiment="ramp", trace="abc", file="abc.mcap", outcome=outcome, duration=3.0, reason="")
 
-    def made(_robot: object, _machine: object, traces: list[Trace], *_: object) -> LoopEnd:
+    def made(_robot: object, _machine: object, traces: list[Trace], *_: object, design: bool) -> LoopEnd:
+        assert not design
         found = Answers(3.0)(traces, ExperimentChooser((), lambda _: pytest.fail("nothing is planned")))
         return LoopEnd(found.model_copy(update={"acquired": (run,)}), traces)
 

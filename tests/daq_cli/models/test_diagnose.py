@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from daq_cli.models.diagnosis_text import WIDTH, answer_text
+from daq_cli.robot.experiment import read_spec
 from model.discrepancy.diagnosis import Diagnosis, DifferencePlace, Suspicion
 from model.discrepancy.explanation.notes import on_stated_numbers
 from model.discrepancy.explanation.renderer import with_sentences
@@ -179,8 +180,13 @@ def test_json_is_the_answer_and_files_are_written(
         tmp_path / "new.json",
         "--report",
         tmp_path / "page.html",
+        "--next",
+        tmp_path / "asked.json",
     )
     assert said.code == 0, said.err
+    assert answer.next_experiment is not None
+    assert read_spec(tmp_path / "asked.json") == answer.next_experiment.spec
+    assert f"daq run spec {tmp_path / 'asked.json'}" in "".join(said.err.split("\n"))
     assert Diagnosis.model_validate(json.loads(said.out)) == answer
     assert asked["options"] == DiagnosisOptions(effects=("backlash", "coulomb_friction"), joints=(1,), most_steps=2)
     assert len(list(asked["holdout"])) == 1  # type: ignore[call-overload]
@@ -194,6 +200,8 @@ def test_json_is_the_answer_and_files_are_written(
         (("nowhere.csv",), "nowhere.csv"),
         (("FIRST", "--out", "model.toml"), "is written as .json"),
         (("FIRST", "--report", "page.pdf"), "is written as .html"),
+        (("FIRST", "--next", "asked.toml"), "an experiment is written as .json"),
+        (("FIRST", "--next", "nowhere/asked.json"), "there is no folder"),
         (("FIRST", "--effects", "gremlins"), "not in the library"),
         (("FIRST", "--effects", "viscous:2,coulomb"), "joints go with --joints here"),
         (("FIRST", "--load", "1"), "has no load"),

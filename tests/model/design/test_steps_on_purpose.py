@@ -10,7 +10,7 @@ from daq.contracts.experiment import ExperimentSpec, Ramp, Step
 from daq.contracts.machine import load_machine
 from daq.safety.planned import planned
 from daq.trajectories.presets import PRESETS
-from model.design.information import _check_followed, _falls_behind, imagined_trace
+from model.design.information import _falls_behind, check_followed, imagined_trace
 from model.machine_model.model import base_model
 
 MA2000 = load_machine("ma2000")
@@ -19,19 +19,19 @@ MODEL = base_model(MA2000)
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_can_be_judged(name: str) -> None:
-    _check_followed(MODEL, imagined_trace(MODEL, PRESETS[name].spec, lambda spec: planned(spec, MA2000)))
+    check_followed(MODEL, imagined_trace(MODEL, PRESETS[name].spec, lambda spec: planned(spec, MA2000)))
 
 
 def test_a_ramp_that_leaves_the_arm_behind_is_refused() -> None:
     quick = ExperimentSpec(trajectory=Ramp(amplitude=0.8, duration=0.7), joints=(2,))
     with pytest.raises(SpecError, match=r"joint 2 would fall \d+ counts behind; set points pause at 127"):
-        _check_followed(MODEL, imagined_trace(MODEL, quick, lambda spec: planned(spec, MA2000)))
+        check_followed(MODEL, imagined_trace(MODEL, quick, lambda spec: planned(spec, MA2000)))
 
 
 def test_a_step_of_any_allowed_size_can_be_judged() -> None:
     for size in (0.05, 0.09, 0.11, 0.13):
         spec = ExperimentSpec(trajectory=Step(amplitude=size), joints=(3,))
-        _check_followed(MODEL, imagined_trace(MODEL, spec, lambda one: planned(one, MA2000)))
+        check_followed(MODEL, imagined_trace(MODEL, spec, lambda one: planned(one, MA2000)))
 
 
 @pytest.mark.parametrize(

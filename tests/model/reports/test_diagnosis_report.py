@@ -7,7 +7,7 @@ import re
 import pytest
 
 from model.comparison.compare import Comparison
-from model.discrepancy.diagnosis import Acquired, Diagnosis
+from model.discrepancy.diagnosis import Acquired, Diagnosis, Inseparable, PlacedEffect
 from model.discrepancy.grounds import ControllerProof
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
 from model.reports.diagnosis_words import TORQUES, compared, gap
@@ -222,6 +222,24 @@ def test_an_experiment_that_separates_nothing_promises_no_separation(answer: tup
     assert "12.0 s" in text
     assert "would tell apart" not in text
     assert "predicted separation" not in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_where_no_motion_would_tell_the_page_says_what_would(answer: tuple[Diagnosis, Comparison]) -> None:
+    members = tuple(PlacedEffect(effect=e, joints=(2,)) for e in ("viscous_friction", "weakened_magnet"))
+    untold = Inseparable(
+        members=members,
+        separation=1.2,
+        needed=3.0,
+        experiment="sweep",
+        tried=110,
+        shares="torque-with-speed",
+        told_by=("current-clamp",),
+    )
+    report = diagnosis_report(answer[0].model_copy(update={"next_experiment": None, "inseparable": (untold,)}))
+    (text,) = next(s for s in report.sections if s.title == "What to run next").blocks
+    assert isinstance(text, Text)
+    assert text.text.endswith("What would tell them: a current clamp on the motor's lead.")
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from model.discrepancy.diagnosis import Diagnosis, Suspicion
+from model.discrepancy.diagnosis import Diagnosis, Inseparable, PlacedEffect, Suspicion
 from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.renderer import summary
 from tests.model.discrepancy.answers import an_answer
 
 
@@ -26,6 +27,25 @@ def test_of_a_group_it_names_the_first_and_counts_the_others(answer: Diagnosis) 
     assert headline(undecided) == several
     both = undecided.model_copy(update={"steps": (grouped, step)})
     assert headline(both) == f"{several}; Coulomb friction on joint 2, 8 N·m (7.8 to 8.2)"
+
+
+def test_a_group_that_no_motion_tells_apart_is_named_as_its_class(answer: Diagnosis) -> None:
+    (step,) = answer.steps
+    grouped = step.model_copy(update={"effect": None, "group": step.candidates[:2]})
+    undecided = answer.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})
+    members = tuple(PlacedEffect(effect=c.effect, joints=c.joints) for c in step.candidates[:3])
+    untold = Inseparable(
+        members=members, separation=2.0, needed=3.0, experiment="sweep", tried=110, shares="torque-against-motion"
+    )
+    named = undecided.model_copy(update={"inseparable": (untold,)})
+    assert headline(named) == (
+        "a torque against the motion on joint 2: Coulomb friction or stiction or Stribeck friction"
+    )
+    assert "a torque against the motion, which no motion that was tried tells apart" in summary(named)
+    for other in (untold.model_copy(update={"shares": None}), untold.model_copy(update={"members": members[1:]})):
+        left = undecided.model_copy(update={"inseparable": (other,)})
+        assert headline(left) == "one of: Coulomb friction on joint 2 or stiction on joint 2"
+        assert "no motion" not in summary(left)
 
 
 def test_it_says_when_no_known_effect_is_left(answer: Diagnosis) -> None:

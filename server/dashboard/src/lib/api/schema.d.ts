@@ -1744,6 +1744,11 @@ export interface components {
              * @default 3
              */
             most_steps?: number;
+            /**
+             * Design
+             * @default false
+             */
+            design?: boolean;
             /** Name */
             name?: string | null;
         };
@@ -1793,6 +1798,11 @@ export interface components {
              */
             remaining?: components["schemas"]["RemainingShape"][];
             next_experiment?: components["schemas"]["NextExperiment"] | null;
+            /**
+             * Inseparable
+             * @default []
+             */
+            inseparable?: components["schemas"]["Inseparable"][];
             /**
              * Acquired
              * @default []
@@ -2767,6 +2777,33 @@ export interface components {
             torque_scale_free: boolean;
         };
         /**
+         * Inseparable
+         * @description Candidates that no admissible motion tells apart: one class of effects.
+         *
+         *     `separation`: the most that any of the `tried` motions set two of them apart, in deviations, and on which
+         *     `experiment`; a motion that tells them apart would have `needed`. `shares`: the law that they have in common, None
+         *     where none is known that all of them have. `told_by`: measurements that would tell them; empty without such a law.
+         */
+        Inseparable: {
+            /** Members */
+            members: components["schemas"]["PlacedEffect"][];
+            /** Separation */
+            separation: number;
+            /** Needed */
+            needed: number;
+            /** Experiment */
+            experiment: string;
+            /** Tried */
+            tried: number;
+            /** Shares */
+            shares?: ("torque-with-speed" | "torque-against-motion" | "torque-with-position" | "torque-of-weight" | "torque-per-volt" | "late-drive" | "play-and-give" | "reading-over-range" | "torque-at-one-rate") | null;
+            /**
+             * Told By
+             * @default []
+             */
+            told_by?: ("current-clamp" | "coast-with-drive-open" | "force-gauge" | "weighed-parts" | "spirit-level" | "loosened-cables" | "protractor" | "dial-gauge" | "oscilloscope" | "stopped-arm")[];
+        };
+        /**
          * Job
          * @description One computation with its state and result. `progress` is a fraction from 0 to 1.
          */
@@ -3544,7 +3581,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-timing" | "errors-follow-record" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "positions-of-links" | "resting-left-out" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
+            kind: "cutoff" | "drive-timing" | "errors-follow-record" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
             /**
              * Values
              * @default {}
@@ -3852,6 +3889,16 @@ export interface components {
              * @default 1
              */
             place?: number;
+        };
+        /**
+         * PlacedEffect
+         * @description An effect on joints; none: of the whole machine.
+         */
+        PlacedEffect: {
+            /** Effect */
+            effect: string;
+            /** Joints */
+            joints: number[];
         };
         /**
          * PlainExperiment

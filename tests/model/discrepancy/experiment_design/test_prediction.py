@@ -1,0 +1,45 @@
+"""What a prediction imagines: an arm that begins at rest, as the real one does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from model.discrepancy.experiment_design.prediction import Prediction, imagine
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import point_at
+from tests.model.discrepancy.experiment_design.test_next_experiment import EXPERIMENTS, plan, record
+from tests.model.fitting import imagined
+
+COUNT = 0.0015
+"""rad of a reading, nearly."""
+
+
+@pytest.mark.parametrize(
+    ("effect", "joint", "size"),
+    [("potentiometer_offset", 3, {"offset": 0.12}), ("potentiometer_gain", 2, {"relative": -0.1})],
+)
+def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_point(
+    effect: str, joint: int, size: dict[str, float]
+) -> None:
+    model = imagined.arm().with_effect(effect, (joint,), size)
+    spec = EXPERIMENTS["ramp"].spec
+    observation, given = observe(model, [record(model, spec, 3)])
+    point = point_at(observation, given, np.zeros((len(given.unknowns), observation.samples)))
+    there = imagine(model, spec, plan)
+    assert there is not None
+    predicted = Prediction(there, point).recorded()
+    (own,) = predicted.there.observation.records
+    resting = slice(0, 20)
+    away = np.abs(own.measured[resting] - own.inputs.set_points[resting])
+    assert away.max() < 6 * COUNT
+    begins = dict(zip((u.name for u in predicted.begun.unknowns), predicted.begun.values, strict=True))
+    assert abs(begins[f"initial.trace1.joint{joint}.position"]) > 0.02
+
+
+def test_starts_have_the_same_freedom_when_a_model_with_bent_potentiometers_is_observed_again() -> None:
+    trace = record(imagined.arm(), EXPERIMENTS["ramp"].spec, 3)
+    _, first = observe(imagined.arm(), [trace])
+    _, again = observe(first.model, [trace])
+    starts = [[(u.low, u.deviation) for u in given.unknowns if u.trace is not None] for given in (first, again)]
+    assert starts[0] == starts[1]

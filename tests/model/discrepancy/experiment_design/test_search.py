@@ -1,0 +1,101 @@
+"""The search for a motion of its own: admissible, repeatable, no worse than what is offered, and kept by the mock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.progress import CancelledError, Never
+from daq.safety.planned import planned
+from model.design.information import check_followed, imagined_trace
+from model.discrepancy.candidates.candidate_fit import CandidateFit, judge
+from model.discrepancy.candidates.library import Hypothesis
+from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.experiment_design.next_experiment import ExperimentChooser, best_experiment, judge_experiments
+from model.discrepancy.experiment_design.search import MotionSearch, designed_motions
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import point_at
+from tests.model.discrepancy.experiment_design.test_next_experiment import EXPERIMENTS, plan, record
+from tests.model.discrepancy.recording import recorded
+from tests.model.fitting import imagined
+
+SMALL = MotionSearch(drawn=6, changed=4)
+PAIR = (0, 1)
+
+
+def simple_rival(effect: str, joint: int, values: dict[str, float]) -> CandidateFit:
+    """A model with an effect of a given size, as if it had been fitted to a short motion."""
+    model = imagined.arm().with_effect(effect, (joint,), values)
+    trace = record(model, EXPERIMENTS["ramp"].spec, 3)
+    point = point_at(*observe(model, [trace]))
+    free = tuple(p for p in model.parameters if p.effect == effect)
+    hypothesis = Hypothesis(effect, (joint,), model, free, (), True, {})
+    probe = Probe(hypothesis, 50.0, {}, np.zeros(len(point.unknowns)), np.zeros_like(point.weighted))
+    return CandidateFit(probe, judge(point), 50.0)
+
+
+@pytest.fixture(scope="module")
+def rivals() -> tuple[CandidateFit, CandidateFit]:
+    return (
+        simple_rival("coulomb_friction", 2, {"torque": 6.0}),
+        simple_rival("dead_zone", 2, {"width": 0.8}),
+    )
+
+
+@pytest.fixture(scope="module")
+def chooser() -> ExperimentChooser:
+    return ExperimentChooser((EXPERIMENTS["diagnostic-d"],), plan, search=SMALL)
+
+
+@pytest.mark.slow
+def test_what_is_asked_for_promises_no_less_than_what_is_offered(
+    rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser
+) -> None:
+    judged, tried = judge_experiments(rivals, chooser, [PAIR], Never())
+    assert len(judged) == 2
+    assert 2 < tried <= 11
+    offered, designed = judged
+    asked = best_experiment(rivals, chooser).experiment
+    assert asked is not None
+    best = max((offered, designed), key=lambda j: j.worth([PAIR]))
+    assert asked.name == best.experiment.name
+    assert asked.spec == best.experiment.spec
+    again, _ = judge_experiments(rivals, chooser, [PAIR], Never())
+    assert [j.experiment for j in again] == [j.experiment for j in judged]
+
+
+def test_a_designed_motion_keeps_limits_and_budget_and_an_arm_follows_it(
+    rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser, tmp_path: Path
+) -> None:
+    (found,), count = designed_motions(rivals, [PAIR], chooser.imagine, SMALL, 8.0, Never())
+    assert 0 < count <= 10
+    assert found.there.duration <= 9.0
+    spec = found.experiment.spec
+    assert isinstance(spec, ExperimentSpec)
+    planned(spec, imagined.machine())
+    for rival in rivals:
+        check_followed(rival.fit.point.fitted_model, imagined_trace(rival.fit.point.fitted_model, spec, plan))
+    (trace,) = recorded([spec], imagined.machine(), 4, tmp_path)
+    assert trace.record.outcome == "complete"
+    assert trace.time[-1] == pytest.approx(found.there.duration, abs=0.05)
+
+
+def test_nothing_is_designed_where_the_planner_refuses_all_and_a_cancelled_search_ends(
+    rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser
+) -> None:
+    def refused(spec: ExperimentSpec) -> np.ndarray:
+        raise SpecError(f"{spec.name}: not today")
+
+    assert judge_experiments(rivals, replace(chooser, plan=refused), [PAIR], Never()) == ([], 0)
+
+    class Asked:
+        def is_set(self) -> bool:
+            return True
+
+    with pytest.raises(CancelledError):
+        judge_experiments(rivals, chooser, [PAIR], Asked())
