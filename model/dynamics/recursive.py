@@ -279,6 +279,15 @@ def gravity_torques(chain: ChainArrays, q: Array) -> Array:
 
 
 @compiled
+def gravity_along(chain: ChainArrays, positions: Array) -> Array:
+    """G(q) at every row of positions, (k, n)."""
+    found = np.empty_like(positions)
+    for k in range(positions.shape[0]):
+        found[k] = gravity_torques(chain, positions[k])
+    return found
+
+
+@compiled
 def velocity_torques(chain: ChainArrays, q: Array, velocity: Array) -> Array:
     """H(q, q̇), Coriolis and centrifugal: accelerations and gravity zero, (n,)."""
     return newton_euler(chain, q, velocity, np.zeros_like(q), np.zeros_like(chain.gravity))

@@ -24,5 +24,4 @@ def chain_of(model: Model, vector: NDArray[Any] | None = None) -> ChainArrays:
 
 def gravity_loads(model: Model, position: Floats) -> Floats:
     """Gravity torques (k, n), N·m or N, at joint positions (k, n)."""
-    chain = chain_of(model)
-    return np.array([recursive.gravity_torques(chain, q) for q in position])
+    return np.asarray(recursive.gravity_along(chain_of(model), np.ascontiguousarray(position)))

@@ -28,21 +28,43 @@ SHORTEST = 12
 
 
 @dataclass(frozen=True)
-class SmoothedTrace:
-    """A trace as the time-domain form uses it.
+class SmoothedMotion:
+    """The smoothed motion of a trace.
 
-    motion: smoothed. acceleration: (k, n) rad/s², with the same smoothing. usable: (k, n) where a joint moves and
-    no sample is missing. noise: (n,) standard deviation of measured − expected acceleration that comes from noise and
-    rounding of the readings: through second differences, and through the speeds, on which the expected one depends.
+    acceleration: (k, n) rad/s², with the motion's smoothing. usable: (k, n) where a joint moves and no sample is
+    missing.
     """
 
     motion: MeasuredMotion
     acceleration: Floats
-    noise: Floats
     usable: Mask
 
 
+@dataclass(frozen=True)
+class SmoothedTrace(SmoothedMotion):
+    """A trace as the time-domain form uses it.
+
+    noise: (n,) standard deviation of measured − expected acceleration that comes from noise and rounding of the
+    readings: through second differences, and through the speeds, on which the expected one depends.
+    """
+
+    noise: Floats
+
+
 def smooth(model: Model, trace: Trace, smoothing: float | None = None) -> SmoothedTrace:
+    """A trace with its smoothed motion, and what noise of the readings does to the accelerations.
+
+    Raises as `smooth_motion` does.
+    """
+    found = smooth_motion(model, trace, smoothing)
+    motion, deviation = found.motion, position_noise(model)
+    gain = d.noise_gain(motion.width, motion.period)
+    through_speed = speed_answers(model, motion) @ np.diag(deviation * gain.speed)
+    noise = np.hypot(deviation * gain.acceleration, np.linalg.norm(through_speed, axis=1))
+    return SmoothedTrace(motion, found.acceleration, found.usable, noise)
+
+
+def smooth_motion(model: Model, trace: Trace, smoothing: float | None = None) -> SmoothedMotion:
     """The smoothed motion of a trace; `smoothing`: standard deviation of the kernel in s, by default chosen from noise.
 
     Raises:
@@ -68,13 +90,11 @@ def smooth(model: Model, trace: Trace, smoothing: float | None = None) -> Smooth
     friction = d.smoothed(_friction_deflection(model, measured), width)
     motion = MeasuredMotion(inputs.time, position, speed, friction, inputs.drive, inputs.period, width)
     gain = d.noise_gain(width, inputs.period)
-    through_speed = speed_answers(model, motion) @ np.diag(deviation * gain.speed)
-    noise = np.hypot(deviation * gain.acceleration, np.linalg.norm(through_speed, axis=1))
     reach = int(np.ceil(2 * width)) + 2
     complete = ~_spread(~present, reach)
     complete[:reach] = complete[len(complete) - reach :] = False
     moving = np.abs(speed) > MOVING * deviation * gain.speed
-    return SmoothedTrace(motion, d.accelerations(position, inputs.period), noise, moving & complete[:, None])
+    return SmoothedMotion(motion, d.accelerations(position, inputs.period), moving & complete[:, None])
 
 
 def position_noise(model: Model) -> Floats:

@@ -22,7 +22,7 @@ from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
-from model.validation.measured_motion import SmoothedTrace, smooth
+from model.validation.measured_motion import SmoothedTrace, smooth_motion
 
 FEWEST, MOST = 12, 40
 """Least and largest number of replicas of a record."""
@@ -43,7 +43,7 @@ def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Fl
     sizes = np.zeros((replicas, model.joint_count))
     try:
         for replica in sizes:
-            own = smooth(model, _made_by(model, trace, rng), smoothing)
+            own = smooth_motion(model, _made_by(model, trace, rng), smoothing)
             left = np.where(own.usable, own.acceleration - expected_accelerations(model, own.motion, ())[0], 0.0)
             replica[:] = np.sqrt((left**2).sum(axis=0) / np.maximum(own.usable.sum(axis=0), 1))
     except DaqError:
