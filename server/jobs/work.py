@@ -14,13 +14,13 @@ from daq.contracts.service.jobs import (
     MACHINE,
     CompareRequest,
     DiagnoseRequest,
-    EffectChoice,
     FitRequest,
     JobRequest,
     ValidateRequest,
 )
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
+from server.batches.study import fit_options, with_effects
 from server.jobs.headlines import of_comparison, of_fit, of_validation
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
 
@@ -100,25 +100,16 @@ class _Worker:
         """Does the same as `daq fit`."""
         from model.fitting.fit import fit
         from model.fitting.identifiability import undetermined_in_words
-        from model.fitting.options import FitOptions
         from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
         from server.jobs.overlays import overlays
         from server.jobs.results import FitData, FitJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
-        begin = _with_effects(self._model(request.model), request.effects)
-        options = FitOptions(
-            parameters=request.parameters,
-            held=request.held,
-            bounds=request.bounds,
-            use_priors=request.use_priors,
-            method=request.method,
-            starts=request.starts,
-            seed=request.seed,
-            loop=request.loop,
+        begin = with_effects(self._model(request.model), request.effects)
+        found = fit(
+            begin, traces, fit_options(request), lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox
         )
-        found = fit(begin, traces, options, lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox)
         comparison = self._compared(
             [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
         )
@@ -288,19 +279,3 @@ class _Worker:
     @property
     def _job(self) -> str:
         return self.mailbox.folder.name
-
-
-def _with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
-    from daq.contracts.errors import SpecError
-    from model.effects.library import effect, library
-
-    for choice in effects:
-        if choice.name not in library():
-            raise SpecError(f"effects: {choice.name!r}: not in the library; it has {', '.join(library())}")
-        found = effect(choice.name)
-        if found.whole_machine:
-            model = model.with_effect(choice.name)
-        else:
-            every = tuple(j for j in model.machine.modelled_joints if not found.joints or j in found.joints)
-            model = model.with_effect(choice.name, choice.joints or every)
-    return model

@@ -34,15 +34,11 @@ class EffectChoice(Wire):
     joints: tuple[JointNumber, ...] = ()
 
 
-class FitRequest(Wire):
-    """Estimates the parameters with which a model best reproduces traces. The fields are the options of `daq fit`."""
+class FitStudy(Wire):
+    """How parameters are estimated with which a model best reproduces traces. The fields are the options of
+    `daq fit`."""
 
     kind: Literal["fit"] = "fit"
-    traces: TraceNumbers
-    held_out: tuple[TraceNumber, ...] = ()
-    """Traces that are held out: the model is checked on them and not fitted to them."""
-    model: ModelNumber = MACHINE
-    """The model to start from."""
     effects: tuple[EffectChoice, ...] = ()
     """Effects to add to the model before fitting."""
     parameters: tuple[Pattern, ...] | None = None
@@ -54,20 +50,57 @@ class FitRequest(Wire):
     starts: Annotated[int, Field(ge=1, le=20)] = 1
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     loop: Literal["closed", "open"] | None = None
+
+
+class ValidateStudy(Wire):
+    """How a model is validated against traces. The fields are the options of `daq validate`."""
+
+    kind: Literal["validate"] = "validate"
+    parameters: tuple[Pattern, ...] | None = None
+    joints: tuple[JointNumber, ...] | None = None
+    damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
+
+
+class SimulateStudy(Wire):
+    """How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`."""
+
+    kind: Literal["simulate"] = "simulate"
+    loop: Literal["closed", "open"] = "closed"
+    quantise: StrictBool = True
+    """Whether readings and drive are rounded, as those of a real board."""
+
+
+class DiagnoseStudy(Wire):
+    """How a missing effect is looked for. The fields are the options of `daq diagnose`."""
+
+    kind: Literal["diagnose"] = "diagnose"
+    effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
+    """Candidate effects; None for all known ones."""
+    joints: tuple[JointNumber, ...] | None = None
+    most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+
+
+Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]
+"""What a batch does with each of its traces."""
+
+
+class FitRequest(FitStudy):
+    """Estimates the parameters with which a model best reproduces traces."""
+
+    traces: TraceNumbers
+    held_out: tuple[TraceNumber, ...] = ()
+    """Traces that are held out: the model is checked on them and not fitted to them."""
+    model: ModelNumber = MACHINE
+    """The model to start from."""
     name: ModelName | None = None
     """Name of the resulting model."""
 
 
-class ValidateRequest(Wire):
-    """Validates a model against traces: which parameters would have to change, and when. The fields are the options of
-    `daq validate`."""
+class ValidateRequest(ValidateStudy):
+    """Validates a model against traces: which parameters would have to change, and when."""
 
-    kind: Literal["validate"] = "validate"
     traces: TraceNumbers
     model: ModelNumber
-    parameters: tuple[Pattern, ...] | None = None
-    joints: tuple[JointNumber, ...] | None = None
-    damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
 
 
 class CompareRequest(Wire):
@@ -78,18 +111,13 @@ class CompareRequest(Wire):
     models: Annotated[tuple[ModelNumber, ...], Field(min_length=1, max_length=10)]
 
 
-class DiagnoseRequest(Wire):
+class DiagnoseRequest(DiagnoseStudy):
     """Finds where a model and traces disagree, which effect is missing, and what adding it improves, as `daq diagnose`
     does."""
 
-    kind: Literal["diagnose"] = "diagnose"
     traces: TraceNumbers
     held_out: tuple[TraceNumber, ...] = ()
     model: ModelNumber = MACHINE
-    effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
-    """Candidate effects; None for all known ones."""
-    joints: tuple[JointNumber, ...] | None = None
-    most_steps: Annotated[int, Field(ge=1, le=10)] = 3
     name: ModelName | None = None
 
 
