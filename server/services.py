@@ -203,6 +203,7 @@ class Services:
                 clock=self.clock,
                 changed=lambda job: self._job_changed(hub, job),
                 at_once=settings.server.jobs_at_once,
+                executor=settings.server.executor,
             )
         )
         stop = StopService(robot)

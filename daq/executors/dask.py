@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
+from uuid import uuid4
 
 import dask.config
 from distributed import Client, LocalCluster
@@ -54,7 +55,8 @@ class DaskWorkers(Workers):
     def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
         """As any executor does."""
         future: Future[Any] = Future()
-        given = self._executor.submit(Checked(function, program_here()), *args, **named)
+        # Without a key Dask would write the whole job out as text, to name it.
+        given = self._executor.submit(Checked(function, program_here()), *args, key=f"job-{uuid4().hex}", **named)
         given.add_done_callback(partial(_pass_on, future))
         return future
 

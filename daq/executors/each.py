@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from daq.contracts.errors import ReachError
+from daq.contracts.progress import Cancel, Never, stop_if
 from daq.executors.program import OtherVersionError
 from daq.executors.workers import BlamedError, Workers
 
@@ -16,22 +17,40 @@ MOST_ALONE = 2
 """How often a job is computed alone after a worker died: one that ends so twice is to blame itself."""
 AHEAD = 2
 """Jobs that wait at the executor for each that it computes, so that no worker waits for the next."""
+LOOK_EVERY = 0.5
+"""Time (s) between two looks whether to end, while nothing comes."""
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 
+def growing(tasks: deque[Task]) -> Iterator[Task]:
+    """The tasks of a queue, which whoever takes the answers may add to."""
+    return _Growing(tasks)
+
+
+class _Growing(Iterator[Task]):
+    def __init__(self, tasks: deque[Task]) -> None:
+        self._tasks = tasks
+
+    def __next__(self) -> Task:
+        if not self._tasks:
+            raise StopIteration
+        return self._tasks.popleft()
+
+
 def done_in_any_order(
-    workers: Workers, function: Callable[[Task], Answer], tasks: Iterable[Task]
+    workers: Workers, function: Callable[[Task], Answer], tasks: Iterable[Task], cancel: Cancel | None = None
 ) -> Iterator[tuple[Task, Future[Answer]]]:
     """Calls the function with every task, and yields each task once, with its future, when it is done.
 
     Where a worker dies, it is not known whose fault that is: all tasks that were given and are lost are computed again,
     one at a time. A task that ends the worker each time then yields a `BrokenExecutor` exception.
 
-    Raises OtherVersionError for a worker of another version; ReachError where a scheduler is lost.
+    Raises CancelledError when asked to end; OtherVersionError for a worker of another version; ReachError where a
+    scheduler is lost.
     """
-    return _Rounds(workers, function, tasks).run()
+    return _Rounds(workers, function, tasks).run(cancel or Never())
 
 
 class _Rounds:
@@ -44,9 +63,13 @@ class _Rounds:
         """Tasks whose worker died, and how often each was computed alone."""
         self._given = 0
 
-    def run(self) -> Iterator[tuple[Any, Future[Any]]]:
+    def run(self, cancel: Cancel) -> Iterator[tuple[Any, Future[Any]]]:
         while self._give_next():
-            task, alone, future = self._done.get()
+            try:
+                task, alone, future = self._done.get(timeout=LOOK_EVERY)
+            except Empty:
+                stop_if(cancel)
+                continue
             self._given -= 1
             error = future.exception()
             if isinstance(error, OtherVersionError | ReachError):
@@ -56,6 +79,7 @@ class _Rounds:
                 self._lost.append((task, alone))
             else:
                 yield task, future
+                stop_if(cancel)
 
     def _give_next(self) -> bool:
         """Gives what may be computed now. Returns whether anything is."""

@@ -11,8 +11,8 @@ from daq.contracts import exit_codes
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption
 from daq_cli.commands.fit import EffectsOption, ParametersOption
-from daq_cli.models.batch import Asked, run_here
-from daq_cli.models.model_input import MODEL_HELP, EffectFileOption
+from daq_cli.models.batch import LOCAL, Asked, run_at_service, run_here
+from daq_cli.models.model_input import MODEL_HELP, EffectFileOption, ExecutorOption
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -33,14 +33,9 @@ TracesOf = Annotated[
     ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder of the result; a batch in it goes on.")]
-ExecutorOption = Annotated[
-    str,
-    typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),
-]
 ModelOption = Annotated[
     str | None, typer.Option(help=f"The model of all traces (default: the machine of each). {MODEL_HELP}")
 ]
-HERE = "local://"
 
 
 @app.command()
@@ -48,7 +43,7 @@ def fit(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = HERE,
+    executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effects: EffectsOption = None,
     effect_file: EffectFileOption = None,
@@ -95,7 +90,7 @@ def validate(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = HERE,
+    executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
     parameters: Annotated[
@@ -123,7 +118,7 @@ def simulate(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = HERE,
+    executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
     open_loop: Annotated[
@@ -146,7 +141,7 @@ def diagnose(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = HERE,
+    executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
     effects: Annotated[
@@ -176,5 +171,6 @@ def diagnose(
 
 def _run(context: typer.Context, asked: Asked, study: Study) -> None:
     robot = robot_of(context)
-    if not run_here(robot, asked, study):
+    run = run_here if robot.call.server is None else run_at_service
+    if not run(robot, asked, study):
         raise typer.Exit(exit_codes.FAULT)

@@ -14,11 +14,14 @@ from daq_cli.models.model_input import load_effects, read_model
 from daq_cli.robot.access import RobotAccess
 
 if TYPE_CHECKING:
-    from daq.contracts.service.jobs import Study
+    from daq.contracts.service.jobs import Study, TraceFilter
     from daq.traces.query import TraceQuery
     from server.batches.run import Chosen, Standing, Told
     from server.batches.study import Common
 
+LOCAL = "local://"
+JOB = "job"
+"""File of the folder that holds the number of the service's job."""
 TELL_EVERY = 10.0
 """Time (s) between two lines of progress where standard error is no terminal."""
 
@@ -54,6 +57,57 @@ def run_here(robot: RobotAccess, asked: Asked, study: Study) -> bool:
             ended = run_batch(folder, common, chosen, workers, tell)
     _print_end(asked, ended.before + ended.done, ended.failed, ended.seconds)
     return not ended.failed
+
+
+def run_at_service(robot: RobotAccess, asked: Asked, study: Study) -> bool:
+    """Has the service run a batch, and fetches its table into the folder. A batch that the folder knows is continued.
+
+    Returns whether every trace is done. Raises SpecError for what a service cannot do, JobEndedError, and what it
+    refuses.
+    """
+    from daq.client.errors import ServiceError
+    from daq.contracts.errors import SpecError
+    from daq.contracts.service.jobs import BatchRequest
+    from daq_cli.models.service_jobs import ServiceJobs
+    from server.batches.folder import CSV, PARQUET
+
+    if asked.executor != LOCAL:
+        raise SpecError("--executor and --server: a service has an executor of its own; leave one of them out")
+    load_effects(asked.effect_files, robot)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    before = asked.out / JOB
+    request = BatchRequest(
+        study=study,
+        filter=_filter(asked.traces),
+        continues=before.read_text("ascii").strip() if before.is_file() else None,
+    )
+    model = None if asked.model is None else read_model(asked.model)
+    found = ServiceJobs(robot).batch(request, model, lambda job: before.write_text(f"{job}\n", "ascii"))
+    with robot.service("jobs") as service:
+        service.jobs.download_table(found.id, asked.out / CSV)
+        try:
+            service.jobs.download_table(found.id, asked.out / PARQUET)
+        except ServiceError as error:
+            console().print(f"no Parquet: {error}")
+    for one in found.data.traces:
+        if one.problem:
+            console().print(printable(f"{one.trace}: {one.problem}"))
+    _print_end(asked, found.data.done, found.data.failed, sum(one.seconds for one in found.data.traces))
+    return not found.data.failed
+
+
+def _filter(text: str) -> TraceFilter:
+    """The traces of a service that a query means. Raises SpecError."""
+    from daq.contracts.errors import SpecError
+    from daq.contracts.service.jobs import TraceFilter
+
+    folder, query = place_and_query(text)
+    if folder is not None:
+        raise SpecError(f"{text}: is a folder of this computer; a service studies its own traces: write a query")
+    if query.robot is not None:
+        raise SpecError("query: robot: a service has the traces of its own robot; leave it out")
+    known = query.model_dump(exclude={"words", "robot"}, exclude_none=True)
+    return TraceFilter.model_validate({"text": " ".join(query.words) or None, **known})
 
 
 def _common(robot: RobotAccess, asked: Asked, study: Study) -> Common:

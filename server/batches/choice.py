@@ -27,7 +27,7 @@ def chosen_traces(summaries: Iterable[TraceSummary], query: TraceQuery) -> tuple
         if summary.state == "recording":
             remarks.append(f"{summary.path.name}: is being recorded now, and left out")
             continue
-        one = _chosen(summary)
+        one = chosen_of(summary)
         if one.job.key in found:
             remarks.append(f"{summary.path.name}: is the same trace as {found[one.job.key].job.file.name}, left out")
         else:
@@ -41,7 +41,8 @@ def require_any(chosen: list[Chosen], place: str) -> None:
         raise SpecError(f"{place}: has no trace that matches; `daq traces ls` lists those there are")
 
 
-def _chosen(summary: TraceSummary) -> Chosen:
+def chosen_of(summary: TraceSummary) -> Chosen:
+    """Returns a trace as a batch studies it; an unfinished or unreadable one with its problem."""
     problem = summary.problem or ""
     if summary.state == "unfinished":
         problem = "a crash left it without an end; `daq traces salvage` finishes it"

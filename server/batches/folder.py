@@ -5,7 +5,8 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
@@ -161,7 +162,7 @@ def _require_same(file: Path, asked: Asked) -> None:
         raise SpecError(f"{file}: not a batch's: {first_invalid(error).message}") from error
     for name in Asked.model_fields:
         if getattr(before, name) != getattr(asked, name):
-            raise SpecError(f"{file.parent}: holds a batch with another {_WORDS[name]}; take another folder with --out")
+            raise SpecError(f"{file.parent}: holds a batch with another {_WORDS[name]}; take another folder")
 
 
 _WORDS = {
@@ -189,6 +190,22 @@ def _read_rows(file: Path) -> dict[str, Row]:
             raise SpecError(f"{file}: a line is no row of a batch: {first_invalid(error).message}") from error
         found[row.key] = row
     return found
+
+
+def take_over(former: Path, path: Path, keys: Collection[str]) -> None:
+    """Copies what another batch has about these traces into a new folder. Raises SpecError."""
+    if not (former / ASKED).is_file():
+        raise SpecError("continues: is no batch that has begun")
+    try:
+        (path / ANSWERS).mkdir(parents=True)
+        shutil.copyfile(former / ASKED, path / ASKED)
+        rows = [row for row in _read_rows(former / ROWS).values() if row.key in keys]
+        (path / ROWS).write_text("".join(row.model_dump_json() + "\n" for row in rows), "utf-8")
+        for row in rows:
+            if (answer := former / ANSWERS / f"{row.key}.json").is_file():
+                shutil.copyfile(answer, path / ANSWERS / answer.name)
+    except OSError as error:
+        raise _unwritable(path, error) from error
 
 
 def _digest(text: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass, field
 
-from daq.contracts.progress import Cancel, Never, stop_if
+from daq.contracts.progress import Cancel
 from daq.executors import Workers, done_in_any_order
 from server.batches.columns import Columns
 from server.batches.folder import BatchFolder, Row
@@ -95,7 +95,6 @@ def run_batch(
     The tables are written at the end, also when the batch is interrupted. Raises CancelledError; SpecError when the
     folder cannot be written; what `done_in_any_order` raises.
     """
-    cancel = cancel or Never()
     left = [one for one in chosen if not folder.is_done(one.job.key)]
     about = {one.job.key: one.about for one in left}
     count = _Count(len(chosen), len(chosen) - len(left))
@@ -112,9 +111,8 @@ def run_batch(
             if one.problem:
                 keep(Answer(key=one.job.key, problem=one.problem))
         jobs = [one.job for one in left if not one.problem]
-        for job, future in done_in_any_order(workers, Studying(common), jobs):
+        for job, future in done_in_any_order(workers, Studying(common), jobs, cancel):
             keep(_answer(job, future))
-            stop_if(cancel)
     finally:
         folder.write_tables()
     return count.standing()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool
+from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool, model_validator
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.service.base import Wire
+from daq.contracts.service.base import Moment, Wire
+from daq.contracts.service.traces import Source, Tag
+from daq.contracts.trace import Outcome
 
-JobKind = Literal["fit", "validate", "compare", "diagnose"]
+JobKind = Literal["fit", "validate", "compare", "diagnose", "batch"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
 """The same states as those of experiments; an interrupted job is not run again by itself either."""
 
@@ -121,7 +123,43 @@ class DiagnoseRequest(DiagnoseStudy):
     name: ModelName | None = None
 
 
-JobRequest = Annotated[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")]
+class TraceFilter(Wire):
+    """Traces of the catalogue by what is known of them, as the parameters of its list; None does not filter. `text` is
+    searched in number, file, name, kind, operator, notes and tags."""
+
+    text: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    tag: Tag | None = None
+    source: Source | None = None
+    outcome: Outcome | None = None
+    kind: Annotated[str, Field(min_length=1, max_length=32)] | None = None
+    since: Moment | None = None
+    until: Moment | None = None
+
+
+class BatchRequest(Wire):
+    """Studies many traces, each by itself: a table with a row for each is the result. A trace that cannot be studied
+    has its problem in its row, and keeps no other from being studied."""
+
+    kind: Literal["batch"] = "batch"
+    study: Study
+    traces: Annotated[tuple[TraceNumber, ...], Field(max_length=2000)] = ()
+    """The traces; a job whose request had a filter instead has those that were found when it was submitted."""
+    filter: TraceFilter | None = None
+    """Finds the traces in the catalogue, 2000 at most."""
+    model: ModelNumber = MACHINE
+    continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] | None = None
+    """An ended batch of the same study and model: what it has done is not done again."""
+
+    @model_validator(mode="after")
+    def _has_traces(self) -> Self:
+        if not self.traces and self.filter is None:
+            raise ValueError("name traces, or a filter that finds them")
+        return self
+
+
+JobRequest = Annotated[
+    FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest | BatchRequest, Field(discriminator="kind")
+]
 
 
 class KnownEffect(Wire):
@@ -176,7 +214,7 @@ class Job(Wire):
     has_report: bool = False
     waits_behind: WaitsBehind | None = None
     """What it waits for while it is queued behind others. Short jobs (comparisons and validations of few traces) have a
-    worker of their own, and never wait for a fit or a diagnosis."""
+    worker of their own, and never wait for a fit or a diagnosis. Batches wait for batches alone."""
 
 
 class ModelEntry(Wire):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +15,7 @@ from sqlalchemy.exc import OperationalError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.contracts.trace_limits import TraceLimits
+from daq.executors import Workers
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
@@ -40,7 +41,7 @@ TRACE = f"{1:012x}"
 COMPARE = CompareRequest(traces=(TRACE,), models=("machine",))
 
 
-class HandExecutor(Executor):
+class HandExecutor(Workers):
     """Does what it is given as `carry_out` of a test does, at once; `given` are the jobs that it was given."""
 
     def __init__(self, carry_out: Callable[[Path], Ended]) -> None:
@@ -54,6 +55,10 @@ class HandExecutor(Executor):
         future: Future[Any] = Future()
         future.set_result(self._carry_out(folder))
         return future
+
+    def count(self) -> int:
+        """As an executor's."""
+        return 1
 
 
 class Bench:
@@ -75,7 +80,7 @@ class Bench:
         self.models: Any = Meanwhile(models)
         self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")
         self.executor = HandExecutor(self._carry_out)
-        self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
+        self.make_executor: Callable[[str, int], Workers] = lambda _url, _count: self.executor
         self.changed = threading.Condition()
         self.told: list[Job] = []
         self.service = JobService(
@@ -96,8 +101,8 @@ class Bench:
     def _carry_out(self, folder: Path) -> Ended:
         return self.carry_out(folder)  # as it is then
 
-    def _make_executor(self, count: int) -> Executor:
-        return self.make_executor(count)
+    def _make_executor(self, url: str, count: int) -> Workers:
+        return self.make_executor(url, count)
 
     def _hear(self, job: Job) -> None:
         with self.changed:
@@ -198,7 +203,7 @@ def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> N
             raise BrokenExecutor
 
     executors = [Broken(lambda _folder: Ended()), bench.executor]
-    bench.make_executor = lambda _count: executors.pop(0)
+    bench.make_executor = lambda _url, _count: executors.pop(0)
     job = _submitted(bench)
     bench.service.start()
     assert bench.end_of(job).state == "done"
@@ -311,7 +316,7 @@ def _until(bench: Bench, is_so: Callable[[], bool]) -> None:
 
 def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what(bench: Bench) -> None:
     held = HeldExecutor()
-    bench.make_executor = lambda _count: held
+    bench.make_executor = lambda _url, _count: held
     diagnosis = _asked(bench, DiagnoseRequest(traces=(TRACE,)))
     fit, other_fit = _asked(bench, FitRequest(traces=(TRACE,))), _asked(bench, FitRequest(traces=(TRACE,)))
     short, next_short = _asked(bench, COMPARE), _asked(bench, COMPARE)
@@ -342,7 +347,7 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
     executors = [HeldExecutor(), HeldExecutor(), HeldExecutor()]
     made: list[HeldExecutor] = []
 
-    def make_executor(_count: int) -> Executor:
+    def make_executor(_url: str, _count: int) -> Workers:
         made.append(executors[len(made)])
         return made[-1]
 
