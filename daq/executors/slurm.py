@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 
 from dask_jobqueue import SLURMCluster
@@ -18,6 +19,8 @@ PATIENCE = 24 * 3600.0
 
 def slurm_workers(address: Address) -> DaskWorkers:
     """Asks Slurm for workers of one core each, and waits for the first. Raises SpecError, ReachError."""
+    if shutil.which("sbatch") is None:
+        raise ReachError(f"executor {address.url}: there is no sbatch here; start this on a computer of the cluster")
     try:
         cluster = SLURMCluster(
             queue=address.place or None,
@@ -34,7 +37,7 @@ def slurm_workers(address: Address) -> DaskWorkers:
         raise SpecError(f"executor {address.url}: {error}") from error
     try:
         cluster.scale(jobs=address.workers or 1)
-        cluster.sync(cluster._correct_state)
+        cluster.sync(cluster._correct_state)  # else an error of sbatch is only logged, and nothing ever comes
     except (OSError, RuntimeError) as error:
         cluster.close()
         raise ReachError(f"executor {address.url}: sbatch: {str(error).partition(chr(10))[0]}") from error

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from daq.contracts import exit_codes
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption
-from daq_cli.commands.fit import EffectsOption, ParametersOption
+from daq_cli.commands.fit import (
+    BoundOption,
+    EffectsOption,
+    HoldOption,
+    MethodOption,
+    NoPriorsOption,
+    OpenLoopOption,
+    ParametersOption,
+    SeedOption,
+)
+from daq_cli.commands.simulate import NoRoundingOption
 from daq_cli.models.batch import LOCAL, Asked, run_at_service, run_here
 from daq_cli.models.model_input import MODEL_HELP, EffectFileOption, ExecutorOption
 from daq_cli.robot.access import robot_of
@@ -48,23 +58,13 @@ def fit(
     effects: EffectsOption = None,
     effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
-    hold: Annotated[str | None, typer.Option(help="Parameters to hold at their values: names or patterns.")] = None,
-    bound: Annotated[
-        list[str] | None,
-        typer.Option(help="Bounds of a parameter, name=low:high, instead of the model's own. May be repeated."),
-    ] = None,
-    no_priors: Annotated[
-        bool, typer.Option("--no-priors", help="Fit without the expected deviations of the parameters.")
-    ] = False,
-    method: Annotated[
-        Literal["least_squares", "nelder_mead"],
-        typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
-    ] = "least_squares",
+    hold: HoldOption = None,
+    bound: BoundOption = None,
+    no_priors: NoPriorsOption = False,
+    method: MethodOption = "least_squares",
     starts: Annotated[int, typer.Option(min=1, max=20, help="Number of fits from different starting values.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the starting values.")] = 0,
-    open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
-    ] = False,
+    seed: SeedOption = 0,
+    open_loop: OpenLoopOption = False,
     json: JsonOption = False,
 ) -> None:
     """Fit a model to every trace by itself: a row of parameters and errors for each."""
@@ -121,12 +121,8 @@ def simulate(
     executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
-    open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
-    ] = False,
-    no_rounding: Annotated[
-        bool, typer.Option("--no-rounding", help="Leave readings and drive unrounded, unlike a real board.")
-    ] = False,
+    open_loop: OpenLoopOption = False,
+    no_rounding: NoRoundingOption = False,
     json: JsonOption = False,
 ) -> None:
     """Simulate every trace and compare it with the measurement: a row of errors for each."""

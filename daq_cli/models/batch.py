@@ -53,6 +53,8 @@ def run_here(robot: RobotAccess, asked: Asked, study: Study) -> bool:
             folder.write_tables()
             _print_end(asked, len(chosen), 0, 0.0)
             return True
+        if not asked.executor.startswith(LOCAL):
+            console().print(f"waiting for workers of {asked.executor}")
         with ending(open_workers(asked.executor)) as workers, shown(study.kind) as tell:
             ended = run_batch(folder, common, chosen, workers, tell)
     _print_end(asked, ended.before + ended.done, ended.failed, ended.seconds)

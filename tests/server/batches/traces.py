@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from daq.contracts.machine import load_machine
@@ -22,6 +23,7 @@ def folder_of_traces(folder: Path, count: int) -> Path:
     folder.mkdir()
     for index in range(count):
         ramp = ramp_trace(MACHINE, amplitude=0.1 + 0.01 * index, duration=1.0)
-        record = ramp.record.model_copy(update={"trace_id": number(index), "robot": "ma2000", "notes": f"run {index}"})
+        told = {"trace_id": number(index), "robot": "ma2000", "notes": f"ramp, run {index}", "outcome": "complete"}
+        record = ramp.record.model_copy(update={**told, "created": datetime(2026, 11, 10 + index % 20, tzinfo=UTC)})
         write_trace(replace(ramp, record=record), folder / f"{index:03}.mcap")
     return folder
