@@ -25,6 +25,7 @@ from daq.executors.workers import BlamedError, Workers
 
 PATIENCE = 20.0
 """Time (s) within which a scheduler must answer, and have a worker."""
+LOST = "the connection to Dask's scheduler was lost, and with it the jobs; the same command goes on"
 COUNT_EVERY = 5.0
 """Time (s) between two counts of the workers, which may come and go."""
 
@@ -48,7 +49,10 @@ class DaskWorkers(Workers):
         with self._lock:
             when, count = self._counted
             if time.monotonic() - when >= COUNT_EVERY:
-                count = max(1, sum(self._client.nthreads().values()))
+                try:
+                    count = max(1, sum(self._client.nthreads().values()))
+                except OSError as error:
+                    raise ReachError(LOST) from error
                 self._counted = time.monotonic(), count
         return count
 
@@ -63,6 +67,13 @@ class DaskWorkers(Workers):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As any executor does."""
         self._executor.shutdown(wait=wait and not cancel_futures)
+        self._end()
+
+    def abandon(self) -> None:
+        """Leaves the scheduler, which forgets the jobs; it may be gone itself."""
+        self._end()
+
+    def _end(self) -> None:
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()
@@ -70,9 +81,10 @@ class DaskWorkers(Workers):
 
 def _pass_on(future: Future[Any], given: Future[Any]) -> None:
     """Gives the end of Dask's future to another, with the exceptions of `concurrent.futures`."""
-    future.set_running_or_notify_cancel()
+    if not future.set_running_or_notify_cancel():
+        return
     if given.cancelled():
-        future.set_exception(ReachError("Dask has given up the jobs: the connection to its scheduler was lost"))
+        future.set_exception(ReachError(LOST))
         return
     error = given.exception()
     if isinstance(error, KilledWorker):
@@ -119,7 +131,8 @@ def connected(url: str, scheduler: str, cluster: Cluster | None = None, patience
 
 def require_same_versions(client: Client) -> None:
     """Raises OtherVersionError, which names the worker, where one has another version than this program."""
-    for worker, has in client.get_versions(packages=[PACKAGE])["workers"].items():
+    versions: Any = client.get_versions(packages=[PACKAGE])
+    for worker, has in versions["workers"].items():
         packages = has["packages"]
         python = str(packages["python"]).split(".")[:2]
         refuse_other(worker, Program(packages[PACKAGE] or "none", ".".join(python)), program_here())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 
-from dask_jobqueue import SLURMCluster
+from dask_jobqueue.slurm import SLURMCluster
 
 from daq.contracts.errors import ReachError, SpecError
 from daq.executors.address import Address

@@ -16,6 +16,7 @@ from daq_cli.robot.access import RobotAccess
 if TYPE_CHECKING:
     from daq.contracts.service.jobs import Study, TraceFilter
     from daq.traces.query import TraceQuery
+    from server.batches.folder import Row
     from server.batches.run import Chosen, Standing, Told
     from server.batches.study import Common
 
@@ -153,8 +154,6 @@ def place_and_query(text: str) -> tuple[Path | None, TraceQuery]:
 def shown(what: str) -> Iterator[Told]:
     """Shows a batch's progress: a bar with rate and time left at a terminal, elsewhere a line now and then. Failures
     are told one by one, in a line each."""
-    from server.batches.run import Row
-
     with _bar(what) if console().is_terminal else _lines() as progress:
 
         def tell(standing: Standing, row: Row | None) -> None:

@@ -37,3 +37,8 @@ def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
     Path("o").write_text("mine")
     daq("batch", "simulate", "traces", "--out", "o").complains(2, "o: cannot be written")
     assert Path("o").read_text() == "mine"
+
+
+def test_the_executor_of_a_service_is_checked_with_its_configuration(daq: CommandLine) -> None:
+    Path("daq.toml").write_text('[server]\nexecutor = "dask:/host"\n')
+    daq("config", "check").complains(2, "executor 'dask:/host': is none")

@@ -1,4 +1,7 @@
-"""A batch one of whose workers is killed with -9 after the fifth trace: python -m … URL FOLDER OUT."""
+"""A batch in which a process is killed with -9 after the fifth trace: python -m … URL FOLDER OUT [PROCESS].
+
+Without PROCESS it is the worker that computed that trace.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import signal
 import sys
 from pathlib import Path
 
+from daq.contracts.errors import DaqError
 from daq.contracts.service.jobs import SimulateStudy
 from daq.executors import open_workers
 from daq.executors.workers import ending
@@ -22,20 +26,24 @@ from tests.server.batches.traces import MACHINE
 AFTER = 5
 
 
-def main(url: str, traces: str, out: str) -> None:
+def main(url: str, traces: str, out: str, process: str = "") -> None:
     """Prints which process was killed after how many traces, and how the batch ended."""
     killed: list[int] = []
 
     def tell(standing: Standing, row: Row | None) -> None:
         if row is not None and standing.done == AFTER:
-            killed.append(int(row.worker.rpartition(":")[2]))
+            killed.append(int(process or row.worker.rpartition(":")[2]))
             os.kill(killed[0], signal.SIGKILL)
 
     common = Common(study=SimulateStudy(), model=None, machine=MACHINE)
     chosen, _ = chosen_traces(list_traces(Path(traces)), TraceQuery())
-    with opened(Path(out), asked_of(common)) as folder, ending(open_workers(url)) as workers:
-        ended = run_batch(folder, common, chosen, workers, tell)
-    print(json.dumps({"killed": killed[0], "done": ended.done, "failed": ended.failed}))
+    try:
+        with opened(Path(out), asked_of(common)) as folder, ending(open_workers(url)) as workers:
+            ended = run_batch(folder, common, chosen, workers, tell)
+    except DaqError as error:
+        print(json.dumps({"killed": killed[0], "error": str(error), "code": error.exit_code}))
+    else:
+        print(json.dumps({"killed": killed[0], "done": ended.done, "failed": ended.failed}))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import pytest
 from benchmarks.dask_processes import cluster
 from tests.server.batches.traces import folder_of_traces, number
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 TRACES = 40
 
 
@@ -54,6 +54,19 @@ def test_a_worker_killed_in_mid_batch_costs_no_trace_and_none_is_in_the_result_t
         rows = list(csv.DictReader(stream))
     assert [row["trace"] for row in rows] == [number(index) for index in range(TRACES)]
     assert {row["state"] for row in rows} == {"done"}
+
+
+def test_a_batch_that_loses_its_scheduler_ends_in_one_line_and_goes_on(tmp_path: Path) -> None:
+    traces, out = folder_of_traces(tmp_path / "traces", TRACES), tmp_path / "out"
+    with cluster(1) as made:
+        done = finished("tests.server.batches.killing", made.url, traces, out, made.scheduler.pid)
+    said = json.loads(done.stdout)
+    assert (said["code"], said["killed"]) == (3, made.scheduler.pid)
+    assert "the connection to Dask's scheduler was lost" in said["error"]
+    kept = numbers_in_rows(out)
+    assert 5 <= len(kept) < TRACES
+    assert daq("batch", "simulate", traces, "--out", out, "--executor", "local://1").returncode == 0
+    assert numbers_in_rows(out) == dict.fromkeys(map(number, range(TRACES)), 1)
 
 
 def test_a_worker_of_another_version_is_refused_by_name(tmp_path: Path) -> None:

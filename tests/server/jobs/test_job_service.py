@@ -12,8 +12,18 @@ from typing import Any
 import pytest
 from sqlalchemy.exc import OperationalError
 
+from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
-from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
+from daq.contracts.service.jobs import (
+    BatchRequest,
+    CompareRequest,
+    DiagnoseRequest,
+    FitRequest,
+    Job,
+    JobRequest,
+    SimulateStudy,
+    TraceFilter,
+)
 from daq.contracts.trace_limits import TraceLimits
 from daq.executors import Workers
 from model.machine_model.model import base_model
@@ -386,3 +396,44 @@ def test_a_model_made_to_do_harm_is_refused_in_one_line(bench: Bench, text: byte
     with pytest.raises(ProblemError, match=r"^[^\n]{1,300}$") as refused:
         bench.models.take_in_text(text, "x", "anna")
     assert (refused.value.status, refused.value.kind) == (422, "not-a-model")
+
+
+def test_a_batch_has_the_traces_that_its_filter_finds_when_it_is_submitted(bench: Bench) -> None:
+    request = BatchRequest(study=SimulateStudy(), filter=TraceFilter())
+    job, _new = bench.service.submit(request, "anna", "key")
+    assert isinstance(job.request, BatchRequest)
+    assert job.request.traces == (TRACE,)
+    assert lane_of(job.request) == "batch"
+    task = Mailbox(bench.folder / job.id).read("request.json")
+    assert (list(task["traces"]), task["executor"], task["continues"]) == ([TRACE], "local://1", None)
+    assert bench.service.submit(request, "anna", "key") == (job, False)
+    for nothing in (TraceFilter(text="nothing is called so"), TraceFilter(kind="sweep")):
+        with pytest.raises(ProblemError) as refused:
+            bench.service.submit(request.model_copy(update={"filter": nothing}), "anna", None)
+        assert (refused.value.status, refused.value.kind) == (422, "batch-size")
+
+
+def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench) -> None:
+    request = BatchRequest(study=SimulateStudy(), traces=(TRACE,))
+    first, _new = bench.service.submit(request, "anna", None)
+    further = request.model_copy(update={"continues": first.id})
+    with pytest.raises(ProblemError) as refused:
+        bench.service.submit(further, "anna", None)
+    assert (refused.value.status, refused.value.kind) == (409, "job-state")
+    bench.service.cancel(first.id, "anna")
+    second, _new = bench.service.submit(further, "anna", None)
+    assert Mailbox(bench.folder / second.id).read("request.json")["continues"] == str(bench.folder / first.id)
+
+
+def test_an_executor_that_is_not_reached_is_the_reason_of_a_job(bench: Bench) -> None:
+    def unreachable(url: str, _count: int) -> Workers:
+        asked.append(url)
+        raise ReachError("executor dask://host:8786: no scheduler answers")
+
+    asked: list[str] = []
+    bench.make_executor = unreachable
+    job, _new = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)
+    bench.service.start()
+    ended = bench.end_of(job)
+    assert (ended.state, ended.failure, asked) == ("interrupted", "lost", ["local://"])
+    assert ended.reason == "executor dask://host:8786: no scheduler answers"
