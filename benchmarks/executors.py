@@ -6,8 +6,10 @@
 Three executors in turn: a plain ProcessPoolExecutor, `local://` and `dask://` (a scheduler and workers as processes of
 this computer). A job computes for a fixed number of steps and carries as much text as a trace of a batch carries model.
 
-Overhead is the time of the cores that could have computed, less what the jobs computed, by job. Efficiency is the
-share that they computed; more workers than cores cannot make it larger. Starting workers is not counted.
+Overhead is the processor time of all processes (client, scheduler, workers) less that of the jobs, by job: other
+programs on the computer do not change it. Efficiency is the share of the cores' wall time in which jobs computed; more
+workers than cores cannot make it larger, and other programs make it smaller, also that of the plain pool beside it.
+Starting workers is not counted.
 
 Empty jobs show how many jobs a second a scheduler can give out. What a thousand workers would do follows from that and
 the processor time that scheduler and client take for each job; it is an extrapolation, and not measured.
@@ -16,6 +18,7 @@ the processor time that scheduler and client take for each job; it is an extrapo
 from __future__ import annotations
 
 import argparse
+import contextlib
 import multiprocessing
 import os
 import sys
@@ -34,7 +37,7 @@ from daq.executors.local import cores
 from daq.executors.workers import ending
 from model.machine_model.model import base_model
 
-STEPS, JOBS, EMPTY = 2_000_000, 48, 1000
+STEPS, JOBS, EMPTY = 3_000_000, 48, 1000
 WORKERS = (1, 2, 4)
 OVERHEAD_MS, EFFICIENCY = 20.0, 0.95
 MANY = 1000
@@ -44,72 +47,95 @@ DIAGNOSIS_S = 20.0
 
 @dataclass(frozen=True)
 class Work:
-    """A job: computes for so many steps, and returns the processor time (s) that it took."""
+    """A job: computes for so many steps, and returns its process and the processor time (s) that it took."""
 
     steps: int
     text: str
 
-    def __call__(self, number: int) -> float:
+    def __call__(self, number: int) -> tuple[int, float]:
         begun = time.process_time()
         for step in range(self.steps):
             number ^= step
-        return time.process_time() - begun
+        return os.getpid(), time.process_time() - begun
 
 
-Through = Callable[[Work, int], float]
-"""Gives an executor so many jobs, and returns the processor time of all of them."""
+Through = Callable[[Work, int], list[tuple[int, float]]]
+"""Gives an executor so many jobs, and returns their answers."""
 
 
 @contextmanager
 def plain(workers: int) -> Iterator[Through]:
     """Python's own pool, given everything at once."""
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield lambda work, jobs: sum(pool.map(work, range(jobs)))
+        yield lambda work, jobs: list(pool.map(work, range(jobs)))
 
 
 @contextmanager
 def ours(url: str) -> Iterator[Through]:
     """An executor of a URL, as a batch uses it."""
     with ending(open_workers(url)) as workers:
-        yield lambda work, jobs: sum(future.result() for _, future in done_in_any_order(workers, work, range(jobs)))
+        yield lambda work, jobs: [answer.result() for _, answer in done_in_any_order(workers, work, range(jobs))]
 
 
 @dataclass(frozen=True)
 class Measured:
-    """So many jobs through so many workers: wall time and the jobs' own time, s."""
+    """So many jobs through so many workers: wall time, processor time of all processes, and of the jobs alone, s."""
 
     workers: int
     jobs: int
     wall: float
+    taken: float
     computed: float
 
     @property
-    def _available(self) -> float:
-        return self.wall * min(self.workers, cores())
-
-    @property
     def overhead_ms(self) -> float:
-        """Time that a job costs beyond its own, ms."""
-        return 1e3 * (self._available - self.computed) / self.jobs
+        """Processor time that a job costs beyond its own, ms."""
+        return 1e3 * (self.taken - self.computed) / self.jobs
 
     @property
     def efficiency(self) -> float:
         """Share of the cores' time in which jobs computed."""
-        return self.computed / self._available
+        return self.computed / (self.wall * min(self.workers, cores()))
 
 
 def measured(through: Through, work: Work, workers: int, jobs: int) -> Measured:
     """Every worker has computed something before."""
-    through(Work(1000, work.text), 4 * workers)
-    begun = time.perf_counter()
-    computed = through(work, jobs)
-    return Measured(workers, jobs, time.perf_counter() - begun, computed)
+    seen: set[int] = set()
+    while len(seen) < workers:
+        seen |= {process for process, _ in through(Work(work.steps // 10, work.text), 2 * workers)}
+    taken, begun = family_time(), time.perf_counter()
+    answers = through(work, jobs)
+    wall, taken = time.perf_counter() - begun, family_time() - taken
+    return Measured(workers, jobs, wall, taken, sum(seconds for _, seconds in answers))
 
 
-def processor_time(process: int) -> float:
-    """Processor time (s) that a process has taken."""
-    fields = Path(f"/proc/{process}/stat").read_text("ascii").rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+@dataclass(frozen=True)
+class Process:
+    """What the system says of a process: its parent, and the processor time (s) that it has taken."""
+
+    parent: int
+    taken: float
+
+
+def process(number: int) -> Process:
+    """Raises FileNotFoundError, ProcessLookupError for one that has ended."""
+    fields = Path(f"/proc/{number}/stat").read_text("ascii", "replace").rpartition(")")[2].split()
+    return Process(int(fields[1]), (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"))
+
+
+def family_time() -> float:
+    """Processor time (s) of this process and of all that it has started, directly or not."""
+    known: dict[int, Process] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdecimal():
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                known[int(entry.name)] = process(int(entry.name))
+    family, total = [os.getpid()], 0.0
+    while family:
+        one = family.pop()
+        total += known[one].taken
+        family += (number for number, other in known.items() if other.parent == one)
+    return total
 
 
 @dataclass(frozen=True)
@@ -129,10 +155,10 @@ class Rate:
 
 def rate(made: Cluster, through: Through, jobs: int, text: str) -> Rate:
     """Measures it on a cluster that has computed before."""
-    scheduler, client, begun = processor_time(made.scheduler.pid), time.process_time(), time.perf_counter()
+    scheduler, client, begun = process(made.scheduler.pid).taken, time.process_time(), time.perf_counter()
     through(Work(0, text), jobs)
     wall, client = time.perf_counter() - begun, time.process_time() - client
-    scheduler = processor_time(made.scheduler.pid) - scheduler
+    scheduler = process(made.scheduler.pid).taken - scheduler
     return Rate(jobs / wall, 1e3 * scheduler / jobs, 1e3 * client / jobs)
 
 

@@ -5,6 +5,7 @@ Without PROCESS it is the worker that computed that trace.
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import signal
@@ -47,4 +48,5 @@ def main(url: str, traces: str, out: str, process: str = "") -> None:
 
 
 if __name__ == "__main__":
+    faulthandler.dump_traceback_later(100, exit=True)  # a batch that hangs shows where
     main(*sys.argv[1:])

@@ -20,7 +20,9 @@ TRACES = 40
 
 def finished(*words: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 def daq(*words: object) -> subprocess.CompletedProcess[str]:

@@ -14,7 +14,7 @@ from tests.server.batches.traces import folder_of_traces
 
 SBATCH = """#!/bin/sh
 cp "$1" "$SLURM_STAND_IN/script"
-setsid sh "$1" >"$SLURM_STAND_IN/said" 2>&1 &
+setsid sh "$SLURM_STAND_IN/script" >"$SLURM_STAND_IN/said" 2>&1 &
 echo $! >"$SLURM_STAND_IN/4711"
 echo "Submitted batch job 4711"
 """
@@ -38,7 +38,7 @@ def daq(slurm: Path, *words: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(150)
 def test_what_sbatch_is_given_computes_the_batch_and_is_cancelled_at_the_end(tmp_path: Path) -> None:
     traces, slurm, out = folder_of_traces(tmp_path / "traces", 3), tmp_path / "slurm", tmp_path / "out"
     commands(slurm, sbatch=SBATCH, scancel=SCANCEL)
