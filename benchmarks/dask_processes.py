@@ -40,7 +40,9 @@ def _started(words: list[str], until: str, environment: Mapping[str, str]) -> tu
 
 def _end(process: subprocess.Popen[str]) -> None:
     process.kill()
-    process.communicate()
+    process.wait()
+    if process.stderr is not None:
+        process.stderr.close()
 
 
 @contextmanager
