@@ -12,7 +12,6 @@ from daq_cli.app import completion
 from daq_cli.app.context import JsonOption
 from daq_cli.commands.fit import (
     BoundOption,
-    EffectsOption,
     HoldOption,
     MethodOption,
     NoPriorsOption,
@@ -55,7 +54,13 @@ def fit(
     out: OutOption,
     executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
-    effects: EffectsOption = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            help="Effects to add to the model before it is fitted, such as backlash,coupling:2-3.",
+            autocompletion=completion.effects,
+        ),
+    ] = None,
     effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
     hold: HoldOption = None,

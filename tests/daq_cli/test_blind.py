@@ -18,6 +18,7 @@ from mcap.stream_reader import StreamReader
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
+from daq.executors.workers import ending
 from daq.traces.reader import read_trace
 from daq_cli.trial.campaign import Campaign
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
@@ -29,7 +30,7 @@ from daq_cli.trial.sealed import diagnose_sealed
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model
 from model.trial.arms import compose
-from tests.daq.executors.by_hand import WorkersByHand
+from tests.daq.executors.by_hand import WorkersByHand, WorkersInThreads
 from tests.daq_cli.invoke import CommandLine
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
@@ -59,7 +60,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
         patch.setenv("DAQ_RUNTIME_FOLDER", str(path / "run"))
         made = trial(path, acquire=True)
         said: list[str] = []
-        made.run(SECRETS, WorkersByHand(), lambda _number, line: said.append(line))
+        with ending(WorkersInThreads(2)) as workers:
+            made.run(SECRETS, workers, lambda _number, line: said.append(line))
     assert [line.partition(": ")[2] for line in said] == ["done", "done"]
     return made
 
