@@ -57,7 +57,7 @@ def fit(
     effects: Annotated[
         str | None,
         typer.Option(
-            help="Effects to add to the model before it is fitted, such as backlash,coupling:2-3.",
+            help="Effects to add to the model before it is fitted, such as backlash:2-3.",
             autocompletion=completion.effects,
         ),
     ] = None,
