@@ -20,7 +20,7 @@ echo "Submitted batch job 4711"
 """
 SCANCEL = """#!/bin/sh
 echo "$1" >>"$SLURM_STAND_IN/cancelled"
-kill -9 -- "-$(cat "$SLURM_STAND_IN/$1")"
+kill -s KILL -- "-$(cat "$SLURM_STAND_IN/$1")"
 """
 
 
