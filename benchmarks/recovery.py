@@ -35,6 +35,8 @@ from benchmarks.mock_arm import FRICTION_ARMS, board_text, hidden_parameters, pl
 from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
+from daq.executors import Workers, done_in_any_order, open_workers
+from daq.executors.workers import ending
 from daq.safety import check_plan
 from daq.trajectories.planner import plan, start_angles
 from model.design.search import DesignedExperiments, DesignOptions, design
@@ -93,16 +95,26 @@ def recover(specs: Iterable[ExperimentSpec], seed: int, bent: bool) -> dict[str,
     }
 
 
-def study(seeds: range, folder: Path, bent: bool) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Recovering:
+    """What a worker does with a seed."""
+
+    specs: tuple[ExperimentSpec, ...]
+    bent: bool
+
+    def __call__(self, seed: int) -> dict[str, Any]:
+        return recover(self.specs, seed, self.bent)
+
+
+def study(seeds: range, folder: Path, bent: bool, workers: Workers) -> list[dict[str, Any]]:
     """Every seed once; those that the folder has are not done again."""
     specs = designed(folder)
     path = folder / ("bent.jsonl" if bent else "straight.jsonl")
     lines = path.read_text("utf-8").splitlines() if path.exists() else []
     done = {entry["seed"]: entry for entry in map(json.loads, lines)}
-    for seed in seeds:
-        if seed in done:
-            continue
-        done[seed] = recover(specs, seed, bent)
+    left = [seed for seed in seeds if seed not in done]
+    for seed, future in done_in_any_order(workers, Recovering(specs, bent), left):
+        done[seed] = future.result()
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(done[seed]) + "\n")
         print(f"  seed {seed} of {seeds[-1]}: fit {done[seed]['seconds']:.1f} s", file=sys.stderr, flush=True)
@@ -158,13 +170,15 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--folder", type=Path, help="where results are kept, to go on later")
     parser.add_argument("--bent", action="store_true", help="potentiometers that bend")
+    parser.add_argument("--executor", default="local://1", help="who computes, as `daq batch --executor`")
     parser.add_argument("--quick", action="store_true", help="three seeds")
     given = parser.parse_args()
     seeds = range(given.first, given.first + (3 if given.quick else given.seeds))
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        entries = study(seeds, folder, given.bent)
+        with ending(open_workers(given.executor)) as workers:
+            entries = study(seeds, folder, given.bent, workers)
     board = "bent by up to ±0.25 %" if given.bent else "straight"
     title = f"Recovery of {len(seeds)} hidden arms, potentiometers {board}"
     command = f"python -m benchmarks recovery --seeds {len(seeds)} --first {given.first}"

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from daq.trajectories.presets import PRESETS as PRESETS
     from ma2000.arm import Arm as Arm
     from ma2000.arm import connect as connect
+    from ma2000.batches import Batch as Batch
+    from ma2000.batches import batch as batch
     from ma2000.files import read_trace as read_trace
     from ma2000.files import read_traces as read_traces
     from ma2000.files import write_trace as write_trace
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
 _HOME = {
     "PRESETS": "daq.trajectories.presets",
     "Arm": "ma2000.arm",
+    "Batch": "ma2000.batches",
     "Client": "daq.client",
     "DaqError": "daq.contracts.errors",
     "DesignOptions": "model.design.search",
@@ -82,6 +85,7 @@ _HOME = {
     "RunError": "ma2000.running",
     "Simulation": "model.simulation.simulate",
     "Trace": "daq.contracts.trace",
+    "batch": "ma2000.batches",
     "base_model": "model.machine_model.model",
     "connect": "ma2000.arm",
     "design": "ma2000.studies",

@@ -39,6 +39,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("daq_cli.commands.simulate", "Simulate recorded traces with a model."),
     "compare": ("daq_cli.commands.compare", "Compare models on the same traces."),
     "diagnose": ("daq_cli.commands.diagnose", "Name the effect that a model lacks, add it, show the gap shrink."),
+    "batch": ("daq_cli.commands.batch", "Fit, validate, simulate or diagnose many traces, on many cores."),
     "design": ("daq_cli.commands.design", "Propose experiments that determine parameters best."),
     "thesis": ("daq_cli.commands.thesis", "Reproduce the 1991 source beside its published results."),
     "blind": ("daq_cli.commands.blind", "Hide effects in the mock, diagnose blindly, and score."),

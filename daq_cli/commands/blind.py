@@ -12,6 +12,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app.context import JsonOption, console, print_json
+from daq_cli.models.model_input import ExecutorOption
 
 if TYPE_CHECKING:
     from daq_cli.trial.campaign import Campaign
@@ -42,8 +43,7 @@ def blind(
         typer.Option(help="Run a registered trial: its cases and experiments, with seeds drawn from its commit."),
     ] = None,
     run: Annotated[str, typer.Option(help="Name of the run of the registered trial.")] = "diagnostic",
-    shard: Annotated[str, typer.Option(help="I/K: this is process I of K that share the folder.")] = "1/1",
-    processes: Annotated[int, typer.Option(min=1, help="Number of cases worked on at the same time.")] = 1,
+    executor: ExecutorOption = "local://1",
     until: Annotated[
         Literal["detect", "record", "diagnose", "score"], typer.Option(help="Last stage to carry out.")
     ] = "score",
@@ -54,6 +54,9 @@ def blind(
     json: JsonOption = False,
 ) -> None:
     """Hide effects in the mock, diagnose blindly, reveal, and score."""
+    from daq.executors import open_workers
+    from daq.executors.address import parse_address
+    from daq.executors.workers import ending
     from daq_cli.trial.campaign import Campaign
     from daq_cli.trial.folder import TrialFolder
     from daq_cli.trial.registered import to_register
@@ -61,7 +64,7 @@ def blind(
     if hashes:
         print(to_register())
         return
-    index, count = _shard(shard)
+    parse_address(executor)
     if registration is not None:
         if seeds is not None:
             raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")
@@ -74,11 +77,11 @@ def blind(
         if seeds is None:
             raise SpecError("--seeds or --registration: one of them is needed")
         chosen, drawn = _chosen(seeds, kinds, loads, cases), None
-    suffix = "" if count == 1 else f"-{index}of{count}"
-    kept = TrialFolder.open(folder, experiment, acquire, drawn, suffix)
-    mine = kept.in_order(chosen)[index - 1 :: count]
+    kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
     campaign = Campaign(kept, load_machine("ma2000"), until=until)
-    left = campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
+    count = len(set(chosen))
+    with ending(open_workers(executor)) as workers:
+        left = campaign.run(chosen, workers, lambda number, said: console().print(f"{number}/{count}  {said}"))
     _show(campaign, folder, as_json=json)
     if left:
         console().print(f"{left} cases are not done; the same command continues with them")
@@ -105,13 +108,6 @@ def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", 
     chosen = registration.run(run)
     origin = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest(), "run": run, "commit": commit}
     return registration.arms(run, commit), chosen.experiment, chosen.acquire, origin
-
-
-def _shard(text: str) -> tuple[int, int]:
-    index, _, count = text.partition("/")
-    if not (index.isdecimal() and count.isdecimal() and 1 <= int(index) <= int(count)):
-        raise SpecError(f"shard {text!r}: write I/K with 1 ≤ I ≤ K, such as 1/2")
-    return int(index), int(count)
 
 
 def _show(campaign: Campaign, folder: Path, *, as_json: bool) -> None:

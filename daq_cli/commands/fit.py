@@ -53,6 +53,23 @@ ParametersOption = Annotated[
     typer.Option(help="Parameters to fit: names or patterns such as *.mass,joint2.* (default: all uncertain ones)."),
 ]
 
+HoldOption = Annotated[str | None, typer.Option(help="Parameters to hold at their values: names or patterns.")]
+BoundOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Bounds of a parameter, name=low:high, instead of the model's own. May be repeated."),
+]
+NoPriorsOption = Annotated[
+    bool, typer.Option("--no-priors", help="Fit without the expected deviations of the parameters.")
+]
+MethodOption = Annotated[
+    Literal["least_squares", "nelder_mead"],
+    typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the starting values.")]
+OpenLoopOption = Annotated[
+    bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
+]
+
 
 @app.command()
 def fit(
@@ -66,24 +83,14 @@ def fit(
     effects: EffectsOption = None,
     effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
-    hold: Annotated[str | None, typer.Option(help="Parameters to hold at their values: names or patterns.")] = None,
-    bound: Annotated[
-        list[str] | None,
-        typer.Option(help="Bounds of a parameter, name=low:high, instead of the model's own. May be repeated."),
-    ] = None,
+    hold: HoldOption = None,
+    bound: BoundOption = None,
     holdout: HoldoutOption = None,
-    no_priors: Annotated[
-        bool, typer.Option("--no-priors", help="Fit without the expected deviations of the parameters.")
-    ] = False,
-    method: Annotated[
-        Literal["least_squares", "nelder_mead"],
-        typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
-    ] = "least_squares",
+    no_priors: NoPriorsOption = False,
+    method: MethodOption = "least_squares",
     starts: Annotated[int, typer.Option(min=1, max=100, help="Number of fits from different starting values.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the starting values.")] = 0,
-    open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
-    ] = False,
+    seed: SeedOption = 0,
+    open_loop: OpenLoopOption = False,
     torques: Annotated[
         bool,
         typer.Option(

@@ -12,6 +12,7 @@ from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.csv_output import check_csv, write_csv
 from daq_cli.app.output_file import check_folder
+from daq_cli.commands.fit import OpenLoopOption
 from daq_cli.models.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -37,6 +38,10 @@ OutputOption = Annotated[
     typer.Option("--output", "-o", help="The simulated trace: .csv, .mcap, or a picture (.png, .svg, .pdf)."),
 ]
 
+NoRoundingOption = Annotated[
+    bool, typer.Option("--no-rounding", help="Leave readings and drive unrounded, unlike a real board.")
+]
+
 
 @app.command()
 def simulate(
@@ -44,12 +49,8 @@ def simulate(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)],
     traces: TracesArgument,
     output: OutputOption = None,
-    open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
-    ] = False,
-    no_rounding: Annotated[
-        bool, typer.Option("--no-rounding", help="Leave readings and drive unrounded, unlike a real board.")
-    ] = False,
+    open_loop: OpenLoopOption = False,
+    no_rounding: NoRoundingOption = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,

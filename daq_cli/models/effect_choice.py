@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import parse_joints
+from daq_cli.models.model_input import load_effects
 
 if TYPE_CHECKING:
+    from daq.contracts.service.jobs import EffectChoice
     from model.machine_model.model import Model
 
 NO_EFFECT = "none"
@@ -35,6 +38,27 @@ def with_effects(model: Model, text: str) -> Model:
         else:
             model = model.with_effect(found, parse_joints(joints) if joints else _joints_of(found, model))
     return model
+
+
+def effect_choices(text: str | None, files: Sequence[Path] | None = None) -> tuple[EffectChoice, ...]:
+    """Effects written as for `with_effects`, for traces whose models are not known yet; those of files are loaded
+    first. Raises SpecError."""
+    from daq.contracts.service.jobs import EffectChoice
+
+    load_effects(files or ())
+    if text is None or text.strip() == NO_EFFECT:
+        return ()
+    found = []
+    for part in text.split(","):
+        name, _, joints = part.strip().partition(":")
+        found.append(EffectChoice(name=effect_name(name), joints=tuple(parse_joints(joints)) if joints else ()))
+    return tuple(found)
+
+
+def candidate_effects(text: str | None, files: Sequence[Path] | None = None) -> tuple[str, ...] | None:
+    """Candidates for a diagnosis, likewise; None for every effect."""
+    load_effects(files or ())
+    return None if text is None else effect_names(text)
 
 
 def _joints_of(name: str, model: Model) -> tuple[int, ...]:

@@ -66,6 +66,10 @@ EffectFileOption = Annotated[
     typer.Option("--effect-file", help="An effect of your own (.py, docs/own-effect.md). May be repeated."),
 ]
 
+ExecutorOption = Annotated[
+    str,
+    typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),
+]
 MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), or a machine that ships (ma2000)."
 
 

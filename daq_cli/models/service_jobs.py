@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +14,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.service.jobs import (
     MACHINE,
+    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
     FitRequest,
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from model.discrepancy.options import DiagnosisOptions
     from model.fitting.options import FitOptions
     from model.machine_model.model import Model
-    from server.jobs.results import ComparisonData, FitData, JobResult, ValidationData
+    from server.jobs.results import BatchJobResult, ComparisonData, FitData, JobResult, ValidationData
 
 LOOK_EVERY = 1.0
 """s between two questions about a job's progress."""
@@ -41,7 +42,13 @@ MOST_STARTS = 20
 """Most starts of a fit that a job may have."""
 MOST_MODELS = 10
 """Most models that a job compares."""
-KINDS: dict[JobKind, str] = {"fit": "fit", "validate": "validation", "compare": "comparison", "diagnose": "diagnosis"}
+KINDS: dict[JobKind, str] = {
+    "fit": "fit",
+    "validate": "validation",
+    "compare": "comparison",
+    "diagnose": "diagnosis",
+    "batch": "batch",
+}
 EXIT_CODES = {
     "failed": exit_codes.WRONG_INPUT,
     "cancelled": exit_codes.INTERRUPTED,
@@ -178,6 +185,15 @@ class ServiceJobs:
         assert isinstance(found, DiagnosisJobResult)
         return found.data
 
+    def batch(self, request: BatchRequest, model: Model | None, submitted: Callable[[str], object]) -> BatchJobResult:
+        """The batch, with a model that is sent, or that of the machine. `submitted` is called with the job's number."""
+        from server.jobs.results import BatchJobResult
+
+        number = MACHINE if model is None else self._number(model, "batch")
+        found = self._done(request.model_copy(update={"model": number}), None, submitted)
+        assert isinstance(found, BatchJobResult)
+        return found
+
     def _numbers(self, named: NamedTraces) -> tuple[str, ...]:
         """The service's numbers of traces; files of this computer are sent unless it has them."""
         with self.robot.service("jobs") as robot:
@@ -200,14 +216,16 @@ class ServiceJobs:
             save_model(model, file)
             return robot.models.upload(file, model_name(name)).id
 
-    def _done(self, request: JobRequest, report: Path | None) -> JobResult:
+    def _done(
+        self, request: JobRequest, report: Path | None, submitted: Callable[[str], object] = lambda _job: None
+    ) -> JobResult:
         """What a job found, once it is done; its report is fetched."""
         from pydantic import TypeAdapter
 
         from server.jobs.results import JobResult
 
         with self.robot.service("jobs") as robot:
-            job = _followed(robot, request)
+            job = _followed(robot, request, submitted)
             if job.state != "done":
                 raise JobEndedError(job)
             if report is not None:
@@ -235,8 +253,9 @@ def standing_of(job: Job, now: datetime) -> str:
     return f"waits behind: {of}{so_far}" + (f", {behind.others} more" if behind.others else "")
 
 
-def _followed(robot: Robot, request: JobRequest) -> Job:
+def _followed(robot: Robot, request: JobRequest, submitted: Callable[[str], object]) -> Job:
     job = robot.jobs.submit(request)
+    submitted(job.id)
     try:
         with shown_progress(f"{request.kind} at the server") as progress:
             return robot.jobs.wait(

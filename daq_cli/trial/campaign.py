@@ -3,17 +3,21 @@ result kept."""
 
 from __future__ import annotations
 
+import fcntl
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
+from daq.executors import Workers, done_in_any_order
+from daq.executors.each import growing
 from daq.traces.reader import read_trace
 from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
@@ -32,6 +36,24 @@ ROBOT_TIME = 60.0
 Progress = Callable[[int, str], None]
 
 
+@contextmanager
+def _alone(folder: Path, load: int) -> Iterator[None]:
+    """Keeps other processes that use this folder from working on the same load within the block."""
+    folder.mkdir(exist_ok=True)
+    with (folder / f".load-{load}").open("ab") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@dataclass(frozen=True)
+class CaseStage:
+    """A stage of a case, to be carried out by any process; `folder` has the results of the case's stages before."""
+
+    stage: Stage
+    seed: int
+    folder: TrialFolder
+
+
 @dataclass
 class Campaign:
     """One trial. `machine` describes the arm from which every diagnosis begins, before a load is announced."""
@@ -43,32 +65,62 @@ class Campaign:
     experiment: Callable[[str], ExperimentSpec] = trial_experiment
     """The experiment of a name."""
     recorder: Callable[[int, str, ExperimentSpec, Machine, Path], Recorded] = record
-    _tangents: dict[int, Lock] = field(default_factory=dict)
-    _counting: Lock = field(default_factory=Lock)
-    _failed: int = 0
 
-    def run(self, seeds: Sequence[int], processes: int, progress: Progress) -> int:
-        """Carries out the stages that are left of all cases, several at once; `progress` is called after every case.
+    def run(self, seeds: Sequence[int], workers: Workers, progress: Progress) -> int:
+        """Carries out the stages that are left of all cases; `progress` is called after every case. This process alone
+        writes the lines; the workers must see the folder.
 
         Returns how many are not done, because a process of theirs failed; they are tried again next time.
         """
-        self._tangents = {seed % 10: Lock() for seed in seeds}
-        seen_by = "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
-        set_points = self.folder.path / f"{seen_by}{self.folder.shard}.csv"
-        write_set_points(self.experiment(seen_by), self.machine, set_points)
-        with ThreadPoolExecutor(processes) as pool:
+        write_set_points(self.experiment(self._seen_by), self.machine, self._set_points)
+        ended, failed = 0, 0
+        left = deque[CaseStage]()
+
+        def go_on(seed: int, first: bool) -> None:
+            nonlocal ended
+            if (stage := self._next_stage(seed)) is not None:
+                put = left.append if first else left.appendleft
+                put(CaseStage(stage, seed, self.folder.of_case(seed)))
+            else:
+                ended += 1
+                progress(ended, f"{self.folder.name_of(seed)}: done")
+
+        for seed in self.folder.in_order(seeds):
+            go_on(seed, first=True)
+        anywhere = replace(self, folder=TrialFolder(self.folder.path, self.folder.asked))
+        for task, future in done_in_any_order(workers, anywhere._carry_out, growing(left)):
             try:
-                for number, said in enumerate(
-                    pool.map(lambda seed: self._case(seed, set_points), self.folder.in_order(seeds)), start=1
-                ):
-                    progress(number, said)
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
-        return self._failed
+                self.folder.add(task.stage, future.result())
+            except (TrialStageError, BrokenExecutor) as error:
+                ended, failed = ended + 1, failed + 1
+                progress(ended, f"{self.folder.name_of(task.seed)}: {error}")
+            else:
+                go_on(task.seed, first=False)
+        return failed
+
+    @property
+    def _seen_by(self) -> str:
+        return "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
+
+    @property
+    def _set_points(self) -> Path:
+        """File of the set points for which effects must be detectable."""
+        return self.folder.path / f"{self._seen_by}.csv"
+
+    def _next_stage(self, seed: int) -> Stage | None:
+        """The first stage of a case that is left; None where there is none, or the case ended before it."""
+        for stage in STAGES[: STAGES.index(self.until) + 1]:
+            if self.folder.row(stage, seed) is None:
+                recorded = self.folder.row("record", seed)
+                return None if recorded is not None and recorded["outcome"] != "complete" else stage
+        return None
+
+    def _carry_out(self, task: CaseStage) -> dict[str, Any]:
+        """Carries out a stage in a worker, and returns its line."""
+        return replace(self, folder=task.folder)._stage(task.stage, task.seed)
 
     def scores(self) -> list[Score]:
-        """The scores of all cases in the folder, those of other shards included."""
+        """The scores of all cases in the folder."""
         self.folder.reload()
         return [Score.model_validate(row) for row in self.folder.rows("score")]
 
@@ -77,35 +129,15 @@ class Campaign:
         scores = self.scores()
         return trial_table(scores, sum(row["outcome"] != "complete" for row in self.folder.rows("record")))
 
-    def _case(self, seed: int, set_points: Path) -> str:
-        """Carries out the stages of one case that are left; returns one line about it."""
-        try:
-            for stage in STAGES[: STAGES.index(self.until) + 1]:
-                if self.folder.row(stage, seed) is None and not self._stage(stage, seed, set_points):
-                    break
-        except TrialStageError as error:
-            with self._counting:
-                self._failed += 1
-            return f"{self.folder.name_of(seed)}: {error}"
-        return f"{self.folder.name_of(seed)}: done"
-
-    def _stage(self, stage: Stage, seed: int, set_points: Path) -> bool:
-        """Carries out one stage; False where the case ends there."""
+    def _stage(self, stage: Stage, seed: int) -> dict[str, Any]:
         if stage == "detect":
+            tangents = self.folder.path / "tangents"
             # The first of a load works out its tangents, which takes a minute; the others read them.
-            with self._tangents[seed % 10]:
-                self.folder.add(stage, detect(seed, set_points, self.folder.path / "tangents"))
-            return True
+            with _alone(tangents, seed % 10):
+                return detect(seed, self._set_points, tangents)
         if stage == "record":
-            row = self._record(seed)
-        elif stage == "diagnose":
-            if self._row("record", seed)["outcome"] != "complete":
-                return False
-            row = self._diagnose(seed)
-        else:
-            row = self._score(seed)
-        self.folder.add(stage, row)
-        return True
+            return self._record(seed)
+        return self._diagnose(seed) if stage == "diagnose" else self._score(seed)
 
     def _row(self, stage: Stage, seed: int) -> dict[str, Any]:
         row = self.folder.row(stage, seed)

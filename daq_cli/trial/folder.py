@@ -9,7 +9,6 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Lock
 from typing import Any, Literal
 
 from pydantic import ValidationError
@@ -37,13 +36,11 @@ class Asked(FrozenRecord):
 
 @dataclass
 class TrialFolder:
-    """The folder of one trial. Several shards may share it; each writes files of lines of its own."""
+    """The folder of one trial. One process writes its lines; those that carry out stages only read what they need."""
 
     path: Path
     asked: Asked
-    shard: str
     _rows: dict[Stage, dict[int, dict[str, Any]]] = field(default_factory=dict)
-    _lock: Lock = field(default_factory=Lock)
 
     @classmethod
     def open(
@@ -52,7 +49,6 @@ class TrialFolder:
         experiment: Literal["diagnostic", "ramp"],
         acquire: bool,
         registration: dict[str, str] | None,
-        shard: str,
     ) -> TrialFolder:
         """The folder, made when it is new. Raises SpecError when it holds another trial."""
         try:
@@ -62,7 +58,7 @@ class TrialFolder:
             raise SpecError(f"{path}: cannot be made: {error.strerror}") from error
         asked = Asked(experiment=experiment, acquire=acquire, registration=registration, key=secrets.token_hex(16))
         file = path / _CAMPAIGN
-        # Of shards that begin at once, one writes it.
+        # Of commands that begin at once, one writes it.
         aside = path / f".{_CAMPAIGN}.{os.getpid()}"
         aside.write_text(asked.model_dump_json(indent=1) + "\n", "utf-8")
         try:
@@ -74,13 +70,13 @@ class TrialFolder:
             asked = present
         finally:
             aside.unlink()
-        folder = cls(path, asked, shard)
+        folder = cls(path, asked)
         folder._finish_lines()
         folder.reload()
         return folder
 
     def _finish_lines(self) -> None:
-        """Ends lines of this shard that a crash cut short, so that the next line is not appended to them."""
+        """Ends lines that a crash cut short, so that the next line is not appended to them."""
         for stage in STAGES:
             file = self._file(stage)
             if file.exists() and not file.read_bytes().endswith(b"\n"):
@@ -88,10 +84,10 @@ class TrialFolder:
                     cut.write(b"\n")
 
     def _file(self, stage: Stage) -> Path:
-        return self.path / f"{stage}{self.shard}.jsonl"
+        return self.path / f"{stage}.jsonl"
 
     def reload(self) -> None:
-        """Reads the lines of all shards."""
+        """Reads the lines, those of an older version's several processes among them."""
         for stage in STAGES:
             self._rows[stage] = {}
             for file in sorted(self.path.glob(f"{stage}*.jsonl")):
@@ -104,6 +100,11 @@ class TrialFolder:
                         raise SpecError(f"{file}: a line is no case of a trial: {shown(row)}")
                     self._rows[stage][row["seed"]] = row
 
+    def of_case(self, seed: int) -> TrialFolder:
+        """The folder with the results of one case alone, to be sent to the process that carries out its next stage."""
+        rows = {stage: {seed: row} for stage in STAGES if (row := self.row(stage, seed)) is not None}
+        return TrialFolder(self.path, self.asked, {**{stage: {} for stage in STAGES}, **rows})
+
     def row(self, stage: Stage, seed: int) -> dict[str, Any] | None:
         """The result of a stage for a case."""
         return self._rows[stage].get(seed)
@@ -114,12 +115,11 @@ class TrialFolder:
 
     def add(self, stage: Stage, row: dict[str, Any]) -> None:
         """Writes a line, and waits until it is on the disk."""
-        with self._lock:
-            with self._file(stage).open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row, ensure_ascii=False) + "\n")
-                file.flush()
-                os.fsync(file.fileno())
-            self._rows[stage][row["seed"]] = row
+        with self._file(stage).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row, ensure_ascii=False) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        self._rows[stage][row["seed"]] = row
 
     def name_of(self, seed: int) -> str:
         """The name of a case: twelve digits, which reveal nothing without the folder's key."""

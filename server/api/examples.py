@@ -25,11 +25,13 @@ from daq.contracts.service.experiments import (
     ScheduleRequest,
 )
 from daq.contracts.service.jobs import (
+    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
     EffectChoice,
     EffectInModel,
     FitRequest,
+    FitStudy,
     Job,
     KnownEffect,
     ModelChange,
@@ -38,6 +40,7 @@ from daq.contracts.service.jobs import (
     ModelLineage,
     ModelParameter,
     ParameterWords,
+    TraceFilter,
     ValidateRequest,
 )
 from daq.contracts.service.live import LiveFrame, RobotMessage, SampleMessage, Ticket
@@ -328,6 +331,7 @@ def _models() -> list[BaseModel]:
         ValidateRequest(traces=(TRACE,), model=MODEL),
         CompareRequest(traces=(TRACE,), models=("machine", MODEL)),
         DiagnoseRequest(traces=(TRACE,), model=MODEL, joints=(2,)),
+        BatchRequest(study=FitStudy(), filter=TraceFilter(kind="ramp", outcome="complete"), model=MODEL),
         job,
         effect,
         entry,

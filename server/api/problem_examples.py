@@ -60,7 +60,7 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "see its state: only what is queued or running can end",
     ),
     _met(
-        ".*/jobs/",
+        "(post .*/jobs$|.*/jobs/)",
         409,
         "job-state",
         "the fit of 2026-10-05 14:03 UTC is running",
@@ -169,6 +169,7 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "POST …/experiments/preview shows the motion and its violations",
     ),
     _met("post .*/traces$", 422, "not-a-trace", "the body is empty", "send a trace"),
+    _met("post .*/jobs$", 422, "batch-size", "filter: finds no trace", "a batch has 1 to 2000 traces"),
     _met("post .*/models$", 422, "not-a-model", "the body is not JSON", "send a file as `daq fit` writes it"),
     _met(".*", 429, "too-many", "too many requests", "ask less often"),
     _met(".*", 503, "database", "the database: database is locked", "try again"),

@@ -17,6 +17,7 @@ DATABASE = "database/service.sqlite"
 NAMES = re.compile(
     r"database/service\.sqlite|traces/[^/\\]{1,250}\.mcap|models/[A-Za-z0-9_-]{1,64}\.json"
     r"|jobs/[0-9a-f]{12}/[A-Za-z0-9_-]{1,64}\.(json|html)"
+    r"|jobs/[0-9a-f]{12}/batch/((rows|batch|table)\.(jsonl|json|csv|parquet)|answers/[A-Za-z0-9_-]{1,64}\.json)"
 )
 """Names that the files of a backup may have. A restore writes no file with any other name."""
 
@@ -50,8 +51,8 @@ class Places:
             yield f"traces/{path.name}", path
         for path in sorted((self.service / "models").glob("*.json")):
             yield f"models/{path.name}", path
-        for path in sorted((self.service / "jobs").glob("*/*")):
-            name = f"jobs/{path.parent.name}/{path.name}"
+        for path in sorted((self.service / "jobs").rglob("*")):
+            name = path.relative_to(self.service).as_posix()
             if NAMES.fullmatch(name):
                 yield name, path
 

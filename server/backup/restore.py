@@ -139,15 +139,17 @@ class _Staged:
                 copy.write(piece)
             disk.sync(copy)
         check(entry, digest.hexdigest(), self._archive)
-        if path.name == REQUEST:
+        if path.name == REQUEST and path.parents[1].name == "jobs":
             self._lead_to_places(path)
         self._moves.append((path, self._places.target(entry.name)))
 
     def _lead_to_places(self, request: Path) -> None:
-        """Changes the paths of traces and models in a job's request to this configuration's folders."""
+        """Changes the paths of traces, models and another job in a job's request to this configuration's folders."""
         task = json.loads(request.read_text("utf-8"))
         for kind, folder in (("traces", self._places.traces), ("models", self._places.service / "models")):
             task[kind] = {number: str(folder / Path(file).name) for number, file in task.get(kind, {}).items()}
+        if before := task.get("continues"):
+            task["continues"] = str(self._places.service / "jobs" / Path(before).name)
         with request.open("w", encoding="utf-8") as stream:
             json.dump(task, stream)
             stream.flush()

@@ -11,13 +11,14 @@ from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
 
+from daq.contracts.service.jobs import TraceFilter
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.salvage import salvage_folder
 from server.problems import ProblemError, conflict, not_found
 from server.store.experiments import ExperimentStore
-from server.store.traces import NewTrace, TraceStore
+from server.store.traces import NewTrace, TraceSearch, TraceStore
 
 UPLOAD = ".upload-"
 """Beginning of the name of a folder into which an upload is written."""
@@ -112,6 +113,19 @@ class Catalogue:
         with self._lock:
             self._traces.remove(self._robot, identity, take_away)
         return path
+
+    def find(self, wanted: TraceFilter, most: int) -> tuple[str, ...]:
+        """Returns the numbers of the traces that match, the newest first; `most` of them at most."""
+        search = TraceSearch(**dict(wanted))
+        found: list[str] = []
+        cursor: str | None = None
+        while len(found) < most:
+            page = self._traces.found(self._robot, search, cursor, min(500, most - len(found)))
+            found += (entry.id for entry in page.items if not entry.missing)
+            cursor = page.next
+            if cursor is None:
+                break
+        return tuple(found[:most])
 
     def path_of(self, identity: str) -> Path:
         """Returns the file of a trace. Raises a 404, also if the file is gone."""

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import multiprocessing
-import os
 import shutil
-import signal
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
 
+from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine
-from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
+from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, FitRequest, Job, JobRequest
+from daq.executors import Workers, open_workers
+from daq.executors.address import LOCAL
+from daq.executors.local import LocalWorkers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
-from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
+from server.jobs.lanes import BATCH_LANE_WORKERS, LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.work import Ended, Task, carry_out
@@ -32,21 +33,29 @@ from server.store.labels import job_label
 
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
+MOST_OF_A_BATCH = 2000
+"""Largest number of traces of a batch."""
 MOST_TOLD = 50
 """Number of waiting jobs that are published again when a job before them has begun or ended."""
 log = logging.getLogger("server.jobs")
 
 
-def worker_processes(count: int) -> Executor:
-    """Makes the executor of one computer. Its processes are spawned, not forked, because this process has threads."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker)
+def job_workers(url: str, count: int) -> Workers:
+    """Opens an executor for jobs; `count` is the number of processes where it is this computer. Raises SpecError,
+    ReachError, OtherVersionError."""
+    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker)
+
+
+def worker_processes(count: int) -> LocalWorkers:
+    """Makes the executor of this computer, whose processes give way to everything else."""
+    return LocalWorkers(count, begin_worker)
 
 
 @dataclass(frozen=True)
 class JobContext:
     """Stores, services and callbacks of the jobs of one robot. `changed` is called with every job that has changed, and
-    must not block. `at_once`: the number of workers of the long lane."""
+    must not block. `at_once`: the number of workers of the long lane. `executor`: the URL of what computes long jobs
+    and batches; short jobs, and what drives a batch, stay on this computer."""
 
     robot: str
     machine: Machine
@@ -57,7 +66,8 @@ class JobContext:
     clock: Clock
     changed: Callable[[Job], None]
     at_once: int
-    make_executor: Callable[[int], Executor] = worker_processes
+    executor: str = LOCAL
+    make_executor: Callable[[str, int], Workers] = job_workers
 
 
 class JobService:
@@ -67,7 +77,7 @@ class JobService:
         self._context = context
         self._wake = threading.Event()
         self._closing = False
-        self._executors: dict[Lane, Executor] = {}
+        self._executors: dict[Lane, Workers] = {}
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
@@ -83,13 +93,16 @@ class JobService:
         before = context.jobs.made_before(context.robot, request, key)
         if before is not None:  # even if its traces and models have been deleted since
             return before, False
+        found = self._found(request)
         task = Task(
             request=request,
             machine=context.machine,
-            traces={number: context.catalogue.path_of(number) for number in traces_of(request)},
+            traces={number: context.catalogue.path_of(number) for number in found or traces_of(request)},
             models={number: context.models.path_of(number) for number in models_of(request) if number != MACHINE},
             names={number: context.models.name_of(number) for number in models_of(request)},
             limits=context.catalogue.limits,
+            executor=f"{LOCAL}{context.at_once}" if context.executor == LOCAL else context.executor,
+            continues=self._folder_to_continue(request),
         )
 
         def prepare(identity: str) -> None:
@@ -101,7 +114,7 @@ class JobService:
                 shutil.rmtree(folder, ignore_errors=True)
                 raise
 
-        job, new = context.jobs.submit(context.robot, request, context.clock.utc(), by, key, prepare)
+        job, new = context.jobs.submit(context.robot, request, context.clock.utc(), by, key, prepare, found)
         if new:
             self._tell(job)
             self._wake.set()
@@ -170,12 +183,10 @@ class JobService:
         if self._thread.is_alive():
             self._thread.join(patience)
         for identity in list(self._running):
-            reported = self._reported(identity)
-            if reported is not None:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(reported.process, signal.SIGTERM)
+            with contextlib.suppress(OSError):
+                Mailbox(self._folder(identity)).cancel()  # it may run on another computer, which cannot be ended
         for executor in self._executors.values():
-            executor.shutdown(wait=False, cancel_futures=True)
+            executor.abandon()
         self._executors.clear()
 
     def _folder(self, identity: str) -> Path:
@@ -208,7 +219,7 @@ class JobService:
     def _begin(self) -> bool:
         """Hands waiting jobs to free workers of their lanes. Returns whether any has begun."""
         context = self._context
-        places = {"short": SHORT_LANE_WORKERS, "long": context.at_once}
+        places = {"short": SHORT_LANE_WORKERS, "long": context.at_once, "batch": BATCH_LANE_WORKERS}
         free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
         has_begun = False
         for job in context.jobs.waiting(context.robot):
@@ -235,10 +246,11 @@ class JobService:
     def _handed_over(self, identity: str, lane: Lane, workers: int) -> Future[Ended]:
         """Hands a job to the executor of its lane, or to a new executor if the death of a worker has broken it."""
         for _ in range(2):
-            executor = self._executors.get(lane)
-            if executor is None:
-                executor = self._executors[lane] = self._context.make_executor(workers)
             try:
+                executor = self._executors.get(lane)
+                if executor is None:
+                    url = self._context.executor if lane == "long" else LOCAL
+                    executor = self._executors[lane] = self._context.make_executor(url, workers)
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
                 del self._executors[lane]
@@ -274,6 +286,9 @@ class JobService:
         except BrokenExecutor:
             self._executors.pop(lane, None)
             event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
+        except DaqError as error:  # of the executor: a job returns its own errors
+            self._executors.pop(lane, None)
+            event, reason = Event.LOST, str(error)
         except Exception as error:
             log.exception("job %s", identity)
             event, reason = Event.FAULT, _fault(error)
@@ -293,6 +308,26 @@ class JobService:
                     event, reason = Event.FAULT, _fault(error)
         self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
         (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: writing the end may have to be repeated
+
+    def _found(self, request: JobRequest) -> tuple[str, ...] | None:
+        """Returns the traces that a batch's filter finds; None where there is none. Raises a 422."""
+        if not isinstance(request, BatchRequest) or request.filter is None:
+            return None
+        found = self._context.catalogue.find(request.filter, MOST_OF_A_BATCH + 1)
+        if found and len(found) <= MOST_OF_A_BATCH:
+            return found
+        said = f"more than {MOST_OF_A_BATCH} traces" if found else "no trace"
+        raise ProblemError(422, "batch-size", f"filter: finds {said}", f"a batch has 1 to {MOST_OF_A_BATCH} traces")
+
+    def _folder_to_continue(self, request: JobRequest) -> Path | None:
+        """Returns the folder of the batch that another one continues. Raises a 404, and a 409 if it has not ended."""
+        if not isinstance(request, BatchRequest) or request.continues is None:
+            return None
+        before = self._context.jobs.get(self._context.robot, request.continues)
+        if before.state in ("queued", "running"):
+            line = f"{job_label(before.request.kind, before.submitted)} is {before.state}"
+            raise conflict("job-state", line, "continue it when it has ended")
+        return self._folder(before.id)
 
     def _keep_model(self, identity: str) -> str:
         context = self._context

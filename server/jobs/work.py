@@ -12,17 +12,19 @@ from daq.contracts.machine import Machine
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import (
     MACHINE,
+    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
-    EffectChoice,
     FitRequest,
     JobRequest,
     ValidateRequest,
 )
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.executors.address import LOCAL
 from daq.traces.reader import read_trace
+from server.batches.study import fit_options, with_effects
 from server.jobs.headlines import of_comparison, of_fit, of_validation
-from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
+from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,9 +33,8 @@ if TYPE_CHECKING:
     from model.comparison.compare import Comparison
     from model.machine_model.model import Model
     from model.reports.page import Report
-    from server.jobs.results import ComparisonJobResult, DiagnosisJobResult, FitJobResult, ValidationJobResult
-
-    AnyResult = FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult
+    from server.batches.run import Standing
+    from server.jobs.results import JobResult
 
 CURVE_POINTS = 21
 """Number of points of each curve of a validation."""
@@ -54,6 +55,10 @@ class Task(FrozenRecord):
     """The names of the models, for tables."""
     limits: TraceLimits = DEFAULT_TRACE_LIMITS
     """The limits within which traces are read."""
+    executor: str = LOCAL
+    """The URL of what computes the traces of a batch."""
+    continues: Path | None = None
+    """The folder of the job whose batch this one continues."""
 
 
 @dataclass(frozen=True)
@@ -95,30 +100,23 @@ class _Worker:
                 return self.compare(request)
             case DiagnoseRequest() as request:
                 return self.diagnose(request)
+            case BatchRequest() as request:
+                return self.batch(request)
 
     def fit(self, request: FitRequest) -> Ended:
         """Does the same as `daq fit`."""
         from model.fitting.fit import fit
         from model.fitting.identifiability import undetermined_in_words
-        from model.fitting.options import FitOptions
         from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
         from server.jobs.overlays import overlays
         from server.jobs.results import FitData, FitJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
-        begin = _with_effects(self._model(request.model), request.effects)
-        options = FitOptions(
-            parameters=request.parameters,
-            held=request.held,
-            bounds=request.bounds,
-            use_priors=request.use_priors,
-            method=request.method,
-            starts=request.starts,
-            seed=request.seed,
-            loop=request.loop,
+        begin = with_effects(self._model(request.model), request.effects)
+        found = fit(
+            begin, traces, fit_options(request), lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox
         )
-        found = fit(begin, traces, options, lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox)
         comparison = self._compared(
             [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
         )
@@ -233,6 +231,33 @@ class _Worker:
         report = diagnosis_report(found, comparison)
         return self._done(result, report, headline(found), found.model_after if changed else None)
 
+    def batch(self, request: BatchRequest) -> Ended:
+        """Does the same as `daq batch`."""
+        from daq.executors import open_workers
+        from daq.executors.workers import ending
+        from server.batches.folder import asked_of, opened, take_over
+        from server.batches.run import run_batch
+        from server.batches.study import Common
+        from server.jobs.batch_result import batch_report, batch_result, chosen_files
+        from server.jobs.yielding import begin_worker
+
+        model = self._model(request.model).model_dump_json()
+        common = Common(study=request.study, model=model, machine=self.task.machine, limits=self.task.limits)
+        chosen, place = chosen_files(self.task.traces, self.task.limits), self.mailbox.folder / BATCH
+        if self.task.continues is not None:
+            take_over(self.task.continues / BATCH, place, set(self.task.traces))
+        with opened(place, asked_of(common)) as folder:
+            with ending(open_workers(self.task.executor, begin_worker)) as workers:
+                ended = run_batch(
+                    folder, common, chosen, workers, lambda standing, _row: self._tell_batch(standing), self.mailbox
+                )
+            result = batch_result(self._job, ended, folder)
+        report = batch_report(request.study, result.data, self._name(request.model))
+        return self._done(result, report, f"{ended.before + ended.done} of {ended.total} traces done")
+
+    def _tell_batch(self, standing: Standing) -> None:
+        self._tell(0, REPORT_SHARE, 1 - standing.left / max(1, standing.total), str(standing))
+
     def _compared(
         self,
         models: list[tuple[str, Model]],
@@ -277,7 +302,7 @@ class _Worker:
     def _keep_model(self, model: Model) -> None:
         self.mailbox.write_text(MODEL, model.model_dump_json(indent=1) + "\n")
 
-    def _done(self, result: AnyResult, report: Report, headline: str, model: Model | None = None) -> Ended:
+    def _done(self, result: JobResult, report: Report, headline: str, model: Model | None = None) -> Ended:
         from model.reports.page import html
 
         self.mailbox.tell(REPORT_SHARE, "writing the report", at_once=True)
@@ -288,19 +313,3 @@ class _Worker:
     @property
     def _job(self) -> str:
         return self.mailbox.folder.name
-
-
-def _with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
-    from daq.contracts.errors import SpecError
-    from model.effects.library import effect, library
-
-    for choice in effects:
-        if choice.name not in library():
-            raise SpecError(f"effects: {choice.name!r}: not in the library; it has {', '.join(library())}")
-        found = effect(choice.name)
-        if found.whole_machine:
-            model = model.with_effect(choice.name)
-        else:
-            every = tuple(j for j in model.machine.modelled_joints if not found.joints or j in found.joints)
-            model = model.with_effect(choice.name, choice.joints or every)
-    return model

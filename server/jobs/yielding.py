@@ -1,4 +1,4 @@
-"""Makes a worker process give way to everything else on the computer, and end with the service that started it.
+"""Makes a worker process of the service give way to everything else on the computer.
 
 A nice value alone is not enough. Linux compares nice values only within one session (sched_autogroup): a fit in the
 service's own session uses up that session's share of the cores, and then the service itself waits for up to 0.1 s. In a
@@ -9,14 +9,11 @@ scheduling class SCHED_IDLE makes the process leave a core as soon as anything e
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
-import signal
 import sys
-import threading
-from multiprocessing import parent_process
 from pathlib import Path
 
+from daq.executors.parent import end_with_parent
 from server import logs
 
 NICENESS = 19
@@ -24,8 +21,6 @@ NICENESS = 19
 AUTOGROUP, SESSION_NICENESS = Path("/proc/self/autogroup"), 5
 """Nice value of the session: it has a third of an ordinary session's weight, so that jobs progress even on a computer
 that is always busy."""
-PR_SET_PDEATHSIG = 1
-"""Option of prctl(2): the signal that the kernel sends at the parent's death."""
 
 
 def begin_worker() -> None:
@@ -46,23 +41,3 @@ def give_way() -> None:
             AUTOGROUP.write_text(str(SESSION_NICENESS), "ascii")
         with contextlib.suppress(OSError):  # forbidden in some containers
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-
-
-def end_with_parent() -> None:
-    """Makes this process end at once when its parent ends, for whatever reason."""
-    parent = parent_process()
-    if parent is None:
-        return
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent.pid:  # the parent ended before this call
-            os._exit(1)
-    # Linux sends the signal also when only the thread ends that started this process; other systems send none at all.
-    threading.Thread(target=_wait_for_its_end, name="parent-watch", daemon=True).start()
-
-
-def _wait_for_its_end() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -19,7 +19,6 @@ from daq.contracts.service.jobs import (
     JobKind,
     JobRequest,
     JobState,
-    ValidateRequest,
 )
 from server.experiments.states import Event, IllegalEventError, advance
 from server.problems import conflict, not_found
@@ -34,7 +33,7 @@ _FAILURES: dict[Event, JobFailure] = {
     Event.FAULT: "program-fault",
     Event.LOST: "lost",
 }
-_REQUEST: TypeAdapter[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest] = TypeAdapter(JobRequest)
+_REQUEST: TypeAdapter[JobRequest] = TypeAdapter(JobRequest)
 
 
 def traces_of(request: JobRequest) -> tuple[str, ...]:
@@ -67,16 +66,20 @@ class JobStore:
         by: str,
         key: str | None,
         prepare: Callable[[str], None] = lambda _identity: None,
+        found: Sequence[str] | None = None,
     ) -> tuple[Job, bool]:
         """Queues a new job, and returns it with True; or returns the one that the key made before, with False.
 
         `prepare` is given the number that the job will have, and writes what its worker needs; if it raises, no job is
-        made. Raises a 409 if the key was used for another request, and a 404 if a trace no longer exists.
+        made. `found`: the traces of a batch whose request has a filter. Raises a 409 if the key was used for another
+        request, and a 404 if a trace no longer exists.
         """
         digest = digest_of(request)
         with self._store.writing() as session:
-            if (found := made_before(session, JobRow, robot, key, digest)) is not None:
-                return as_job(found), False
+            if (before := made_before(session, JobRow, robot, key, digest)) is not None:
+                return as_job(before), False
+            if found is not None:
+                request = request.model_copy(update={"traces": tuple(found)})
             row = JobRow(
                 **new_columns(robot, key, digest, now, by),
                 kind=request.kind,

@@ -10,7 +10,8 @@ from sqlalchemy.orm import Session
 from daq.contracts.service.jobs import JobKind
 from server.store.tables import ExperimentRow, JobRow, ModelRow, TraceRow
 
-_JOBS: dict[str, str] = {"fit": "fit", "validate": "validation", "compare": "comparison", "diagnose": "diagnosis"}
+_JOBS: dict[str, str] = {"validate": "validation", "compare": "comparison", "diagnose": "diagnosis"}
+"""What a kind of job is called, where that is not the kind's own name."""
 
 
 def trace_label(name: str | None, kind: str | None, file: str, created: datetime) -> str:

@@ -120,6 +120,10 @@ class TraceStore:
             row = _row(session, robot, identity)
             return _entry(row, _tags(session, [row.id]).get(row.id, ()))
 
+    def found(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
+        """Returns a part of the list, newest first, read anew."""
+        return self._page(robot, search, cursor, limit)
+
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
         query = select(TraceRow).where(TraceRow.robot == robot)

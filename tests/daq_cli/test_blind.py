@@ -18,6 +18,7 @@ from mcap.stream_reader import StreamReader
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
+from daq.executors.workers import ending
 from daq.traces.reader import read_trace
 from daq_cli.trial.campaign import Campaign
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
@@ -29,6 +30,7 @@ from daq_cli.trial.sealed import diagnose_sealed
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model
 from model.trial.arms import compose
+from tests.daq.executors.by_hand import WorkersByHand, WorkersInThreads
 from tests.daq_cli.invoke import CommandLine
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
@@ -45,8 +47,8 @@ def short(name: str) -> ExperimentSpec:
     )
 
 
-def trial(path: Path, acquire: bool = False, shard: str = "", until: Any = "score") -> Campaign:
-    folder = TrialFolder.open(path, "ramp", acquire, None, shard)
+def trial(path: Path, acquire: bool = False, until: Any = "score") -> Campaign:
+    folder = TrialFolder.open(path, "ramp", acquire, None)
     return Campaign(folder, MACHINE, FAKE, until, experiment=short)
 
 
@@ -58,7 +60,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
         patch.setenv("DAQ_RUNTIME_FOLDER", str(path / "run"))
         made = trial(path, acquire=True)
         said: list[str] = []
-        made.run(SECRETS, 2, lambda _number, line: said.append(line))
+        with ending(WorkersInThreads(2)) as workers:
+            made.run(SECRETS, workers, lambda _number, line: said.append(line))
     assert [line.partition(": ")[2] for line in said] == ["done", "done"]
     return made
 
@@ -187,15 +190,15 @@ def test_without_acquire_no_experiment_may_be_asked_for(done: Campaign, tmp_path
 def test_a_resumed_trial_repeats_no_stage(done: Campaign) -> None:
     before = {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES}
     again = trial(done.folder.path, acquire=True)
-    again.run(SECRETS, 1, lambda _number, _said: None)
+    again.run(SECRETS, WorkersByHand(), lambda _number, _said: None)
     assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
 
 
 def test_a_trial_can_be_resumed_from_its_lines_in_another_folder(done: Campaign, tmp_path: Path) -> None:
     for name in ("trial.json", *(f"{stage}.jsonl" for stage in STAGES)):
         (tmp_path / name).write_bytes((done.folder.path / name).read_bytes())
-    again = Campaign(TrialFolder.open(tmp_path, "ramp", True, None, ""), MACHINE, ("/no/diagnoser",))
-    assert again.run(SECRETS, 1, lambda _number, _said: None) == 0
+    again = Campaign(TrialFolder.open(tmp_path, "ramp", True, None), MACHINE, ("/no/diagnoser",))
+    assert again.run(SECRETS, WorkersByHand(), lambda _number, _said: None) == 0
     assert again.table() == done.table()
     assert not list((tmp_path / "traces").iterdir())
 
@@ -220,7 +223,7 @@ def test_the_order_of_cases_reveals_nothing(done: Campaign) -> None:
 
 def test_a_folder_of_another_trial_is_refused(done: Campaign) -> None:
     with pytest.raises(SpecError, match="holds a trial of other options"):
-        TrialFolder.open(done.folder.path, "diagnostic", False, None, "")
+        TrialFolder.open(done.folder.path, "diagnostic", False, None)
 
 
 def test_a_stage_whose_line_was_cut_short_is_repeated(tmp_path: Path) -> None:
@@ -234,13 +237,22 @@ def test_a_stage_whose_line_was_cut_short_is_repeated(tmp_path: Path) -> None:
     assert [row["seed"] for row in trial(tmp_path).folder.rows("detect")] == [110, 120]
 
 
-def test_shards_write_their_own_lines_and_read_all(tmp_path: Path) -> None:
-    first, second = (trial(tmp_path, shard=f"-{k}of2").folder for k in (1, 2))
-    assert first.asked == second.asked
-    first.add("detect", {"seed": 110})
-    second.add("detect", {"seed": 120})
-    first.reload()
-    assert {row["seed"] for row in first.rows("detect")} == {110, 120}
+def test_lines_that_several_processes_of_an_older_version_wrote_are_read(tmp_path: Path) -> None:
+    trial(tmp_path).folder.add("detect", {"seed": 110})
+    (tmp_path / "detect-2of2.jsonl").write_text('{"seed": 120}\n', "utf-8")
+    assert {row["seed"] for row in trial(tmp_path).folder.rows("detect")} == {110, 120}
+
+
+def test_a_case_whose_process_is_killed_is_not_done_and_the_others_are(done: Campaign, tmp_path: Path) -> None:
+    copy = trial(tmp_path, until="record")
+    for seed in SECRETS:
+        copy.folder.add("detect", rows(done, "detect")[seed])
+    copy.recorder = lambda _seed, name, *_: Recorded(tmp_path / f"{name}.mcap", "complete", "", 8.0)
+    said: list[str] = []
+    workers = WorkersByHand(dies=lambda task, _time: task.seed == SECRETS[0])
+    assert copy.run(SECRETS, workers, lambda _number, line: said.append(line)) == 1
+    assert [row["seed"] for row in copy.folder.rows("record")] == [SECRETS[1]]
+    assert sorted(line.partition(": ")[2] for line in said) == ["done", "killed"]
 
 
 def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaign) -> None:
@@ -269,7 +281,7 @@ def test_set_points_of_the_detection_are_those_that_a_run_sends(tmp_path: Path) 
         (("--seeds", "9:1"), "write FIRST:LAST"),
         (("--seeds", "1:2", "--kinds", "dirty"), "kind 'dirty': allowed are clean"),
         (("--seeds", "1:2", "--loads", "none"), "load 'none': allowed are nominal"),
-        (("--seeds", "1:2", "--shard", "3/2"), "write I/K"),
+        (("--seeds", "1:2", "--executor", "3/2"), "write local://4"),
         ((), "--seeds or --registration"),
         (("--registration", "nowhere.toml"), "nowhere.toml: cannot be read"),
     ],
@@ -296,7 +308,7 @@ STAGE_MODULES = (
     "server.jobs.next_experiment",
     "mock_controller",
 )
-AROUND = ("daq_cli", "daq.client", "daq.config")
+AROUND = ("daq_cli", "daq.client", "daq.config", "daq.executors")
 """What only the command line around a trial uses, which decides nothing."""
 
 

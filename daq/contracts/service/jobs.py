@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool
+from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool, model_validator
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.service.base import Wire
+from daq.contracts.service.base import Moment, Wire
+from daq.contracts.service.traces import Source, Tag
+from daq.contracts.trace import Outcome
 
-JobKind = Literal["fit", "validate", "compare", "diagnose"]
+JobKind = Literal["fit", "validate", "compare", "diagnose", "batch"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
 """The same states as those of experiments; an interrupted job is not run again by itself either."""
 
@@ -34,15 +36,11 @@ class EffectChoice(Wire):
     joints: tuple[JointNumber, ...] = ()
 
 
-class FitRequest(Wire):
-    """Estimates the parameters with which a model best reproduces traces. The fields are the options of `daq fit`."""
+class FitStudy(Wire):
+    """How parameters are estimated with which a model best reproduces traces. The fields are the options of
+    `daq fit`."""
 
     kind: Literal["fit"] = "fit"
-    traces: TraceNumbers
-    held_out: tuple[TraceNumber, ...] = ()
-    """Traces that are held out: the model is checked on them and not fitted to them."""
-    model: ModelNumber = MACHINE
-    """The model to start from."""
     effects: tuple[EffectChoice, ...] = ()
     """Effects to add to the model before fitting."""
     parameters: tuple[Pattern, ...] | None = None
@@ -54,20 +52,57 @@ class FitRequest(Wire):
     starts: Annotated[int, Field(ge=1, le=20)] = 1
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     loop: Literal["closed", "open"] | None = None
+
+
+class ValidateStudy(Wire):
+    """How a model is validated against traces. The fields are the options of `daq validate`."""
+
+    kind: Literal["validate"] = "validate"
+    parameters: tuple[Pattern, ...] | None = None
+    joints: tuple[JointNumber, ...] | None = None
+    damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
+
+
+class SimulateStudy(Wire):
+    """How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`."""
+
+    kind: Literal["simulate"] = "simulate"
+    loop: Literal["closed", "open"] = "closed"
+    quantise: StrictBool = True
+    """Whether readings and drive are rounded, as those of a real board."""
+
+
+class DiagnoseStudy(Wire):
+    """How a missing effect is looked for. The fields are the options of `daq diagnose`."""
+
+    kind: Literal["diagnose"] = "diagnose"
+    effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
+    """Candidate effects; None for all known ones."""
+    joints: tuple[JointNumber, ...] | None = None
+    most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+
+
+Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]
+"""What a batch does with each of its traces."""
+
+
+class FitRequest(FitStudy):
+    """Estimates the parameters with which a model best reproduces traces."""
+
+    traces: TraceNumbers
+    held_out: tuple[TraceNumber, ...] = ()
+    """Traces that are held out: the model is checked on them and not fitted to them."""
+    model: ModelNumber = MACHINE
+    """The model to start from."""
     name: ModelName | None = None
     """Name of the resulting model."""
 
 
-class ValidateRequest(Wire):
-    """Validates a model against traces: which parameters would have to change, and when. The fields are the options of
-    `daq validate`."""
+class ValidateRequest(ValidateStudy):
+    """Validates a model against traces: which parameters would have to change, and when."""
 
-    kind: Literal["validate"] = "validate"
     traces: TraceNumbers
     model: ModelNumber
-    parameters: tuple[Pattern, ...] | None = None
-    joints: tuple[JointNumber, ...] | None = None
-    damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
 
 
 class CompareRequest(Wire):
@@ -78,24 +113,55 @@ class CompareRequest(Wire):
     models: Annotated[tuple[ModelNumber, ...], Field(min_length=1, max_length=10)]
 
 
-class DiagnoseRequest(Wire):
+class DiagnoseRequest(DiagnoseStudy):
     """Finds where a model and traces disagree, which effect is missing, and what adding it improves, as `daq diagnose`
     does."""
 
-    kind: Literal["diagnose"] = "diagnose"
     traces: TraceNumbers
     held_out: tuple[TraceNumber, ...] = ()
     model: ModelNumber = MACHINE
-    effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
-    """Candidate effects; None for all known ones."""
-    joints: tuple[JointNumber, ...] | None = None
-    most_steps: Annotated[int, Field(ge=1, le=10)] = 3
     design: bool = False
     """Whether the next experiment may be a motion that is designed for the candidates; it takes longer."""
     name: ModelName | None = None
 
 
-JobRequest = Annotated[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")]
+class TraceFilter(Wire):
+    """Traces of the catalogue by what is known of them, as the parameters of its list; None does not filter. `text` is
+    searched in number, file, name, kind, operator, notes and tags."""
+
+    text: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    tag: Tag | None = None
+    source: Source | None = None
+    outcome: Outcome | None = None
+    kind: Annotated[str, Field(min_length=1, max_length=32)] | None = None
+    since: Moment | None = None
+    until: Moment | None = None
+
+
+class BatchRequest(Wire):
+    """Studies many traces, each by itself: a table with a row for each is the result. A trace that cannot be studied
+    has its problem in its row, and keeps no other from being studied."""
+
+    kind: Literal["batch"] = "batch"
+    study: Study
+    traces: Annotated[tuple[TraceNumber, ...], Field(max_length=2000)] = ()
+    """The traces; a job whose request had a filter instead has those that were found when it was submitted."""
+    filter: TraceFilter | None = None
+    """Finds the traces in the catalogue, 2000 at most."""
+    model: ModelNumber = MACHINE
+    continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] | None = None
+    """An ended batch of the same study and model: what it has done is not done again."""
+
+    @model_validator(mode="after")
+    def _has_traces(self) -> Self:
+        if not self.traces and self.filter is None:
+            raise ValueError("name traces, or a filter that finds them")
+        return self
+
+
+JobRequest = Annotated[
+    FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest | BatchRequest, Field(discriminator="kind")
+]
 
 
 class KnownEffect(Wire):
@@ -150,7 +216,7 @@ class Job(Wire):
     has_report: bool = False
     waits_behind: WaitsBehind | None = None
     """What it waits for while it is queued behind others. Short jobs (comparisons and validations of few traces) have a
-    worker of their own, and never wait for a fit or a diagnosis."""
+    worker of their own, and never wait for a fit or a diagnosis. Batches wait for batches alone."""
 
 
 class ModelEntry(Wire):

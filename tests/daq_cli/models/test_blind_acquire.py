@@ -23,6 +23,7 @@ from model.discrepancy.options import DiagnosisOptions
 from model.machine_model.model import base_model
 from model.machine_model.model_file import save_model
 from model.trial.arms import compose
+from tests.daq.executors.by_hand import WorkersByHand
 
 MACHINE = load_machine("ma2000")
 SOUND = compose(7654321, "clean", "nominal")
@@ -126,10 +127,10 @@ def test_a_trial_runs_the_experiment_that_its_diagnosis_asks_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DAQ_RUNTIME_FOLDER", str(tmp_path / "run"))
-    folder = TrialFolder.open(tmp_path / "trial", "ramp", True, None, "")
+    folder = TrialFolder.open(tmp_path / "trial", "ramp", True, None)
     folder.add("detect", {"seed": SOUND, "d_prime": 0.0, "effects": [], "load_kg": None})
     said: list[str] = []
-    Campaign(folder, MACHINE, until="diagnose").run([SOUND], 1, lambda _number, line: said.append(line))
+    Campaign(folder, MACHINE, until="diagnose").run([SOUND], WorkersByHand(), lambda _number, line: said.append(line))
     assert [line.partition(": ")[2] for line in said] == ["done"]
     row = folder.row("diagnose", SOUND)
     assert row is not None

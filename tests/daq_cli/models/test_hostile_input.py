@@ -46,7 +46,7 @@ def test_a_hostile_file_is_refused_in_one_line(daq: CommandLine, words: str, kin
         "fit good.csv --machine single.toml -o out.json --starts={}",
         "validate single.toml good.csv --joint={}",
         "fit good.csv --machine single.toml -o out.json --bound=link1.mass={}:{}",
-        "blind --folder t --seeds=1 --shard={}",
+        "blind --folder t --seeds=1 --executor={}",
         "blind --folder t --seeds=1 --cases={}",
     ],
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,9 +12,20 @@ from typing import Any
 import pytest
 from sqlalchemy.exc import OperationalError
 
+from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
-from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
+from daq.contracts.service.jobs import (
+    BatchRequest,
+    CompareRequest,
+    DiagnoseRequest,
+    FitRequest,
+    Job,
+    JobRequest,
+    SimulateStudy,
+    TraceFilter,
+)
 from daq.contracts.trace_limits import TraceLimits
+from daq.executors import Workers
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
@@ -40,7 +51,7 @@ TRACE = f"{1:012x}"
 COMPARE = CompareRequest(traces=(TRACE,), models=("machine",))
 
 
-class HandExecutor(Executor):
+class HandExecutor(Workers):
     """Does what it is given as `carry_out` of a test does, at once; `given` are the jobs that it was given."""
 
     def __init__(self, carry_out: Callable[[Path], Ended]) -> None:
@@ -54,6 +65,10 @@ class HandExecutor(Executor):
         future: Future[Any] = Future()
         future.set_result(self._carry_out(folder))
         return future
+
+    def count(self) -> int:
+        """As an executor's."""
+        return 1
 
 
 class Bench:
@@ -75,7 +90,7 @@ class Bench:
         self.models: Any = Meanwhile(models)
         self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")
         self.executor = HandExecutor(self._carry_out)
-        self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
+        self.make_executor: Callable[[str, int], Workers] = lambda _url, _count: self.executor
         self.changed = threading.Condition()
         self.told: list[Job] = []
         self.service = JobService(
@@ -96,8 +111,8 @@ class Bench:
     def _carry_out(self, folder: Path) -> Ended:
         return self.carry_out(folder)  # as it is then
 
-    def _make_executor(self, count: int) -> Executor:
-        return self.make_executor(count)
+    def _make_executor(self, url: str, count: int) -> Workers:
+        return self.make_executor(url, count)
 
     def _hear(self, job: Job) -> None:
         with self.changed:
@@ -198,7 +213,7 @@ def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> N
             raise BrokenExecutor
 
     executors = [Broken(lambda _folder: Ended()), bench.executor]
-    bench.make_executor = lambda _count: executors.pop(0)
+    bench.make_executor = lambda _url, _count: executors.pop(0)
     job = _submitted(bench)
     bench.service.start()
     assert bench.end_of(job).state == "done"
@@ -311,7 +326,7 @@ def _until(bench: Bench, is_so: Callable[[], bool]) -> None:
 
 def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what(bench: Bench) -> None:
     held = HeldExecutor()
-    bench.make_executor = lambda _count: held
+    bench.make_executor = lambda _url, _count: held
     diagnosis = _asked(bench, DiagnoseRequest(traces=(TRACE,)))
     fit, other_fit = _asked(bench, FitRequest(traces=(TRACE,))), _asked(bench, FitRequest(traces=(TRACE,)))
     short, next_short = _asked(bench, COMPARE), _asked(bench, COMPARE)
@@ -342,7 +357,7 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
     executors = [HeldExecutor(), HeldExecutor(), HeldExecutor()]
     made: list[HeldExecutor] = []
 
-    def make_executor(_count: int) -> Executor:
+    def make_executor(_url: str, _count: int) -> Workers:
         made.append(executors[len(made)])
         return made[-1]
 
@@ -381,3 +396,44 @@ def test_a_model_made_to_do_harm_is_refused_in_one_line(bench: Bench, text: byte
     with pytest.raises(ProblemError, match=r"^[^\n]{1,300}$") as refused:
         bench.models.take_in_text(text, "x", "anna")
     assert (refused.value.status, refused.value.kind) == (422, "not-a-model")
+
+
+def test_a_batch_has_the_traces_that_its_filter_finds_when_it_is_submitted(bench: Bench) -> None:
+    request = BatchRequest(study=SimulateStudy(), filter=TraceFilter())
+    job, _new = bench.service.submit(request, "anna", "key")
+    assert isinstance(job.request, BatchRequest)
+    assert job.request.traces == (TRACE,)
+    assert lane_of(job.request) == "batch"
+    task = Mailbox(bench.folder / job.id).read("request.json")
+    assert (list(task["traces"]), task["executor"], task["continues"]) == ([TRACE], "local://1", None)
+    assert bench.service.submit(request, "anna", "key") == (job, False)
+    for nothing in (TraceFilter(text="nothing is called so"), TraceFilter(kind="sweep")):
+        with pytest.raises(ProblemError) as refused:
+            bench.service.submit(request.model_copy(update={"filter": nothing}), "anna", None)
+        assert (refused.value.status, refused.value.kind) == (422, "batch-size")
+
+
+def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench) -> None:
+    request = BatchRequest(study=SimulateStudy(), traces=(TRACE,))
+    first, _new = bench.service.submit(request, "anna", None)
+    further = request.model_copy(update={"continues": first.id})
+    with pytest.raises(ProblemError) as refused:
+        bench.service.submit(further, "anna", None)
+    assert (refused.value.status, refused.value.kind) == (409, "job-state")
+    bench.service.cancel(first.id, "anna")
+    second, _new = bench.service.submit(further, "anna", None)
+    assert Mailbox(bench.folder / second.id).read("request.json")["continues"] == str(bench.folder / first.id)
+
+
+def test_an_executor_that_is_not_reached_is_the_reason_of_a_job(bench: Bench) -> None:
+    def unreachable(url: str, _count: int) -> Workers:
+        asked.append(url)
+        raise ReachError("executor dask://host:8786: no scheduler answers")
+
+    asked: list[str] = []
+    bench.make_executor = unreachable
+    job, _new = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)
+    bench.service.start()
+    ended = bench.end_of(job)
+    assert (ended.state, ended.failure, asked) == ("interrupted", "lost", ["local://"])
+    assert ended.reason == "executor dask://host:8786: no scheduler answers"

@@ -1021,6 +1021,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/jobs/{job}/table.csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Batch Table
+         * @description Returns the table of a batch, a row for each trace, as CSV.
+         */
+        get: operations["get_batch_table"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/jobs/{job}/table.parquet": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Batch Parquet
+         * @description Returns the table of a batch as Parquet; 404 where the service has no `pyarrow` to write it.
+         */
+        get: operations["get_batch_parquet"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/models": {
         parameters: {
             query?: never;
@@ -1356,6 +1396,71 @@ export interface components {
              * @default 60
              */
             longest?: number;
+        };
+        /**
+         * BatchData
+         * @description How a batch ended. What it found is in its table (`table.csv`, `table.parquet`).
+         */
+        BatchData: {
+            /** Done */
+            done: number;
+            /** Failed */
+            failed: number;
+            /** Traces */
+            traces: components["schemas"]["BatchTrace"][];
+        };
+        /**
+         * BatchJobResult
+         * @description Result of a batch.
+         */
+        BatchJobResult: {
+            /** Id */
+            id: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "batch";
+            data: components["schemas"]["BatchData"];
+        };
+        /**
+         * BatchRequest
+         * @description Studies many traces, each by itself: a table with a row for each is the result. A trace that cannot be studied
+         *     has its problem in its row, and keeps no other from being studied.
+         */
+        BatchRequest: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "batch";
+            /** Study */
+            study: components["schemas"]["FitStudy"] | components["schemas"]["ValidateStudy"] | components["schemas"]["SimulateStudy"] | components["schemas"]["DiagnoseStudy"];
+            /**
+             * Traces
+             * @default []
+             */
+            traces?: string[];
+            filter?: components["schemas"]["TraceFilter"] | null;
+            /**
+             * Model
+             * @default machine
+             */
+            model?: string;
+            /** Continues */
+            continues?: string | null;
+        };
+        /**
+         * BatchTrace
+         * @description One trace of a batch. `problem` says why nothing was found; empty if it is done. `seconds`: computing time.
+         */
+        BatchTrace: {
+            /** Trace */
+            trace: string;
+            /** Problem */
+            problem: string;
+            /** Seconds */
+            seconds: number;
         };
         /**
          * BoardPid
@@ -1723,6 +1828,15 @@ export interface components {
              * @enum {string}
              */
             kind: "diagnose";
+            /** Effects */
+            effects?: string[] | null;
+            /** Joints */
+            joints?: number[] | null;
+            /**
+             * Most Steps
+             * @default 3
+             */
+            most_steps?: number;
             /** Traces */
             traces: string[];
             /**
@@ -1735,6 +1849,24 @@ export interface components {
              * @default machine
              */
             model?: string;
+            /**
+             * Design
+             * @default false
+             */
+            design?: boolean;
+            /** Name */
+            name?: string | null;
+        };
+        /**
+         * DiagnoseStudy
+         * @description How a missing effect is looked for. The fields are the options of `daq diagnose`.
+         */
+        DiagnoseStudy: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "diagnose";
             /** Effects */
             effects?: string[] | null;
             /** Joints */
@@ -1744,13 +1876,6 @@ export interface components {
              * @default 3
              */
             most_steps?: number;
-            /**
-             * Design
-             * @default false
-             */
-            design?: boolean;
-            /** Name */
-            name?: string | null;
         };
         /**
          * DiagnosisData
@@ -2470,7 +2595,7 @@ export interface components {
         };
         /**
          * FitRequest
-         * @description Estimates the parameters with which a model best reproduces traces. The fields are the options of `daq fit`.
+         * @description Estimates the parameters with which a model best reproduces traces.
          */
         FitRequest: {
             /**
@@ -2478,18 +2603,6 @@ export interface components {
              * @enum {string}
              */
             kind: "fit";
-            /** Traces */
-            traces: string[];
-            /**
-             * Held Out
-             * @default []
-             */
-            held_out?: string[];
-            /**
-             * Model
-             * @default machine
-             */
-            model?: string;
             /**
              * Effects
              * @default []
@@ -2532,8 +2645,74 @@ export interface components {
             seed?: number;
             /** Loop */
             loop?: ("closed" | "open") | null;
+            /** Traces */
+            traces: string[];
+            /**
+             * Held Out
+             * @default []
+             */
+            held_out?: string[];
+            /**
+             * Model
+             * @default machine
+             */
+            model?: string;
             /** Name */
             name?: string | null;
+        };
+        /**
+         * FitStudy
+         * @description How parameters are estimated with which a model best reproduces traces. The fields are the options of
+         *     `daq fit`.
+         */
+        FitStudy: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "fit";
+            /**
+             * Effects
+             * @default []
+             */
+            effects?: components["schemas"]["EffectChoice"][];
+            /** Parameters */
+            parameters?: string[] | null;
+            /**
+             * Held
+             * @default []
+             */
+            held?: string[];
+            /** Bounds */
+            bounds?: {
+                [key: string]: [
+                    number | null,
+                    number | null
+                ];
+            };
+            /**
+             * Use Priors
+             * @default true
+             */
+            use_priors?: boolean;
+            /**
+             * Method
+             * @default least_squares
+             * @enum {string}
+             */
+            method?: "least_squares" | "nelder_mead";
+            /**
+             * Starts
+             * @default 1
+             */
+            starts?: number;
+            /**
+             * Seed
+             * @default 0
+             */
+            seed?: number;
+            /** Loop */
+            loop?: ("closed" | "open") | null;
         };
         /**
          * FittedParameter
@@ -2813,7 +2992,7 @@ export interface components {
             /** Robot */
             robot: string;
             /** Request */
-            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
+            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"] | components["schemas"]["BatchRequest"];
             /**
              * State
              * @enum {string}
@@ -4844,6 +5023,28 @@ export interface components {
             floor: number;
         };
         /**
+         * SimulateStudy
+         * @description How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`.
+         */
+        SimulateStudy: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "simulate";
+            /**
+             * Loop
+             * @default closed
+             * @enum {string}
+             */
+            loop?: "closed" | "open";
+            /**
+             * Quantise
+             * @default true
+             */
+            quantise?: boolean;
+        };
+        /**
          * Sine
          * @description `cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it.
          */
@@ -5258,6 +5459,27 @@ export interface components {
             joint?: number | null;
         };
         /**
+         * TraceFilter
+         * @description Traces of the catalogue by what is known of them, as the parameters of its list; None does not filter. `text` is
+         *     searched in number, file, name, kind, operator, notes and tags.
+         */
+        TraceFilter: {
+            /** Text */
+            text?: string | null;
+            /** Tag */
+            tag?: string | null;
+            /** Source */
+            source?: ("mock" | "real" | "imported") | null;
+            /** Outcome */
+            outcome?: ("complete" | "stopped" | "fault" | "interrupted") | null;
+            /** Kind */
+            kind?: string | null;
+            /** Since */
+            since?: string | null;
+            /** Until */
+            until?: string | null;
+        };
+        /**
          * TraceRecord
          * @description What a trace says about itself: the metadata record at the start of the file, and at its end the outcome.
          */
@@ -5405,8 +5627,7 @@ export interface components {
         };
         /**
          * ValidateRequest
-         * @description Validates a model against traces: which parameters would have to change, and when. The fields are the options of
-         *     `daq validate`.
+         * @description Validates a model against traces: which parameters would have to change, and when.
          */
         ValidateRequest: {
             /**
@@ -5414,10 +5635,30 @@ export interface components {
              * @enum {string}
              */
             kind: "validate";
+            /** Parameters */
+            parameters?: string[] | null;
+            /** Joints */
+            joints?: number[] | null;
+            /**
+             * Damping Ratio
+             * @default 0.5
+             */
+            damping_ratio?: number;
             /** Traces */
             traces: string[];
             /** Model */
             model: string;
+        };
+        /**
+         * ValidateStudy
+         * @description How a model is validated against traces. The fields are the options of `daq validate`.
+         */
+        ValidateStudy: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "validate";
             /** Parameters */
             parameters?: string[] | null;
             /** Joints */
@@ -5534,7 +5775,7 @@ export interface components {
             /** Job */
             job: string;
             /** Request */
-            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
+            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"] | components["schemas"]["BatchRequest"];
             /** Started */
             started: string | null;
             /** Others */
@@ -7097,7 +7338,7 @@ export interface operations {
         parameters: {
             query?: {
                 state?: ("queued" | "running" | "done" | "failed" | "cancelled" | "interrupted")[] | null;
-                kind?: ("fit" | "validate" | "compare" | "diagnose") | null;
+                kind?: ("fit" | "validate" | "compare" | "diagnose" | "batch") | null;
                 model?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
@@ -7139,7 +7380,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
+                "application/json": components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"] | components["schemas"]["BatchRequest"];
             };
         };
         responses: {
@@ -7255,7 +7496,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["FitJobResult"] | components["schemas"]["ValidationJobResult"] | components["schemas"]["ComparisonJobResult"] | components["schemas"]["DiagnosisJobResult"];
+                    "application/json": components["schemas"]["FitJobResult"] | components["schemas"]["ValidationJobResult"] | components["schemas"]["ComparisonJobResult"] | components["schemas"]["DiagnosisJobResult"] | components["schemas"]["BatchJobResult"];
                 };
             };
         };
@@ -7280,6 +7521,54 @@ export interface operations {
                 };
                 content: {
                     "text/html": unknown;
+                };
+            };
+        };
+    };
+    get_batch_table: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/csv": unknown;
+                };
+            };
+        };
+    };
+    get_batch_parquet: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/vnd.apache.parquet": unknown;
                 };
             };
         };

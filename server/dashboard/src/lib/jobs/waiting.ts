@@ -10,6 +10,7 @@ const NOUNS: Readonly<Record<JobKind, string>> = {
   validate: 'validation',
   compare: 'simulation',
   diagnose: 'diagnosis',
+  batch: 'batch',
 };
 
 /** Traces that are called by name; of more, how many. */

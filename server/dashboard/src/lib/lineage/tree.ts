@@ -125,6 +125,7 @@ export const JOB_NAMES: Record<Job['request']['kind'], string> = {
   validate: 'Validation',
   compare: 'Comparison',
   diagnose: 'Diagnosis',
+  batch: 'Batch',
 };
 
 /** The lines that are shown: children of what is closed are not. */

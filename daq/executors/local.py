@@ -1,0 +1,67 @@
+"""Worker processes of this computer, which end with the process that started them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from typing import Any
+
+from daq.executors.parent import end_with_parent
+from daq.executors.workers import Workers
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class LocalWorkers(Workers):
+    """Processes that are spawned, not forked, because the process that starts them may have threads.
+
+    When one of them dies, what all of them compute is lost, and the next job starts new ones.
+    """
+
+    def __init__(self, count: int, initializer: Callable[[], None] | None = None) -> None:
+        self._count = count
+        self._initializer = initializer or begin_worker
+        self._lock = threading.Lock()
+        self._pool = self._new_pool()
+
+    def _new_pool(self) -> ProcessPoolExecutor:
+        context = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(self._count, mp_context=context, initializer=self._initializer)
+
+    def count(self) -> int:
+        """The number of processes."""
+        return self._count
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
+        """As any executor does."""
+        with self._lock:
+            try:
+                return self._pool.submit(function, *args, **named)
+            except BrokenExecutor:
+                self._pool.shutdown(wait=False)
+                self._pool = self._new_pool()
+                return self._pool.submit(function, *args, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """As any executor does."""
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def abandon(self) -> None:
+        """Kills the processes."""
+        # Python 3.14 has kill_workers() for this.
+        for process in list((self._pool._processes or {}).values()):
+            process.kill()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def begin_worker() -> None:
+    """Sets up a worker process: it ends with its parent, and silently at Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    end_with_parent()

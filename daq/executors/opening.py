@@ -1,0 +1,46 @@
+"""Opens the executor of a URL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+
+from daq.contracts.errors import SpecError
+from daq.executors.address import Address, parse_address
+from daq.executors.local import LocalWorkers, cores
+from daq.executors.workers import Workers
+
+NEEDED = {"dask": "distributed", "dask+tls": "distributed", "slurm": "dask_jobqueue"}
+"""The module without which an executor cannot be opened."""
+
+
+def open_workers(url: str, initializer: Callable[[], None] | None = None) -> Workers:
+    """Opens the executor of a URL (docs/batches.md).
+
+    Args:
+        initializer: what a process of this computer does first, in place of `begin_worker`; other workers are set up
+            by whoever starts them.
+
+    Raises SpecError for a URL of no executor or a missing package; ReachError for a scheduler that does not answer;
+    OtherVersionError.
+    """
+    address = parse_address(url)
+    if address.kind == "local":
+        return LocalWorkers(address.workers or cores(), initializer)
+    require_installed(address)
+    if address.kind == "slurm":
+        from daq.executors.slurm import slurm_workers
+
+        return slurm_workers(address)
+    from daq.executors.dask import dask_workers
+
+    return dask_workers(address)
+
+
+def require_installed(address: Address) -> None:
+    """Raises SpecError, which says what to install, where the executor's package is missing."""
+    module = NEEDED.get(address.kind)
+    if module is not None and find_spec(module) is None:
+        raise SpecError(
+            f"executor {address.url}: needs Dask: `pip install 'ma2000-daq[cluster]'` where daq is installed"
+        )

@@ -1,0 +1,220 @@
+"""The folder of a batch: what was asked, a line for each trace that is done, whole answers, and the tables."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from daq.contracts import exit_codes
+from daq.contracts.documents import parse_json, read_text
+from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.frozen import FrozenRecord
+from daq.contracts.service.jobs import Study
+from daq.executors.program import program_here
+from firmware_protocol.invalid import first_invalid
+from server.batches.columns import Columns
+from server.batches.study import Answer, Common
+from server.batches.table import write_csv, write_parquet
+
+ASKED, ROWS, ANSWERS, CSV, PARQUET = "batch.json", "rows.jsonl", "answers", "table.csv", "table.parquet"
+_HIDDEN_LOCK = ".lock"
+
+
+class BatchInUseError(DaqError):
+    """Another program computes into this folder."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+class Asked(FrozenRecord):
+    """What all rows of the table share, and what a batch must ask again to go on. `model` and `effects` are hashes."""
+
+    format: int = 1
+    software: str
+    study: Study
+    model: str | None
+    effects: tuple[str, ...]
+
+
+class Row(FrozenRecord):
+    """One trace of the table. `about`: what is known of the trace itself."""
+
+    key: str
+    problem: str
+    seconds: float
+    worker: str
+    about: Columns
+    columns: Columns
+
+    @property
+    def cells(self) -> Columns:
+        """The row of the table."""
+        ended: Columns = {"state": "failed" if self.problem else "done", "problem": self.problem or None}
+        return {"trace": self.key, **self.about, **ended, "seconds": round(self.seconds, 3), **self.columns}
+
+
+class BatchFolder:
+    """One batch. A trace has one row at most, the one that was written last."""
+
+    def __init__(self, path: Path, rows: dict[str, Row]) -> None:
+        self.path = path
+        self._rows = rows
+
+    @property
+    def rows(self) -> list[Row]:
+        """The rows, in the order of their keys."""
+        return [self._rows[key] for key in sorted(self._rows)]
+
+    def is_done(self, key: str) -> bool:
+        """Whether a trace was studied with success."""
+        row = self._rows.get(key)
+        return row is not None and not row.problem
+
+    def add(self, answer: Answer, about: Columns) -> Row:
+        """Keeps the answer about a trace, and waits until it is on the disk. Raises SpecError."""
+        row = Row(
+            key=answer.key,
+            problem=answer.problem,
+            seconds=answer.seconds,
+            worker=answer.worker,
+            about=about,
+            columns=answer.columns,
+        )
+        try:
+            if answer.text:
+                file = self.answer_file(answer.key)
+                part = file.with_name(f".{file.name}.part")
+                part.write_text(answer.text + "\n", "utf-8")
+                part.replace(file)
+            with (self.path / ROWS).open("a", encoding="utf-8") as lines:
+                lines.write(row.model_dump_json() + "\n")
+                lines.flush()
+                os.fsync(lines.fileno())
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+        self._rows[answer.key] = row
+        return row
+
+    def answer_file(self, key: str) -> Path:
+        """The file of the whole answer about a trace."""
+        return self.path / ANSWERS / f"{key}.json"
+
+    def write_tables(self) -> tuple[Path, Path | None]:
+        """Writes the tables anew. Returns their files; None for Parquet where `pyarrow` is not installed."""
+        cells = [row.cells for row in self.rows]
+        try:
+            return write_csv(cells, self.path / CSV), write_parquet(cells, self.path / PARQUET)
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+
+
+def asked_of(common: Common) -> Asked:
+    """What a batch asks."""
+    return Asked(
+        software=str(program_here()),
+        study=common.study,
+        model=None if common.model is None else _digest(common.model),
+        effects=tuple(_digest(read_text(file, f"effect file {file}")) for file in common.effect_files),
+    )
+
+
+@contextmanager
+def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
+    """The folder, made when it is new, for this program alone within the block.
+
+    Raises SpecError when it holds another batch or cannot be written; BatchInUseError.
+    """
+    try:
+        (path / ANSWERS).mkdir(parents=True, exist_ok=True)
+        lock = (path / _HIDDEN_LOCK).open("ab")
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BatchInUseError(f"{path}: another batch computes into it; wait until it has ended") from None
+        _require_same(path / ASKED, asked)
+        yield BatchFolder(path, _read_rows(path / ROWS))
+
+
+def _require_same(file: Path, asked: Asked) -> None:
+    if not file.exists():
+        try:
+            part = file.with_suffix(".part")
+            part.write_text(asked.model_dump_json(indent=1) + "\n", "utf-8")
+            part.replace(file)
+        except OSError as error:
+            raise _unwritable(file.parent, error) from error
+        return
+    try:
+        before = Asked.model_validate(parse_json(read_text(file, str(file)), str(file)))
+    except ValidationError as error:
+        raise SpecError(f"{file}: not a batch's: {first_invalid(error).message}") from error
+    for name in Asked.model_fields:
+        if getattr(before, name) != getattr(asked, name):
+            raise SpecError(f"{file.parent}: holds a batch with another {_WORDS[name]}; take another folder")
+
+
+_WORDS = {
+    "format": "format of its files",
+    "software": "version of this program",
+    "study": "study, or other options",
+    "model": "model",
+    "effects": "effect file",
+}
+
+
+def _read_rows(file: Path) -> dict[str, Row]:
+    """The rows of the file. A line that a crash cut short is taken out: its trace is studied again."""
+    if not file.exists():
+        return {}
+    found: dict[str, Row] = {}
+    text = read_text(file, str(file))
+    whole, _, cut = text.rpartition("\n")
+    if cut:
+        os.truncate(file, len(text.encode()) - len(cut.encode()))
+    for line in whole.splitlines():
+        try:
+            row = Row.model_validate_json(line)
+        except ValidationError as error:
+            raise SpecError(f"{file}: a line is no row of a batch: {first_invalid(error).message}") from error
+        found[row.key] = row
+    return found
+
+
+def take_over(former: Path, path: Path, keys: Collection[str]) -> None:
+    """Copies what another batch has about these traces into a new folder. Raises SpecError."""
+    if not (former / ASKED).is_file():
+        raise SpecError("continues: is no batch that has begun")
+    try:
+        (path / ANSWERS).mkdir(parents=True)
+        shutil.copyfile(former / ASKED, path / ASKED)
+        rows = [row for row in _read_rows(former / ROWS).values() if row.key in keys]
+        (path / ROWS).write_text("".join(row.model_dump_json() + "\n" for row in rows), "utf-8")
+        for row in rows:
+            if (answer := former / ANSWERS / f"{row.key}.json").is_file():
+                shutil.copyfile(answer, path / ANSWERS / answer.name)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+def _digest(text: str) -> str:
+    try:
+        data: Any = json.loads(text)
+    except ValueError:
+        data = text
+    return sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _unwritable(path: Path, error: OSError) -> SpecError:
+    return SpecError(f"{path}: cannot be written: {error.strerror or error}")

@@ -1,0 +1,95 @@
+"""Every task is answered once, whatever becomes of workers."""
+
+from __future__ import annotations
+
+from concurrent.futures import BrokenExecutor, Future
+from typing import Any
+
+import pytest
+
+from daq.contracts.errors import ReachError
+from daq.executors.each import AHEAD, done_in_any_order
+from daq.executors.program import Checked, OtherVersionError, Program
+from daq.executors.workers import BlamedError, ending
+from tests.daq.executors.by_hand import WorkersByHand, square
+
+
+def answers(workers: WorkersByHand, tasks: range) -> dict[int, Any]:
+    found: dict[int, Any] = {}
+    for task, future in done_in_any_order(workers, square, tasks):
+        assert task not in found
+        error = future.exception()
+        found[task] = future.result() if error is None else type(error)
+    return found
+
+
+def test_every_task_is_answered_once() -> None:
+    assert answers(WorkersByHand(), range(50)) == {n: n**2 for n in range(50)}
+    assert answers(WorkersByHand(), range(0)) == {}
+
+
+def test_what_a_dead_worker_had_is_computed_again() -> None:
+    workers = WorkersByHand(dies=lambda task, time: task in (3, 4, 20) and time == 1)
+    assert answers(workers, range(30)) == {n: n**2 for n in range(30)}
+    assert sorted(workers.given) == sorted([*range(30), 3, 4, 20])
+
+
+def test_a_task_that_kills_every_worker_is_blamed_and_no_other() -> None:
+    workers = WorkersByHand(dies=lambda task, time: task == 7 or (task == 8 and time == 1))
+    assert answers(workers, range(12)) == {n: n**2 for n in range(12)} | {7: BrokenExecutor}
+    assert workers.given.count(7) == 3
+
+
+class Slow(WorkersByHand):
+    """Answers the task that fills it, and no other."""
+
+    def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
+        self.given.append(args[0])
+        future: Future[Any] = Future()
+        if len(self.given) == AHEAD * self.count():
+            future.set_result(0)
+        return future
+
+
+def test_no_more_is_given_than_workers_can_begin_soon() -> None:
+    workers, tasks = Slow(count=3), iter(range(1000))
+    task, _future = next(done_in_any_order(workers, square, tasks))
+    assert (task, len(workers.given), next(tasks)) == (AHEAD * 3 - 1, AHEAD * 3, AHEAD * 3)
+
+
+class Refusing(WorkersByHand):
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self._error = error
+
+    def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
+        self.given.append(args[0])
+        future: Future[Any] = Future()
+        future.set_exception(self._error)
+        return future
+
+
+@pytest.mark.parametrize("error", [ReachError("the scheduler is gone"), OtherVersionError("worker a: has 0.0.9")])
+def test_what_concerns_all_tasks_ends_them(error: Exception) -> None:
+    with pytest.raises(type(error), match=str(error)):
+        list(done_in_any_order(Refusing(error), square, range(9)))
+
+
+def test_a_task_that_an_executor_blames_itself_is_not_tried_again() -> None:
+    workers = Refusing(BlamedError("killed four workers"))
+    assert len(list(done_in_any_order(workers, square, range(3)))) == len(workers.given) == 3
+
+
+def test_a_worker_of_another_version_is_refused_by_name() -> None:
+    with pytest.raises(OtherVersionError, match=r"worker .*process \d+: has ma2000-daq .* and ma2000-daq 0\.0\.1 on "):
+        Checked(square, Program("0.0.1", "3.9"))(2)
+
+
+def test_workers_are_given_up_when_the_block_fails() -> None:
+    workers = WorkersByHand()
+    with ending(workers):
+        pass
+    assert workers.ended == "waited"
+    with pytest.raises(KeyboardInterrupt), ending(workers):
+        raise KeyboardInterrupt
+    assert workers.ended == "abandoned"
