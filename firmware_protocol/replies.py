@@ -322,5 +322,12 @@ class Refused(Reply):
     reason: int
 
 
+@dataclass(frozen=True)
+class ExplainedRefusal(Refused):
+    """A refusal of another dialect, which says why in its own words. It has no frame."""
+
+    why: str = ""
+
+
 REPLIES: dict[int, type[Reply]] = {kind.OPCODE: kind for kind in Reply.__subclasses__()}
 """Every reply by its opcode."""

@@ -110,12 +110,14 @@ class WriteSetPoints(Request):
     IS_COMMAND = True
     postures: tuple[tuple[int, int], ...]
     """(joint, posture units 0–999), joints ascending."""
+    units: int = POSTURE_UNITS
+    """Units over a joint's range. No frame says it: another number is for another dialect."""
 
     def __post_init__(self) -> None:
         check_ascending("WriteSetPoints", tuple(joint for joint, _ in self.postures))
         for joint, posture in self.postures:
-            if not 0 <= posture < POSTURE_UNITS:
-                limit = POSTURE_UNITS - 1
+            if not 0 <= posture < self.units:
+                limit = self.units - 1
                 raise ProtocolError(f"joint {joint}: set point of {posture} posture units: allowed are 0 to {limit}")
 
     def pack(self) -> bytes:

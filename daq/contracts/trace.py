@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from daq.contracts.errors import TraceError
-from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.experiment import ExperimentSpec, ReportedGain
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 
@@ -86,7 +86,8 @@ class TraceRecord(FrozenRecord):
     machine: Machine | None = None
     memory_map: dict[str, object] | None = None
     spec: ExperimentSpec | None = None
-    gains: dict[int, Gain] | None = None
+    gains: dict[int, ReportedGain] | None = None
+    """P, I, D of each joint, as the controller reported them."""
     period: float | None = None
     """Control period (s); None where the record was not made tick by tick."""
     every: Annotated[int, Field(ge=1, exclude_if=lambda every: every == 1)] = 1

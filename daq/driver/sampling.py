@@ -64,7 +64,8 @@ class Deliveries:
 
     def send(self, postures: Mapping[int, int]) -> tuple[SentSetPoints, WriteSetPoints]:
         """The request for a batch of set points, noted as sent."""
-        return self.watch.sending(postures), WriteSetPoints(tuple(sorted(postures.items())))
+        units = self.link.scale.set_point_units
+        return self.watch.sending(postures), WriteSetPoints(tuple(sorted(postures.items())), units)
 
     def taken(self, batch: SentSetPoints, request: Request, reply: Reply, due: int | None) -> SetPointsTaken:
         """The confirmation of a batch, which must show from period `due` on (None: as the confirmation says).

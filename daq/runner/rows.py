@@ -19,7 +19,7 @@ class RowMaker:
         self.joints = tuple(joints)
         self._period = period
         self._calibrations = [machine.calibration(joint) for joint in joints]
-        self._scales = [machine.joint(joint).dc_motor.scale for joint in joints]
+        self._scales = [machine.drive_scale(joint) for joint in joints]
         self._first: int | None = None
 
     def row(self, snapshot: BoardSnapshot) -> SampleRow:
