@@ -40,8 +40,12 @@ class LinkDialect(Protocol):
         ...
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """Bytes that ask `request` under a sequence number (0–65535). Called once per request: a repeat sends the same
-        bytes again."""
+        """Bytes that ask `request` under a sequence number (0–65535). Called once per request."""
+        ...
+
+    def again(self, request: Request, frame: bytes) -> bytes:
+        """Bytes of a repeat of a request that `encode` has made `frame` of. Only where a repeat of the same bytes could
+        undo a stop that has come meanwhile are they others."""
         ...
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
@@ -114,6 +118,11 @@ class FramedDialect:
             self._greeted_with = None
             if reply.session != self._last.session:
                 self._last = Stamp(reply.session, 0)
+
+    def again(self, request: Request, frame: bytes) -> bytes:
+        """The same bytes: the bridge refuses a command that is older than a stop."""
+        del request
+        return frame
 
     def answer(self) -> bytes:
         """Nothing: every request is one frame."""

@@ -328,6 +328,9 @@ class ExplainedRefusal(Refused):
 
     why: str = ""
 
+    def __post_init__(self) -> None:
+        """Nothing to check: it is never packed."""
+
 
 REPLIES: dict[int, type[Reply]] = {kind.OPCODE: kind for kind in Reply.__subclasses__()}
 """Every reply by its opcode."""

@@ -38,11 +38,12 @@ class PolledSampling:
         return confirmation
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
-        """Writes the set points, waits until tick `after` is over, and asks."""
+        """Writes the set points, waits until tick `after` is over, and asks; None is a usual pause after the sample
+        before."""
         deliveries = self._deliveries
         if postures:
             self.write(postures)
-        wanted = None if after is None or self._newest is None else max(after, self._newest) + 1
+        wanted = self._due(after)
         if wanted is not None:
             deliveries.clock.sleep_until(self._time.time_of(wanted - 1) + ASKED_AFTER * deliveries.period_s)
         asked = AFTER_NEWEST if after is None else after
@@ -63,6 +64,12 @@ class PolledSampling:
         self._newest = tick
         flags = StatusFlag(reply.status)
         return deliveries.deliver(tick, after, (now, tick_time), reply.joints, flags, "sample", every)
+
+    def _due(self, after: int | None) -> int | None:
+        """The tick to ask for; None where it may be any."""
+        if self._newest is None:
+            return None
+        return self._newest + self._deliveries.link.scale.every if after is None else max(after, self._newest) + 1
 
     def _check(self, status: int) -> None:
         """Raises HardwareFaultError for a drive that is damaged."""

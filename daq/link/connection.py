@@ -152,10 +152,12 @@ class Connection:
         now = self.now()
         for transaction in transactions:
             request = transaction.request
-            if not transaction.frame:
-                with self._dialect_lock:
-                    transaction.frame = self._dialect.encode(transaction.sequence, request)
-            frames += transaction.frame * (1 if self._dialect.scale.half_duplex else copies_of(request))
+            with self._dialect_lock:
+                if transaction.frame:
+                    frame = self._dialect.again(request, transaction.frame)
+                else:
+                    frame = transaction.frame = self._dialect.encode(transaction.sequence, request)
+            frames += frame * (1 if self._dialect.scale.half_duplex else copies_of(request))
             transaction.written += 1
             transaction.written_at = now
             transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))

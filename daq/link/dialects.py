@@ -10,7 +10,7 @@ from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.errors import ProtocolError
 
 GROUP = "ma2000_daq.dialects"
-"""Entry points of other packages: a name, and a callable that makes a `LinkDialect` of the joints' numbers on the bus."""
+"""Entry points of other packages: a name, and what makes a `LinkDialect` of the joints' numbers on the bus."""
 
 
 def dialect_of(url: str) -> LinkDialect:

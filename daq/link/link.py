@@ -62,7 +62,8 @@ class Link:
     number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
     that is not yet written.
 
-    `scale` is what the line's dialect can say of its machine. `chance` draws the first sequence number and, except in lock-step, the nonces of `Hello`.
+    `scale` is what the line's dialect can say of its machine. `chance` draws the first sequence number and, except in
+    lock-step, the nonces of `Hello`.
     """
 
     def __init__(

@@ -154,8 +154,8 @@ def postures_of(machine: Machine, joint: int, angles: Floats) -> Integers:
 def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
     """The angles (rad) of the postures nearest to `angles`, one per joint: what set points can represent.
 
-    A reading in the last fraction of the range counts as the highest posture, as on the wire. Raises SpecError for a wrong
-    number of joints, an angle that is not finite or one outside the sensor's range.
+    A reading in the last fraction of the range counts as the highest posture, as on the wire. Raises SpecError for a
+    wrong number of joints, an angle that is not finite or one outside the sensor's range.
     """
     if len(angles) != len(machine.joints):
         raise SpecError(f"start: {len(angles)} angles, {machine.name} has {len(machine.joints)} joints")

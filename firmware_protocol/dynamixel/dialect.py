@@ -131,7 +131,7 @@ class DynamixelDialect:
             case ReportGains():
                 area = GAINS
             case WriteSetPoints():
-                first = self._goals(request)
+                first = b"" if self._stopped else self._goals(request)
             case Stop():
                 self._stopped = True
             case Sample() | ReadStatus() | Release():
@@ -156,6 +156,11 @@ class DynamixelDialect:
                         replies.append((job.sequence, reply))
         return replies
 
+    def again(self, request: Request, frame: bytes) -> bytes:
+        """Of set points, after a stop, nothing but the question: until the bus has been silent for a moment the servos
+        would take them."""
+        return encode(sync_read(self._ids, *BLOCK)) if self._stopped and isinstance(request, WriteSetPoints) else frame
+
     def answer(self) -> bytes:
         """The instructions of the next step of what is under way."""
         written, self._next = self._next, b""
@@ -176,20 +181,24 @@ class DynamixelDialect:
 
     def _advance(self, job: _Job) -> Reply | None:
         """What all servos' answers come to: the reply, or None and perhaps a next step."""
-        request = job.request
+        request, blocks = job.request, {device: job.heard[device].data for device in self._ids if device in job.heard}
         if isinstance(request, Hello):
-            return self._greeted(request, {d: job.heard[d].data for d in self._ids})
+            return self._greeted(request, blocks)
         if isinstance(request, ReportGains):
-            return ServoGains(tuple(_gains(job.heard[device].data) for device in self._ids))
-        servos = {device: Servo.of(job.heard[device].data) for device in self._ids if device in job.heard}
+            return ServoGains(tuple(map(_gains, blocks.values())))
+        servos = {device: Servo.of(block) for device, block in blocks.items()}
+        return self._known(job, servos)
+
+    def _known(self, job: _Job, servos: Servos) -> Reply | None:
+        """The same of the requests that need the servos' present state."""
         tick, flags = self._time(servos), self._flags(servos)
-        match request:
+        match job.request:
             case Sample(_, mask):
                 readings = [(joint, servos[self._ids[joint - 1]].reading) for joint in joints_of(mask)]
                 return Snapshot(tick, flags, tuple(readings))
             case ReadStatus():
                 return Status(tick, flags, 0, 0, int(any(one.stopped for one in servos.values())))
-            case WriteSetPoints():
+            case WriteSetPoints() as request:
                 return self._taken(job, request, servos, tick, flags)
             case Release():
                 return self._released(job, servos)
@@ -230,7 +239,7 @@ class DynamixelDialect:
         """The set points are taken when the goals read back are those that were sent."""
         if flags & (StatusFlag.RESTARTED | StatusFlag.HARDWARE_ERROR):
             return SetPointsTaken(tick, flags)
-        if flags & StatusFlag.FROZEN:
+        if flags & StatusFlag.FROZEN or self._stopped:
             return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, _why_frozen(servos))
         if all(servos[self._ids[joint - 1]].goal == posture for joint, posture in request.postures):
             return SetPointsTaken(tick, flags)
@@ -249,7 +258,7 @@ class DynamixelDialect:
         if self._may_write(job):
             locked = {device: one.goal for device, one in servos.items() if one.watchdog < 0}
             job.goals = {device: one.position for device, one in servos.items()} | locked
-            self._then(job, self._write(Table.GOAL_POSITION, job.goals), {Table.BUS_WATCHDOG: STOP_MARK}, set(locked))
+            self._then(self._write(Table.GOAL_POSITION, job.goals), {Table.BUS_WATCHDOG: STOP_MARK}, set(locked))
         return None
 
     def _released(self, job: _Job, servos: Servos) -> Reply | None:
@@ -265,7 +274,7 @@ class DynamixelDialect:
         if self._may_write(job):
             job.goals = {device: one.position for device, one in servos.items()}
             free = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0))
-            self._then(job, free + self._write(Table.GOAL_POSITION, job.goals), {Table.TORQUE_ENABLE: 1}, set())
+            self._then(free + self._write(Table.GOAL_POSITION, job.goals), {Table.TORQUE_ENABLE: 1}, set())
         return None
 
     def _may_write(self, job: _Job) -> bool:
@@ -273,7 +282,7 @@ class DynamixelDialect:
         job.writes += 1
         return job.writes <= MOST_WRITES
 
-    def _then(self, job: _Job, first: bytes, everywhere: Mapping[Table, int], but: set[int]) -> None:
+    def _then(self, first: bytes, everywhere: Mapping[Table, int], but: set[int]) -> None:
         """Next step: writes `first` and then one value to all servos `but` these; reads everything back."""
         rest = [one for one in self._ids if one not in but]
         second = b"".join(self._write(item, dict.fromkeys(rest, value)) for item, value in everywhere.items() if rest)

@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 
 from firmware_protocol.dynamixel.control_table import HardwareError
+from firmware_protocol.dynamixel.packets import LARGEST_ID
 from mock_controller.ports import Port, PortError, PtyPort, TcpPort, host_and_port
 from mock_controller.servos.bench import Bench, Options
 
@@ -31,10 +32,7 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, _interrupt)
     given = _parser().parse_args(arguments)
     try:
-        ids = tuple(int(one) for one in given.ids.split(","))
-        if len(ids) != 2 or len(set(ids)) != 2 or not all(0 <= one <= 252 for one in ids):
-            raise ValueError(f"ids {given.ids!r}: this bench has two servos, with two different IDs from 0 to 252")
-        bench = Bench(Options(ids, given.supply, given.load, given.coulomb, given.torque))
+        bench = Bench(Options(_ids(given.ids), given.supply, given.load, given.coulomb, given.torque))
         _serve(bench, PtyPort(given.link) if given.pty else TcpPort(*host_and_port(given.tcp, "tcp")), given.owned)
     except KeyboardInterrupt:
         return 0
@@ -57,6 +55,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--torque", action="store_true", help="start with the torque on (default: off, as at power-up)")
     parser.add_argument("--owned", action="store_true", help="end when standard input ends")
     return parser
+
+
+def _ids(text: str) -> tuple[int, ...]:
+    """Raises ValueError for anything but two IDs."""
+    parts = text.split(",")
+    if len(set(parts)) != 2 or len(parts) != 2 or not all(one.isdecimal() and int(one) <= LARGEST_ID for one in parts):
+        raise ValueError(f"ids {text!r}: this bench has two servos, with two different IDs from 0 to {LARGEST_ID}")
+    return int(parts[0]), int(parts[1])
 
 
 def _serve(bench: Bench, port: Port, owned: bool) -> None:

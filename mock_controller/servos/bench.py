@@ -48,7 +48,7 @@ class Bench:
         self._motor = Motor(coulomb=options.coulomb)
         self._plant = PanTilt(Head(load=options.load), self._motor, (_START[0], _START[1] - LEVEL))
         self._decoder = PacketDecoder()
-        self._waiting: list[Packet] = []
+        self._waiting: dict[int, Packet] = {}
         for servo, angle in zip(self.servos, _START, strict=True):
             servo.power_up(round(COUNTS_A_TURN * angle / math.tau))
             if options.torque:
@@ -108,39 +108,41 @@ class Bench:
         by_id = {servo.device: servo for servo in present}
         match packet.instruction:
             case Instruction.PING:
-                about = Table.MODEL_NUMBER.address, Table.MODEL_NUMBER.size
-                version = Table.FIRMWARE_VERSION.address, Table.FIRMWARE_VERSION.size
-                return [_data(servo, servo.read(*about), servo.read(*version)) for servo in meant]
-            case Instruction.READ:
-                _, address, count = areas_read(packet)[0]
-                return [_data(servo, servo.read(address, count)) for servo in meant if alone]
-            case Instruction.SYNC_READ | Instruction.BULK_READ:
+                return [_data(servo, *(servo.read(item.address, item.size) for item in _ABOUT)) for servo in meant]
+            case Instruction.READ | Instruction.SYNC_READ | Instruction.BULK_READ:
                 areas = [(by_id[device], at, n) for device, at, n in areas_read(packet) if device in by_id]
                 return [_data(servo, servo.read(at, n)) for servo, at, n in areas]
-            case Instruction.WRITE:
+            case Instruction.WRITE if alone:
                 _, address, data = areas_written(packet)[0]
-                results = [(servo, servo.write(address, data)) for servo in meant]
-                return [_answer(servo, error) for servo, error in results if alone]
-            case Instruction.SYNC_WRITE | Instruction.BULK_WRITE:
-                for device, address, data in areas_written(packet):
-                    if device in by_id:
-                        by_id[device].write(address, data)
+                return [_answer(servo, servo.write(address, data)) for servo in meant]
+            case Instruction.WRITE | Instruction.SYNC_WRITE | Instruction.BULK_WRITE:
+                self._write(packet, by_id)
                 return ()
+        answers = [_answer(servo, self._other(packet, servo)) for servo in meant]
+        return answers if alone else ()
+
+    def _write(self, packet: Packet, by_id: dict[int, Servo]) -> None:
+        """Writes that nobody answers."""
+        for device, address, data in areas_written(packet):
+            for servo in by_id.values() if device == BROADCAST else [by_id[device]] if device in by_id else []:
+                servo.write(address, data)
+
+    def _other(self, packet: Packet, servo: Servo) -> StatusError | None:
+        """Instructions that have no data of their own."""
+        match packet.instruction:
             case Instruction.REG_WRITE:
-                self._waiting = [one for one in self._waiting if one.device != packet.device] + [packet]
-                return [_answer(servo, None) for servo in meant if alone]
-            case Instruction.ACTION:
-                for kept in self._waiting:
-                    _, address, data = areas_written(kept)[0]
-                    if kept.device in by_id:
-                        by_id[kept.device].write(address, data)
-                self._waiting = []
-                return [_answer(servo, None) for servo in meant if alone]
+                self._waiting[servo.device] = packet
+            case Instruction.ACTION if servo.device in self._waiting:
+                _, address, data = areas_written(self._waiting.pop(servo.device))[0]
+                return servo.write(address, data)
             case Instruction.REBOOT:
-                for servo in meant:
-                    servo.power_up(servo[Table.PRESENT_POSITION])
-                return [_answer(servo, None) for servo in meant if alone]
-        return [_answer(servo, StatusError.INSTRUCTION) for servo in meant if alone]
+                servo.power_up(servo[Table.PRESENT_POSITION])
+            case _:
+                return StatusError.INSTRUCTION
+        return None
+
+
+_ABOUT = (Table.MODEL_NUMBER, Table.FIRMWARE_VERSION)
 
 
 def _data(servo: Servo, *pieces: bytes | StatusError) -> Packet:

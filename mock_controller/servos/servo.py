@@ -71,7 +71,7 @@ class Servo:
         self.power_up(0)
 
     def __getitem__(self, item: Table) -> int:
-        return item.of(self._table)
+        return item.of(bytes(self._table[item.address : item.address + item.size]), item.address)
 
     @property
     def alert(self) -> bool:
