@@ -75,6 +75,11 @@ class Identity:
         """Whether no arm is behind it."""
         return Capability.SIMULATED in self.capabilities
 
+    @property
+    def keeps_samples(self) -> bool:
+        """Whether it samples every control period by itself, and keeps the samples until they are asked for."""
+        return Capability.SAMPLE in self.capabilities and Capability.POLLED not in self.capabilities
+
 
 @dataclass(frozen=True)
 class ControllerStatus:

@@ -18,6 +18,9 @@ NEARLY = 1
 """Ticks by which a sample may come beside the one that was wanted and still be called that one. At 1 ms a tick and the
 speeds of an arm this is less than a count of its sensors, while a grid without holes lets a gap mean something."""
 
+MOST_TRIES = 5
+"""Questions, a tick or more apart, after which a clock that has not moved counts as one that stands still."""
+
 
 class PolledSampling:
     """One question a sample. A controller whose clock stands still is not believed."""
@@ -46,14 +49,7 @@ class PolledSampling:
         wanted = self._due(after)
         if wanted is not None:
             deliveries.clock.sleep_until(self._time.time_of(wanted - 1) + ASKED_AFTER * deliveries.period_s)
-        asked = AFTER_NEWEST if after is None else after
-        reply = deliveries.link.request(Sample(asked, mask_of(tuple(joints))), Snapshot)
-        now = deliveries.clock.now()
-        deliveries.check_restart(reply.status)
-        self._check(reply.status)
-        if self._measured is not None and reply.tick <= self._measured:
-            raise NoSampleError(f"the same sample came twice: the controller's clock stands still at tick {reply.tick}")
-        self._measured = reply.tick
+        reply, now = self._newer(Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints))))
         tick_time = self._time.arrived(reply.tick, now)
         tick = reply.tick
         if wanted is not None and abs(tick - wanted) <= NEARLY:
@@ -64,6 +60,21 @@ class PolledSampling:
         self._newest = tick
         flags = StatusFlag(reply.status)
         return deliveries.deliver(tick, after, (now, tick_time), reply.joints, flags, "sample", every)
+
+    def _newer(self, question: Sample) -> tuple[Snapshot, float]:
+        """A sample that was measured after the last one, and when it came (s). A question may come a little too early."""
+        deliveries = self._deliveries
+        for _ in range(MOST_TRIES):
+            reply, now = deliveries.link.request(question, Snapshot), deliveries.clock.now()
+            deliveries.check_restart(reply.status)
+            self._check(reply.status)
+            if self._measured is None or reply.tick > self._measured:
+                self._measured = reply.tick
+                return reply, now
+            deliveries.clock.sleep_until(now + deliveries.period_s)
+        raise NoSampleError(
+            f"the same sample comes again and again: the controller's clock stands still at {reply.tick}"
+        )
 
     def _due(self, after: int | None) -> int | None:
         """The tick to ask for; None where it may be any."""

@@ -137,7 +137,8 @@ class DynamixelDialect:
             case Sample() | ReadStatus() | Release():
                 pass
             case _:
-                raise ProtocolError(f"a bench of Dynamixel servos knows no {type(request).__name__}")
+                name = type(request).__name__
+                raise ProtocolError(f"{name}: Dynamixel servos are only read, moved, stopped and released from here")
         self._jobs = [job for job in self._jobs if job.sequence != sequence][-_MOST_JOBS:]
         self._jobs.append(_Job(sequence, request, area[1]))
         return first + encode(sync_read(self._ids, *area))

@@ -18,12 +18,13 @@ from firmware_protocol.dynamixel.instructions import StatusError
 
 SIZE = 700
 """Bytes of the table: its last item that has a meaning is at 661."""
-INFORMATION = b"MOCK"
+INFORMATION = int.from_bytes(b"MOCK", "little")
 """Model Information, by which a host knows that no motor is behind this servo."""
 XM430_W350, FIRMWARE = 1020, 45
 WATCHDOG_MS = 20
 _DEFAULTS = {
     Table.MODEL_NUMBER: XM430_W350,
+    Table.MODEL_INFORMATION: INFORMATION,
     Table.FIRMWARE_VERSION: FIRMWARE,
     Table.BAUD_RATE: 3,
     Table.OPERATING_MODE: POSITION_MODE,
@@ -63,15 +64,13 @@ class Servo:
         self.supply = supply
         self.volts: float | None = None
         """At the motor; None while the torque is off."""
-        self._table = bytearray(SIZE)
+        self._values: dict[int, int] = {item.address: 0 for item in Table}
         for item, value in (_DEFAULTS | {Table.ID: device}).items():
             self._set(item, value)
-        at = Table.MODEL_INFORMATION.address
-        self._table[at : at + len(INFORMATION)] = INFORMATION
         self.power_up(0)
 
     def __getitem__(self, item: Table) -> int:
-        return item.of(bytes(self._table[item.address : item.address + item.size]), item.address)
+        return self._values[item.address]
 
     @property
     def alert(self) -> bool:
@@ -85,7 +84,7 @@ class Servo:
 
     def power_up(self, position: int) -> None:
         """RAM as after a reset, at a position in counts."""
-        self._table[FIRST_IN_RAM:] = bytes(SIZE - FIRST_IN_RAM)
+        self._values |= {item.address: 0 for item in Table if item.address >= FIRST_IN_RAM}
         for item, value in (_AT_POWER_UP | {Table.PRESENT_INPUT_VOLTAGE: round(10 * self.supply)}).items():
             self._set(item, value)
         self._set(Table.PRESENT_POSITION, position)
@@ -109,7 +108,10 @@ class Servo:
         """Bytes of the table, or why not."""
         if not count or address + count > SIZE:
             return StatusError.DATA_LENGTH if not count else StatusError.ACCESS
-        return bytes(self._table[address : address + count])
+        table = bytearray(SIZE)
+        for item in Table:
+            table[item.address : item.address + item.size] = item.pack(self[item])
+        return bytes(table[address : address + count])
 
     def write(self, address: int, data: bytes) -> StatusError | None:
         """Writes whole items; None when all are written, else nothing is, and why."""
@@ -175,7 +177,7 @@ class Servo:
         return None if low <= value <= high else StatusError.DATA_RANGE
 
     def _set(self, item: Table, value: int) -> None:
-        self._table[item.address : item.address + item.size] = item.pack(value)
+        self._values[item.address] = value
 
 
 _RANGES = {

@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine, load_machine
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
 from daq.link import Link
+from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
+from daq.traces.reader import read_trace
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from mock_controller.servos.bench import Bench, Options
 
@@ -63,3 +68,26 @@ class VirtualBench:
 def pan_tilt() -> Machine:
     """The machine file of the bench."""
     return load_machine(str(PAN_TILT))
+
+
+class Quiet:
+    """A listener that nobody listens to."""
+
+    def progress(self, fraction: float, text: str) -> None:
+        """Nobody looks."""
+
+    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
+        """Nobody looks."""
+
+    def happened(self, event: TraceEvent) -> None:
+        """Read from the trace instead."""
+
+
+def recorded(options: Options, spec: ExperimentSpec, folder: Path) -> Trace:
+    """The trace of an experiment on a new bench."""
+    machine = pan_tilt()
+    with VirtualBench(options).controller() as controller:
+        setup = RunSetup(
+            controller, ArmControl(controller), spec, machine, machine.limits, folder, Quiet(), StopRequests()
+        )
+        return read_trace(run_experiment(setup, Consent()).trace)

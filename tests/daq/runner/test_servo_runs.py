@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -57,8 +57,8 @@ class At:
 
 
 @pytest.fixture
-def at(tmp_path: Path) -> Iterator[At]:
-    yield At(VirtualBench(), tmp_path)
+def at(tmp_path: Path) -> At:
+    return At(VirtualBench(), tmp_path)
 
 
 def told(trace: Trace, kind: str) -> list[str]:
@@ -179,7 +179,7 @@ def test_a_stop_in_a_run_freezes_within_a_few_degrees(at: At) -> None:
 def test_an_unconsented_real_bench_is_not_moved(at: At) -> None:
     real = VirtualBench()
     for servo in real.bench.servos:
-        servo._table[2:6] = bytes(4)
+        servo._values[Table.MODEL_INFORMATION.address] = 0
     at.controller = real.controller()
     at.control = ArmControl(at.controller)
     with pytest.raises(SafetyError, match="is a real arm: it moves only with the operator's consent"):

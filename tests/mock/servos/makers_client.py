@@ -21,30 +21,30 @@ class MemoryPort:
         self._incoming = bytearray()
         self._left_ms = 0.0
 
-    def clearPort(self) -> None:
+    def clearPort(self) -> None:  # noqa: N802
         self._incoming.clear()
 
-    def writePort(self, packet: list[int]) -> int:
+    def writePort(self, packet: list[int]) -> int:  # noqa: N802
         self.written.append(bytes(packet))
         self._incoming += self._behind(bytes(packet))
         return len(packet)
 
-    def readPort(self, length: int) -> bytes:
+    def readPort(self, length: int) -> bytes:  # noqa: N802
         taken = bytes(self._incoming[:length])
         del self._incoming[:length]
         return taken
 
-    def setPacketTimeout(self, packet_length: int) -> None:
+    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         self._left_ms = 20.0
 
-    def setPacketTimeoutMillis(self, msec: float) -> None:
+    def setPacketTimeoutMillis(self, msec: float) -> None:  # noqa: N802
         self._left_ms = 20.0
 
-    def isPacketTimeout(self) -> bool:
+    def isPacketTimeout(self) -> bool:  # noqa: N802
         self._left_ms -= 1.0
         return self._left_ms < 0.0
 
-    def getBaudRate(self) -> int:
+    def getBaudRate(self) -> int:  # noqa: N802
         return 1000000
 
     @property

@@ -69,7 +69,8 @@ def test_stuffed_content_holds_no_header_and_is_found_again(data: bytes) -> None
 @given(DEVICES, st.integers(0, 700), DATA)
 def test_the_makers_client_stuffs_and_unstuffs_as_we_do(device: int, address: int, data: bytes) -> None:
     ours = list(encode(ask.write(device, address, data)))
-    bare = ours[:5] + [*(len(data) + 5).to_bytes(2, "little"), 3, *address.to_bytes(2, "little"), *data, 0, 0]
+    length, where = (len(data) + 5).to_bytes(2, "little"), address.to_bytes(2, "little")
+    bare = [*ours[:5], *length, 3, *where, *data, 0, 0]
     assert client().addStuffing(list(bare))[:-2] == ours[:-2]
     back = client().removeStuffing(list(ours))
     assert back[: len(bare) - 2] == bare[:-2]
