@@ -62,7 +62,7 @@ class PolledSampling:
         return deliveries.deliver(tick, after, (now, tick_time), reply.joints, flags, "sample", every)
 
     def _newer(self, question: Sample) -> tuple[Snapshot, float]:
-        raise NoSampleError(f"the same sample comes again: the controller's clock stands still at {self._measured}")
+        """A sample measured after the last one, and when it came (s). A question may come a little too early."""
         deliveries = self._deliveries
         for _ in range(MOST_TRIES):
             reply, now = deliveries.link.request(question, Snapshot), deliveries.clock.now()

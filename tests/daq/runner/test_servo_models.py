@@ -1,0 +1,64 @@
+"""What models make of the records of a bench of servos. The bench's plant shares no code with them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.experiment import ExperimentSpec, Multisine
+from daq.contracts.trace import Trace
+from mock_controller.servos.bench import Options
+from model.arrays import Floats
+from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.workflow import diagnose
+from model.fitting.fit import fit
+from model.fitting.options import FitOptions
+from model.machine_model.model import Model, base_model
+from model.simulation.inputs import inputs_of
+from model.simulation.simulate import simulate
+from tests.daq.servo_bench import pan_tilt, recorded
+
+COUNT = math.tau / 4096
+
+
+def motion(seed: int, duration: float) -> ExperimentSpec:
+    trajectory = Multisine(amplitude={1: 0.5, 2: 0.4}, duration=duration, lowest=0.2, highest=2.0, tones=8, seed=seed)
+    return ExperimentSpec(trajectory=trajectory, joints=(1, 2), settle=0.3, hold=0.3)
+
+
+def left(model: Model, trace: Trace) -> Floats:
+    """Rms distance (counts) of the simulated positions from the recorded ones, by joint."""
+    simulation = simulate(model, trace)
+    apart = (simulation.at_samples(simulation.position) - trace.position) / COUNT
+    return np.asarray(np.sqrt(np.mean(apart**2, axis=0)))
+
+
+def test_a_record_is_simulated_tick_by_tick_of_the_servos_loop(tmp_path: Path) -> None:
+    trace = recorded(Options(torque=True), motion(1, 1.5), tmp_path)
+    inputs = inputs_of(trace, pan_tilt())
+    assert inputs.period == 0.001
+    assert len(inputs) == trace.tick[-1] - trace.tick[0] + 1  # type: ignore[index]
+    assert left(base_model(pan_tilt()), trace).max() < 10
+
+
+@pytest.mark.slow
+def test_a_fit_finds_the_bench_s_own_numbers(tmp_path: Path) -> None:
+    first, second = (recorded(Options(torque=True, coulomb=0.14), motion(seed, 6.0), tmp_path) for seed in (1, 2))
+    before = base_model(pan_tilt())
+    found = fit(before, [first], FitOptions(parameters=("*friction*",)))
+    values = dict(zip(found.names, found.values, strict=True))
+    for joint in (1, 2):
+        assert values[f"joint{joint}.coulomb_friction.torque"] == pytest.approx(0.14, abs=0.02)
+        assert values[f"joint{joint}.viscous_friction.coefficient"] == pytest.approx(0.06, abs=0.03)
+    assert (left(found.model, second) < 0.6 * left(before, second)).all()
+
+
+@pytest.mark.slow
+def test_a_diagnosis_names_a_load_that_nobody_told_it_of(tmp_path: Path) -> None:
+    options = Options(torque=True, load=0.15)
+    traces = [recorded(options, motion(seed, 5.0), tmp_path) for seed in (1, 2)]
+    answer = diagnose(base_model(pan_tilt()), traces[:1], traces[1:], DiagnosisOptions(most_steps=1))
+    assert [step.effect for step in answer.steps] == ["payload"]
