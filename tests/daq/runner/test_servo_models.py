@@ -61,4 +61,4 @@ def test_a_diagnosis_names_a_load_that_nobody_told_it_of(tmp_path: Path) -> None
     options = Options(torque=True, load=0.15)
     traces = [recorded(options, motion(seed, 5.0), tmp_path) for seed in (1, 2)]
     answer = diagnose(base_model(pan_tilt()), traces[:1], traces[1:], DiagnosisOptions(most_steps=1))
-    assert [step.effect for step in answer.steps] == ["payload"]
+    assert [step.effect for step in answer.steps if step.kind == "effect"] == ["payload"]
