@@ -33,12 +33,10 @@ def test_what_the_page_types_can_be_typed(line: str) -> None:
 
 
 @pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The bench that the page starts, in a folder with the settings that the page writes."""
-    monkeypatch.chdir(tmp_path)
+def bench() -> Iterator[None]:
+    """The bench that the page starts, in the folder of the settings that the page writes."""
     shutil.copytree(ROOT / "examples", "examples")
-    Path("daq.toml").write_text(SETTINGS.replace("$PWD", str(tmp_path)))
-    monkeypatch.setenv("DAQ_CONFIG", str(tmp_path / "daq.toml"))
+    Path("daq.toml").write_text(SETTINGS.replace("$PWD", str(Path.cwd())))
     command = [sys.executable, "-m", "mock_controller.servos", "--pty", "--link", "bench", "--owned"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
