@@ -8,7 +8,7 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import Capability, StatusFlag, Stop, WriteSetPoints
+from firmware_protocol.commands import Capability, FineSetPoints, StatusFlag, Stop
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
@@ -93,7 +93,7 @@ def test_a_stop_holds_where_the_servos_are_and_they_refuse_goals(controller: Con
 
 def test_a_repeat_of_set_points_cannot_undo_a_stop(controller: Controller, bench: VirtualBench) -> None:
     dialect = DynamixelDialect((1, 2))
-    late = WriteSetPoints(((1, 2600),), 4096)
+    late = FineSetPoints(((1, 2600),), 4096)
     frame = dialect.encode(7, late)
     assert dialect.again(late, frame) == frame
     dialect.encode(8, Stop())
