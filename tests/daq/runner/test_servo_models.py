@@ -24,8 +24,9 @@ from tests.daq.servo_bench import pan_tilt, recorded
 COUNT = math.tau / 4096
 
 
-def motion(seed: int, duration: float) -> ExperimentSpec:
-    trajectory = Multisine(amplitude={1: 0.5, 2: 0.4}, duration=duration, lowest=0.2, highest=2.0, tones=8, seed=seed)
+def motion(seed: int, duration: float = 8.0, share: float = 1.0) -> ExperimentSpec:
+    amplitude: dict[int, float] = {1: 0.35 * share, 2: 0.2 * share}
+    trajectory = Multisine(amplitude=amplitude, duration=duration, lowest=0.2, highest=1.5, tones=8, seed=seed)
     return ExperimentSpec(trajectory=trajectory, joints=(1, 2), settle=0.3, hold=0.3)
 
 
@@ -37,7 +38,7 @@ def left(model: Model, trace: Trace) -> Floats:
 
 
 def test_a_record_is_simulated_tick_by_tick_of_the_servos_loop(tmp_path: Path) -> None:
-    trace = recorded(Options(torque=True), motion(1, 1.5), tmp_path)
+    trace = recorded(Options(torque=True), motion(1, 1.5, 0.3), tmp_path)
     inputs = inputs_of(trace, pan_tilt())
     assert inputs.period == 0.001
     assert len(inputs) == trace.tick[-1] - trace.tick[0] + 1  # type: ignore[index]
@@ -46,7 +47,7 @@ def test_a_record_is_simulated_tick_by_tick_of_the_servos_loop(tmp_path: Path) -
 
 @pytest.mark.slow
 def test_a_fit_finds_the_bench_s_own_numbers(tmp_path: Path) -> None:
-    first, second = (recorded(Options(torque=True, coulomb=0.14), motion(seed, 6.0), tmp_path) for seed in (1, 2))
+    first, second = (recorded(Options(torque=True, coulomb=0.14), motion(seed), tmp_path) for seed in (1, 2))
     before = base_model(pan_tilt())
     found = fit(before, [first], FitOptions(parameters=("*friction*",)))
     values = dict(zip(found.names, found.values, strict=True))
@@ -58,6 +59,6 @@ def test_a_fit_finds_the_bench_s_own_numbers(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_diagnosis_names_a_load_that_nobody_told_it_of(tmp_path: Path) -> None:
     options = Options(torque=True, load=0.15)
-    traces = [recorded(options, motion(seed, 5.0), tmp_path) for seed in (1, 2)]
+    traces = [recorded(options, motion(seed), tmp_path) for seed in (1, 2)]
     answer = diagnose(base_model(pan_tilt()), traces[:1], traces[1:], DiagnosisOptions(most_steps=1))
     assert [step.effect for step in answer.steps if step.kind == "effect"] == ["payload"]
