@@ -76,8 +76,9 @@ bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchma
 golden: $(FOR_DEVELOPMENT) ## compare answers of every command with those recorded before, to the digit (20 minutes)
 	@$(BIN)/python -m benchmarks.golden
 
-firmware: ## build the bridge's programs for boards, from Debian's packages (docs/hardware.md)
-	@$(MAKE) --no-print-directory -C firmware_protocol/bridge BUILD=$(CURDIR)/build/firmware all
+firmware: $(if $(MAP),$(FOR_USE)) ## build the bridge's programs for boards, from Debian's packages; MAP=FILE.toml: the Mega's, for that memory map
+	@$(MAKE) --no-print-directory -C firmware_protocol/bridge BUILD=$(CURDIR)/build/firmware \
+	    $(if $(MAP),MAP=$(abspath $(MAP)) PYTHON=$(CURDIR)/$(BIN)/python mega2560,all)
 
 clean: ## remove caches and what was built
 	@rm -rf build dist server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache

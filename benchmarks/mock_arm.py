@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from urllib.parse import urlencode
@@ -88,17 +89,39 @@ def recorded(
     plant: str | None = None,
     board: str | None = None,
     modify: Sequence[str] = (),
+    *,
+    baud: int = 115_200,
 ) -> list[Trace]:
     """Traces of experiments, one after the other on one mock in lock-step, with these hidden effects."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        options: dict[str, str | list[str]] = {"lock_step": "1", "seed": str(seed), "modify": list(modify)}
-        for kind, text in (("plant", plant), ("board", board)):
-            if text is not None:
-                (folder / f"{kind}.toml").write_text(text, "utf-8")
-                options[kind] = str(folder / f"{kind}.toml")
-        with Controller.connect(f"mock://?{urlencode(options, doseq=True)}") as controller:
+        with connected(folder, seed, plant, board, modify, baud=baud) as controller:
             return [_recorded(controller, spec, machine, folder) for spec in specs]
+
+
+@contextmanager
+def connected(
+    folder: Path,
+    seed: int,
+    plant: str | None = None,
+    board: str | None = None,
+    modify: Sequence[str] = (),
+    *,
+    baud: int = 115_200,
+) -> Iterator[Controller]:
+    """A new mock in lock-step with these hidden effects, whose files lie in a folder."""
+    options: dict[str, str | list[str]] = {
+        "lock_step": "1",
+        "seed": str(seed),
+        "baud": str(baud),
+        "modify": list(modify),
+    }
+    for kind, text in (("plant", plant), ("board", board)):
+        if text is not None:
+            (folder / f"{kind}.toml").write_text(text, "utf-8")
+            options[kind] = str(folder / f"{kind}.toml")
+    with Controller.connect(f"mock://?{urlencode(options, doseq=True)}") as controller:
+        yield controller
 
 
 def _recorded(controller: Controller, spec: ExperimentSpec, machine: Machine, folder: Path) -> Trace:

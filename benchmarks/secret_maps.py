@@ -17,6 +17,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import degrees, radians
 from pathlib import Path
 from random import Random
 
@@ -26,7 +27,7 @@ from daq.commissioning.memory.findings import Findings
 from daq.commissioning.memory.procedure import Finder, errors_now, may_have_power
 from daq.commissioning.memory.recording import PageReading
 from daq.contracts.machine import load_machine
-from daq_cli.robot.mock_hand import MockOperator
+from daq_cli.robot.mock_hand import End, MockOperator
 from firmware_protocol.memory_map import JOINTS, MemoryMap
 from mock_controller.board.board import Board
 from mock_controller.device import build_device
@@ -98,16 +99,17 @@ class BoardArm:
     def now(self) -> float:
         return self.board.time_us * 1e-6
 
-    def emergency_stop(self, *, pressed: bool) -> None:
+    def emergency_stop(self, *, pressed: bool) -> Mapping[int, float]:
         self.board.press_emergency_stop(pressed)
+        return {joint: degrees(angle) for joint, angle in enumerate(self.board.plant.joint_angles, start=1)}
 
-    def lead(self, degrees: Mapping[int, float], seconds: float) -> None:
-        from math import radians
-
-        self.board.lead({joint: radians(angle) for joint, angle in degrees.items()}, seconds)
-
-    def wait(self, seconds: float) -> None:
-        self.board.run_until(self.board.time_us + round(seconds * 1e6))
+    def lead(self, to: Mapping[int, float | End], seconds: float) -> Mapping[int, float]:
+        angles = {
+            joint: self.board.end_stop(joint, high=place == "high") if isinstance(place, str) else radians(place)
+            for joint, place in to.items()
+        }
+        self.board.lead(angles, seconds)
+        return {joint: degrees(angle) for joint, angle in angles.items()}
 
     def switch_off_and_on(self) -> None:
         self.board.brown_out()
@@ -140,7 +142,7 @@ def search(seed: int, documented: Documented, *, commands: bool = True) -> Score
     options = Options(tcp="nowhere:0", secret_map=seed, documented=documented, seed=seed, start=start, lock_step=True)
     board = build_device(options, lambda _: None).board
     page, arm = BoardPage(board), BoardArm(board)
-    operator = MockOperator(arm, load_machine("ma2000"), postures=dict(enumerate(map(float, start), start=1)))
+    operator = MockOperator(arm, load_machine("ma2000"))
     findings = Finder(page, operator, inputs=5).find()
     proofs: list[CommandProof] = []
     if commands and not may_have_power(errors_now(page, findings.joints)):

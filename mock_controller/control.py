@@ -20,6 +20,7 @@ from mock_controller.faults.registry import describe
 Answer = dict[str, Any]
 _LONGEST_LEAD_S = 600.0
 _JOINTS = tuple("123456")
+_ENDS = ("low", "high")
 
 
 class ControlError(ValueError):
@@ -173,22 +174,30 @@ class Control:
 
     def _emergency_stop(self, request: Answer) -> Answer:
         """Presses the emergency stop ("pressed": true) or releases it: the drives lose their power, and a hand holds
-        the arm."""
+        the arm where the answer's "degrees" have it."""
         pressed = request.get("pressed")
         if not isinstance(pressed, bool):
             raise ControlError('"pressed": true or false is needed')
-        self._device.board.press_emergency_stop(pressed)
-        return {"pressed": pressed}
+        board = self._device.board
+        board.press_emergency_stop(pressed)
+        held = enumerate(board.plant.joint_angles, start=1)
+        return {"pressed": pressed, "degrees": {joint: math.degrees(angle) for joint, angle in held}}
 
     def _hand(self, request: Answer) -> Answer:
-        """Leads joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees}, "seconds"."""
+        """Leads joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees, or "low" or "high"
+        for an end stop}, "seconds"."""
         to, seconds = request.get("to"), request.get("seconds", 0.0)
-        if not isinstance(to, dict) or not all(key in _JOINTS and _is_number(value) for key, value in to.items()):
-            raise ControlError('"to": degrees by joint are needed, as in {"1": 90}')
+        if not isinstance(to, dict) or not all(key in _JOINTS and _is_place(value) for key, value in to.items()):
+            raise ControlError('"to": degrees by joint are needed, as in {"1": 90}, or "low" or "high" for an end stop')
         if not _is_number(seconds) or not 0 <= seconds <= _LONGEST_LEAD_S:
             raise ControlError(f'"seconds": a number from 0 to {_LONGEST_LEAD_S:g} is needed')
-        self._device.board.lead({int(joint): math.radians(angle) for joint, angle in to.items()}, seconds)
-        return {"to": to, "seconds": seconds}
+        board = self._device.board
+        angles = {
+            int(joint): board.end_stop(int(joint), high=place == "high") if place in _ENDS else math.radians(place)
+            for joint, place in to.items()
+        }
+        board.lead(angles, seconds)
+        return {"to": {str(joint): math.degrees(angle) for joint, angle in angles.items()}, "seconds": seconds}
 
     def _written(self, _: Answer) -> Answer:
         """How often the host has written to each address."""
@@ -215,6 +224,10 @@ class Control:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_place(value: object) -> bool:
+    return value in _ENDS or _is_number(value)
 
 
 def _word(request: Answer, key: str) -> str:

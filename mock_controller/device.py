@@ -52,6 +52,11 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
         arm = draw_arm(options.secret)
         arm_seed, modifications = arm.seed, arm.modifications()
         parameters, plant_parameters = arm.board_parameters(parameters), arm.plant_parameters(plant_parameters)
+    if options.secret_sensors is not None:
+        from mock_controller.hidden.sensors import draw_sensors
+
+        parameters = replace(parameters, calibrations=draw_sensors(options.secret_sensors, parameters.calibrations))
+        arm_seed = options.secret_sensors if arm_seed is None else arm_seed
     if options.start is None:
         plant = Plant(plant_parameters, modifications)
     else:

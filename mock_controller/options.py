@@ -44,6 +44,7 @@ class Options(BaseModel):
     modify: tuple[str, ...] = ()
     secret: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     secret_map: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    secret_sensors: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     documented: Literal["kept", "moved"] = "kept"
     fault: tuple[str, ...] = ()
 
@@ -181,6 +182,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SEED",
         help="registers at secret addresses, others between them; --memory-map is then what the bridge believes. "
         "python -m mock_controller.reveal --memory-map SEED shows the truth",
+    )
+    machine.add_argument(
+        "--secret-sensors",
+        type=int,
+        metavar="SEED",
+        help="potentiometers of secret direction, zero and range. "
+        "python -m mock_controller.reveal --sensors SEED shows the truth",
     )
     machine.add_argument(
         "--documented",

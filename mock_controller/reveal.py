@@ -1,5 +1,6 @@
 """`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each; with
-`--memory-map`, what the memories of `--secret-map SEED` hide.
+`--memory-map`, what the memories of `--secret-map SEED` hide, with `--sensors`, the potentiometers of
+`--secret-sensors SEED`.
 
 For scoring answers after they have been given. Exit code 2 for seeds without a meaning.
 """
@@ -9,21 +10,30 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from typing import Any
 
+from mock_controller.board.parameters import default_board
 from mock_controller.hidden.arm import draw_arm
 from mock_controller.hidden.memory import draw_memory
+from mock_controller.hidden.sensors import draw_sensors, truth_of
 
 
 def main(arguments: list[str]) -> int:
     """Prints the truth; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m mock_controller.reveal", description=__doc__)
     parser.add_argument("seeds", type=int, nargs="+", metavar="SEED")
-    parser.add_argument("--memory-map", action="store_true", help="the seeds are those of --secret-map")
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument("--memory-map", action="store_true", help="the seeds are those of --secret-map")
+    kind.add_argument("--sensors", action="store_true", help="the seeds are those of --secret-sensors")
     parser.add_argument("--documented", choices=("kept", "moved"), default="kept", help="as given to the mock")
     given = parser.parse_args(arguments)
+    truths: list[Any]
     try:
         if given.memory_map:
             truths = [draw_memory(seed, given.documented).truth() for seed in given.seeds]
+        elif given.sensors:
+            stated = default_board().calibrations
+            truths = [{"seed": seed, "sensors": truth_of(draw_sensors(seed, stated))} for seed in given.seeds]
         else:
             truths = [draw_arm(seed).truth() for seed in given.seeds]
     except ValueError as error:

@@ -74,7 +74,7 @@ SHARED = 10
     DISTURBANCE_FREQUENCY,  # Hz
     AT_ZERO,  # rad at count 0
     RAD_PER_COUNT,  # signed; 0 where there is no sensor
-    RANGE,  # rad
+    RANGE,  # rad from count 0 to the last one, signed as counting
     POTENTIOMETER_GAIN,  # relative, about the middle of the range
     POTENTIOMETER_OFFSET,  # rad
     BEND_1,  # rad, sine of half a wave over the range, and its harmonics

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from starlette.exceptions import HTTPException
 
 MEDIA_TYPE = "application/problem+json"
+SCHEMA = {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}
 log = logging.getLogger("server")
 
 TITLES = {
@@ -222,7 +223,8 @@ def _what(error: Mapping[str, Any]) -> str:
 
 
 PROBLEMS: dict[int | str, dict[str, Any]] = {
-    status: {"model": ProblemDetails, "description": TITLES[status], "content": {MEDIA_TYPE: {}}}
+    status: {"description": TITLES[status], "content": {MEDIA_TYPE: {"schema": SCHEMA}}}
     for status in (400, 401, 403, 404, 409, 413, 422, 429, 503, 507)
 }
-"""The problems with which any route may answer, for its `responses`."""
+"""The problems with which any route may answer, for its `responses`. They refer to the schema, which the description
+adds once: with the model itself FastAPI would make a validator of its own for each of them at every route."""

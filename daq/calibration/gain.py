@@ -10,6 +10,7 @@ that the law is another one.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -106,7 +107,8 @@ def estimate_gain(
             "make larger steps"
         )
         return NoEstimate(joint, reason, len(errors), saturated)
-    to_volts_per_rad = machine.joint(joint).dc_motor.scale.counts_to_volts(1) / machine.calibration(joint).rad_per_count
+    volts = machine.joint(joint).dc_motor.scale.counts_to_volts(machine.drive_sign(joint))
+    to_volts_per_rad = volts / machine.calibration(joint).rad_per_count
     return GainEstimate(
         joint=joint,
         gain=gain,
@@ -120,6 +122,30 @@ def estimate_gain(
         saturated=saturated,
         errors=len(np.unique(errors)),
     )
+
+
+@dataclass(frozen=True)
+class CommonGain:
+    """Gain per unit of P that `joints` have in common (DAC counts per ADC count), and its standard error."""
+
+    joints: tuple[int, ...]
+    value: float
+    deviation: float
+
+
+def common_gain(estimates: Sequence[GainEstimate]) -> CommonGain | None:
+    """The gain per unit of P that agrees with every sample of every joint; None where there is none, or no P is
+    known."""
+    known = [(one, one.gain / one.per_unit) for one in estimates if one.per_unit]
+    if not known or len(known) < len(estimates):
+        return None
+    lowest, highest = max(e.lowest / p for e, p in known), min(e.highest / p for e, p in known)
+    if lowest >= highest:
+        return None
+    weights = [(p / e.standard_error) ** 2 for e, p in known]
+    mean = sum(w * e.gain / p for w, (e, p) in zip(weights, known, strict=True)) / sum(weights)
+    value = mean if lowest < mean < highest else (lowest + highest) / 2
+    return CommonGain(tuple(e.joint for e, _ in known), value, 1 / math.sqrt(sum(weights)))
 
 
 def gains_from_trace(trace: Trace, machine: Machine) -> list[GainEstimate | NoEstimate]:

@@ -362,6 +362,17 @@ class Machine(FrozenRecord):
         step = of_joint(getattr(self.controller, "drive_resolution", None), joint)
         return motor.scale if step is None else DriveScale(step.value, 1.0, 1)
 
+    def drive_sign(self, joint: int) -> int:
+        """Sign of the drive for a positive output of the board's controller, on joint `joint` (from 1).
+
+        The controller works in counts, so on any arm that comes to rest a positive output makes the counts grow: a
+        sensor that counts down, or a gear that turns the motion round, belongs to a motor that is connected the other
+        way.
+        """
+        sensor, drive = self.joint(joint).sensor, self.joint(joint).drive
+        counting = 1 if sensor is None else sensor.direction
+        return counting if (drive.gain if isinstance(drive, PlainGain) else drive.gear_ratio).value > 0 else -counting
+
     def joint(self, number: int) -> Joint:
         """Joint `number` (from 1). Raises SpecError when there is none."""
         if not 1 <= number <= len(self.joints):

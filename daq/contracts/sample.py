@@ -11,8 +11,9 @@ class SampleRow:
 
     `time` is tick · period, in s from the record's first tick: the board's own time. `host_time` is the host's
     monotonic clock (s) when the sample arrived. `set_point` is what the controller took in this period, not what was
-    sent. `status` holds the board's flags (`firmware_protocol.commands.StatusFlag`). `velocity` is empty on a rig that
-    does not measure it, such as the MA2000.
+    sent, and `taken` the number of the first period that used it, 0 where that is not known. `status` holds the board's
+    flags (`firmware_protocol.commands.StatusFlag`). `velocity` is empty on a rig that does not measure it, such as the
+    MA2000.
     """
 
     tick: int
@@ -25,3 +26,4 @@ class SampleRow:
     power_raw: tuple[int, ...]
     status: int = 0
     velocity: tuple[float, ...] = ()
+    taken: int = 0

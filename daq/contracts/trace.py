@@ -115,6 +115,8 @@ class Trace:
     tick:      (n,)   number of the control period; a step of more than `record.every` is a gap
     host_time: (n,)   s, the host's monotonic clock when the sample arrived
     status:    (n,)   the board's flags (`firmware_protocol.commands.StatusFlag`)
+    taken:     (n,)   number of the first control period that used the sample's set points, 0 where it is not known;
+                      None where every period has a sample, which shows it
 
     Raises TraceError when shapes disagree, time does not increase, or a value is not finite.
     """
@@ -131,6 +133,7 @@ class Trace:
     tick: Integers | None = None
     host_time: Floats | None = None
     status: Integers | None = None
+    taken: Integers | None = None
     events: tuple[TraceEvent, ...] = field(default=())
 
     def __repr__(self) -> str:
@@ -155,7 +158,7 @@ class Trace:
                 raise TraceError(f"trace {self.record.trace_id}: {name} is not finite at sample {row}")
         if not np.isfinite(self.time).all() or (count > 1 and not (np.diff(self.time) > 0).all()):
             raise TraceError(f"trace {self.record.trace_id}: time must be finite and strictly increasing")
-        for name in ("tick", "host_time", "status"):
+        for name in ("tick", "host_time", "status", "taken"):
             signal = getattr(self, name)
             if signal is not None and signal.shape != (count,):
                 raise TraceError(f"trace {self.record.trace_id}: {name} has shape {signal.shape}, expected {(count,)}")

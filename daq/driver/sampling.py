@@ -109,8 +109,9 @@ class Deliveries:
         after the time between two samples, `every` periods. What is missing is counted in samples, too: one for every
         `every` periods, or part of them, by which the snapshot is too new."""
         missing = 0 if after is None else max(0, -(-(tick - after - 1) // every))
-        missed = self.watch.missed(tick, joints) or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
-        snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed)
+        used = self.watch.seen(tick, joints)
+        missed = used.missed or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
+        snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed, used.since)
         tally = self.link.tally
         if missing:
             tally.count("missing_samples", missing)

@@ -22,6 +22,18 @@ class SentSetPoints:
         return all(reading.set_point == self.postures[joint] for joint, reading in joints if joint in self.postures)
 
 
+@dataclass(frozen=True)
+class Used:
+    """What is known of the set points that a period used.
+
+    missed: they are older than those that were due; never while nothing is due
+    since:  the first period that used them; None where that is not known
+    """
+
+    missed: bool = False
+    since: int | None = None
+
+
 @dataclass
 class SetPointWatch:
     """What has been sent, in order.
@@ -68,11 +80,14 @@ class SetPointWatch:
         with self._lock:
             self._sent.clear()
 
-    def missed(self, tick: int, joints: tuple[tuple[int, JointReading], ...]) -> bool:
-        """Whether period `tick` shows set points older than those due. False while nothing is due."""
+    def seen(self, tick: int, joints: tuple[tuple[int, JointReading], ...]) -> Used:
+        """Judges the set points that period `tick` used."""
         with self._lock:
             due = [i for i, batch in enumerate(self._sent) if batch.due is not None and batch.due <= tick]
             if not due:
-                return False
+                return Used()
             del self._sent[: due[-1]]
-            return not any(batch.shown_by(joints) for batch in self._sent)
+            shown = next((batch for batch in self._sent if batch.shown_by(joints)), None)
+            if shown is None:
+                return Used(missed=True)
+            return Used(since=None if shown.due is None else min(shown.due, tick))

@@ -30,6 +30,8 @@ class BoardSnapshot:
     """Number of samples that were asked for and are not there, between the previous sample and this one."""
     set_points_missed: bool = False
     """The controller did not take what was in its memory when the period began."""
+    taken: int | None = None
+    """The first period that used these set points, as the bridge confirmed them; None where it is not known."""
 
     @property
     def tick_is_estimate(self) -> bool:

@@ -19,7 +19,8 @@ class RowMaker:
         self.joints = tuple(joints)
         self._period = period
         self._calibrations = [machine.calibration(joint) for joint in joints]
-        self._scales = [machine.drive_scale(joint) for joint in joints]
+        scales = [machine.drive_scale(joint) for joint in joints]
+        self._drives = [(machine.drive_sign(joint), scale) for joint, scale in zip(joints, scales, strict=True)]
         self._first: int | None = None
 
     def row(self, snapshot: BoardSnapshot) -> SampleRow:
@@ -36,7 +37,11 @@ class RowMaker:
             set_point=tuple(own.posture_to_rad(reading.set_point) for own, reading in both),
             position=tuple(own.counts_to_rad(reading.position) for own, reading in both),
             error=tuple(own.rad_per_count * reading.error for own, reading in both),
-            drive=tuple(scale.counts_to_volts(r.power) for scale, r in zip(self._scales, readings, strict=True)),
+            drive=tuple(
+                scale.counts_to_volts(sign * reading.power)
+                for (sign, scale), reading in zip(self._drives, readings, strict=True)
+            ),
             power_raw=tuple(reading.power for reading in readings),
             status=int(snapshot.flags),
+            taken=snapshot.taken or 0,
         )

@@ -57,11 +57,11 @@ def _range_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) 
     own = limits.joint(joint)
     angles = plan.angles[:, joint - 1]
     slack = rounding_slack(machine, joint) + TOLERANCE
-    allowed = f"{_degrees(own.low)} to {_degrees(own.high)}"
     found = []
     for limit, sign, worst in ((own.low, -1, int(angles.argmin())), (own.high, 1, int(angles.argmax()))):
         value, time = float(angles[worst]), worst * plan.period
         if limit is not None and sign * (value - limit) > slack:
+            allowed = f"{_degrees(own.low)} to {_degrees(own.high)}"
             line = f"joint {joint}: {_degrees(value)} at {time:.2f} s: allowed are {allowed}"
             found.append(Violation("range", joint, time, value, limit, line))
     return found

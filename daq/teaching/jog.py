@@ -33,8 +33,8 @@ class JogCommand:
 
 @dataclass(frozen=True)
 class JogStep:
-    """Set points for the next period (joint → posture units), the angles (rad) that they stand for, and why joints
-    that should move do not."""
+    """Set points for after a sample (joint → posture units), the angles (rad) that they stand for, and why joints that
+    should move do not."""
 
     postures: Mapping[int, int] = field(default_factory=dict)
     angles: Mapping[int, float] = field(default_factory=dict)
@@ -48,43 +48,64 @@ def top_speed(limits: Limits, joint: int) -> float:
 
 
 class Jogger:
-    """Computes one set point per period. Pure except for the angles it has accepted.
+    """Computes one set point per sample. Pure except for the angles it has accepted and the tick of the last sample.
+
+    every: control periods from one sample to the next: more than one where the line is slow. A step is as long as the
+           time between the last two samples, so that the joint has its speed, and never longer than so many periods:
+           after a gap it goes on where it was.
 
     Needs all joints of the machine in every sample, since floor and reach depend on all. Raises SpecError without
     them, and for commands that are faster than allowed.
     """
 
-    def __init__(self, machine: Machine, limits: Limits, joints: tuple[int, ...]) -> None:
+    def __init__(self, machine: Machine, limits: Limits, joints: tuple[int, ...], every: int = 1) -> None:
         if len(joints) != len(machine.joints):
             raise SpecError(f"jog: samples have joints {list(joints)}, all of 1 to {len(machine.joints)} are needed")
         self._machine = machine
         self._limits = limits
         self._joints = joints
         self._period = control_period(machine)
+        self._every = every
+        self._last: int | None = None
         self._driven: dict[int, float] = {}
 
     def step(self, row: SampleRow, command: JogCommand | None) -> JogStep:
-        """The step to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
+        """The step to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN.
+
+        A step of several periods that would leave the limits is replaced by one of one period: so the joint comes as
+        near to its limit as on a fast line.
+        """
+        periods = self._periods_to(row)
         if command is None or row.host_time - command.time > DEAD_MAN:
             return JogStep()
         self._check(command)
         here = self._angles(row)
-        there = here.copy()
-        moving = tuple(joint for joint, velocity in command.velocities.items() if velocity)
-        for joint in moving:
-            there[joint - 1] += command.velocities[joint] * self._period
-        plan = make_plan(self._machine, moving, np.stack([here, there]))
-        violations = check_move_to_start(plan, self._machine, self._limits)
-        if violations:
-            return JogStep(refused=tuple(str(violation) for violation in violations))
-        return JogStep(
-            {joint: int(plan.postures[1, joint - 1]) for joint in moving},
-            {joint: float(there[joint - 1]) for joint in moving},
-        )
+        step = self._moved(here, command, periods)
+        return self._moved(here, command, 1) if step.refused and periods > 1 else step
 
     def accept(self, step: JogStep) -> None:
         """Notes that the step has been sent: the next one continues from it."""
         self._driven.update(step.angles)
+
+    def _periods_to(self, row: SampleRow) -> int:
+        """Control periods from the sample before to this one, which a step makes up for; at most `every`."""
+        before, self._last = self._last, row.tick
+        return self._every if before is None else max(1, min(self._every, row.tick - before))
+
+    def _moved(self, here: Floats, command: JogCommand, periods: int) -> JogStep:
+        """The step of so many periods from set points `here` (rad), or why there is none."""
+        there = here.copy()
+        moving = tuple(joint for joint, velocity in command.velocities.items() if velocity)
+        for joint in moving:
+            there[joint - 1] += command.velocities[joint] * periods * self._period
+        plan = make_plan(self._machine, moving, np.linspace(here, there, periods + 1))
+        violations = check_move_to_start(plan, self._machine, self._limits)
+        if violations:
+            return JogStep(refused=tuple(str(violation) for violation in violations))
+        return JogStep(
+            {joint: int(plan.postures[-1, joint - 1]) for joint in moving},
+            {joint: float(there[joint - 1]) for joint in moving},
+        )
 
     def _check(self, command: JogCommand) -> None:
         for joint, velocity in command.velocities.items():
@@ -113,7 +134,7 @@ def jog(
 
     Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped; it is frozen then.
     """
-    jogger = Jogger(machine, limits, arm.joints)
+    jogger = Jogger(machine, limits, arm.joints, arm.every)
     guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints, every=arm.every)
     lag = Lag(control_period(machine), arm.every)
     told: tuple[str, ...] = ()

@@ -32,6 +32,7 @@ LARGEST = {
     "time": (LARGEST_TIME, "s"),
     "host_time": (LARGEST_TIME, "s"),
     "tick": (LARGEST_TICK, "control periods"),
+    "taken": (LARGEST_TICK, "control periods"),
     "position": (LARGEST_POSITION, "rad or m"),
     "set_point": (LARGEST_POSITION, "rad or m"),
     "error": (2 * LARGEST_POSITION, "rad or m"),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import layout
+from daq.traces import layout, set_points_taken
 from daq.traces.scan import UNREADABLE, Scan, payloads, require
 
 Samples = NDArray[Any]
@@ -20,10 +20,17 @@ Samples = NDArray[Any]
 
 @dataclass(frozen=True)
 class Decoded:
-    """The samples of each joint, in the order of `joints`, with the same ticks; and the events."""
+    """The samples of each joint, in the order of `joints`, with the same ticks; when their set points were taken, where
+    the file tells; and the events."""
 
     samples: tuple[Samples, ...]
+    taken: NDArray[Any] | None
     events: tuple[TraceEvent, ...]
+
+    @property
+    def of_periods(self) -> tuple[NDArray[Any], ...]:
+        """Messages of every topic that has one in each recorded period."""
+        return self.samples if self.taken is None else (*self.samples, self.taken)
 
 
 def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded:
@@ -32,8 +39,11 @@ def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded
     parts = [decoder.chunk(chunk) for chunk in found.chunks]
     empty = np.empty(0, layout.JOINT_SAMPLE_DTYPE)
     samples = tuple(np.concatenate([empty, *(part.samples[column] for part in parts)]) for column in range(len(joints)))
-    _require_same_ticks(samples)
-    return Decoded(samples, tuple(event for part in parts for event in part.events))
+    times = [part.taken for part in parts if part.taken is not None]
+    taken = np.concatenate([set_points_taken.read([]), *times]) if decoder.tells_taken else None
+    decoded = Decoded(samples, taken, tuple(event for part in parts for event in part.events))
+    _require_same_ticks(decoded.of_periods)
+    return decoded
 
 
 def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimits, origin: str) -> None:
@@ -49,9 +59,9 @@ def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimit
     last = -np.inf
     for number, chunk in enumerate(found.chunks):
         try:
-            samples = decoder.chunk(chunk).samples
-            _require_same_ticks(samples)
-            time = samples[0]["time"]
+            decoded = decoder.chunk(chunk)
+            _require_same_ticks(decoded.of_periods)
+            time = decoded.samples[0]["time"]
             if not (np.diff(time, prepend=last) > 0).all():
                 raise ValueError("its time does not increase")
         except UNREADABLE as error:
@@ -70,26 +80,33 @@ class _Decoder:
         channels = _channels(found)
         self._joints = [channels.get(f"{layout.JOINT_TOPIC}{joint}") for joint in joints]
         self._events = channels.get(layout.EVENTS_TOPIC)
+        self._taken = set_points_taken.channel_in(found)
+
+    @property
+    def tells_taken(self) -> bool:
+        """Whether the file tells when set points were taken."""
+        return self._taken is not None
 
     def chunk(self, chunk: bytes) -> Decoded:
         """Raises ValueError, struct.error."""
         parts: dict[int, list[bytes]] = {
-            channel: [] for channel in (*self._joints, self._events) if channel is not None
+            channel: [] for channel in (*self._joints, self._taken, self._events) if channel is not None
         }
         count, seen = payloads(chunk, parts, self._records_left)
         self._records_left -= count
         if not seen <= self._known:
             raise ValueError(f"channel {min(seen - self._known)} is not defined")
         samples = tuple(_samples(parts[channel] if channel is not None else []) for channel in self._joints)
+        taken = None if self._taken is None else set_points_taken.read(parts[self._taken])
         events = parts[self._events] if self._events is not None else []
         self._event_count += len(events)
         require(self._event_count, self._most_events, "there are more than {} events", "events")
-        return Decoded(samples, tuple(layout.event_of(message) for message in events))
+        return Decoded(samples, taken, tuple(layout.event_of(message) for message in events))
 
 
-def _require_same_ticks(samples: tuple[Samples, ...]) -> None:
+def _require_same_ticks(samples: tuple[NDArray[Any], ...]) -> None:
     if any(not np.array_equal(other["tick"], samples[0]["tick"]) for other in samples[1:]):
-        raise ValueError("the joints do not have the same ticks")
+        raise ValueError("the topics do not have the same ticks")
 
 
 def _channels(found: Scan) -> dict[str, int]:

@@ -41,6 +41,8 @@ OPTIONAL_SIGNALS = ("set_point", "error", "drive", "velocity")
 """Signals a sample may lack (NaN)."""
 RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "error", "drive", "power_raw")
 """Signals that a recording of the controller has."""
+SLOW_LINE_SIGNALS = (*RECORDED_SIGNALS, "taken")
+"""The same where only every n-th period has a sample."""
 
 ALL_SIGNALS = (
     "time",
@@ -53,10 +55,11 @@ ALL_SIGNALS = (
     "tick",
     "host_time",
     "status",
+    "taken",
 )
 """Columns of a trace."""
 
-_CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _JOINT_SAMPLE = struct.Struct("<4s2dq5diI")
 JOINT_SAMPLE_BYTES = _JOINT_SAMPLE.size
 JOINT_SAMPLE_DTYPE = np.dtype(
@@ -103,7 +106,7 @@ def timestamp(utc_ns: int) -> dict[str, int]:
 def joint_sample(row: SampleRow, column: int) -> bytes:
     """The sample of one joint: `column` is its index in the row."""
     return _JOINT_SAMPLE.pack(
-        _CDR_LITTLE_ENDIAN,
+        CDR_LITTLE_ENDIAN,
         row.time,
         row.host_time,
         row.tick,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces import cache, disk, layout
+from daq.traces import cache, disk, layout, set_points_taken
 from daq.traces.bounds import check_record, check_signals
 from daq.traces.decode import Decoded, decode
 from daq.traces.metadata import joints_of, one_line, record_of, signals_of
@@ -73,7 +73,10 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
     count = len(decoded.samples[0])
     if end is not None and end.get("samples", str(count)) != str(count):
         raise TraceError(f"{origin}: has {count} samples, and says at its end that they are {end['samples'][:20]}")
-    signals = _signals(signals_of(start, origin), decoded)
+    named = signals_of(start, origin)
+    if set_points_taken.SIGNAL in named and decoded.taken is None and count:
+        raise TraceError(f"{origin}: is not laid out as a trace: it has no topic {set_points_taken.TOPIC}")
+    signals = _signals(named, decoded)
     check_signals(signals, origin)
     check_record(record, decoded.events, origin)
     return Trace(record, joints, events=decoded.events, **signals)
@@ -93,4 +96,6 @@ def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, NDArray[Any]]
         found["power_raw"] = columns("power_raw").astype(np.int64)
     if "status" in names:
         found["status"] = first["status"].astype(np.int64)
+    if set_points_taken.SIGNAL in names and decoded.taken is not None:
+        found["taken"] = decoded.taken["taken"].copy()
     return found

@@ -11,7 +11,7 @@ from mcap.writer import CompressionType, Writer
 from daq.contracts.errors import TraceError
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
-from daq.traces import layout
+from daq.traces import layout, set_points_taken
 
 ONE_CHUNK_A_FLUSH = 1 << 40
 """Chunk size (bytes) that is never reached: chunks end only at `flush`, never inside a row."""
@@ -82,6 +82,7 @@ class Recording:
             for joint, name in zip(joints, self._names, strict=True)
         ]
         self._log = self._mcap.register_channel(layout.EVENTS_TOPIC, "json", log)
+        self._taken = set_points_taken.register(self._mcap) if set_points_taken.SIGNAL in signals else None
 
     def row(self, row: SampleRow) -> None:
         """Adds one control period.
@@ -96,6 +97,8 @@ class Recording:
         self._mcap.add_message(self._states, logged, states, published, self.samples)
         for column, channel in enumerate(self._joints):
             self._mcap.add_message(channel, logged, layout.joint_sample(row, column), published, self.samples)
+        if self._taken is not None:
+            self._mcap.add_message(self._taken, logged, set_points_taken.message(row), published, self.samples)
         self.samples += 1
         self.last_time = row.time
 

@@ -48,7 +48,7 @@ def write_trace(trace: Trace, path: Path) -> Path:
 
 
 def _signals(trace: Trace) -> tuple[str, ...]:
-    names = (*layout.RECORDED_SIGNALS, "velocity")
+    names = (*layout.SLOW_LINE_SIGNALS, "velocity")
     return tuple(name for name in names if getattr(trace, name) is not None)
 
 
@@ -57,7 +57,7 @@ def _rows(trace: Trace) -> Iterator[SampleRow]:
     absent = (math.nan,) * len(trace.joints)
     columns = {
         name: None if getattr(trace, name) is None else getattr(trace, name).tolist()
-        for name in ("tick", "host_time", "status", "set_point", "error", "drive", "velocity", "power_raw")
+        for name in ("tick", "host_time", "status", "taken", "set_point", "error", "drive", "velocity", "power_raw")
     }
 
     def values(name: str, row: int) -> tuple[float, ...]:
@@ -65,6 +65,7 @@ def _rows(trace: Trace) -> Iterator[SampleRow]:
         return absent if column is None else tuple(column[row])
 
     ticks, arrivals, flags, powers = (columns[name] for name in ("tick", "host_time", "status", "power_raw"))
+    taken = columns["taken"]
     for row, (time, position) in enumerate(zip(trace.time.tolist(), trace.position.tolist(), strict=True)):
         yield SampleRow(
             tick=row if ticks is None else ticks[row],
@@ -77,4 +78,5 @@ def _rows(trace: Trace) -> Iterator[SampleRow]:
             power_raw=(0,) * len(trace.joints) if powers is None else tuple(powers[row]),
             status=0 if flags is None else flags[row],
             velocity=() if columns["velocity"] is None else values("velocity", row),
+            taken=0 if taken is None else taken[row],
         )

@@ -115,6 +115,10 @@ def _ticks(trace: Trace) -> Iterator[Finding]:
         first = float(trace.time[int(np.argmax(steps > trace.record.every))])
         message = f"{trace.missing} samples are missing in {gaps} gaps, the first after {first:.3f} s"
         yield Finding(level="warning", check="gaps", message=message)
+    if trace.taken is not None and (trace.taken > trace.tick).any():
+        row = int(np.argmax(trace.taken > trace.tick))
+        message = f"the set points of tick {trace.tick[row]} are said to have been taken in tick {trace.taken[row]}"
+        yield Finding(level="error", check="set_points", message=message)
     counted = trace.record.counters.get(MISSING_COUNTER)
     if counted is not None and counted < trace.missing:
         message = f"{trace.missing} samples are missing, the link counted {counted:.0f}"

@@ -16,7 +16,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
 from daq.traces import disk
-from daq.traces.layout import RECORDED_SIGNALS
+from daq.traces.layout import RECORDED_SIGNALS, SLOW_LINE_SIGNALS
 from daq.traces.naming import part_path
 from daq.traces.recording import Recording
 
@@ -73,7 +73,8 @@ class TraceWriter:
         except OSError as error:
             raise TraceError(f"{path}: cannot be made: {disk.reason(error)}") from error
         try:
-            self._recording = Recording(self._stream, record, joints, RECORDED_SIGNALS, attachments or {})
+            signals = RECORDED_SIGNALS if record.every == 1 else SLOW_LINE_SIGNALS
+            self._recording = Recording(self._stream, record, joints, signals, attachments or {})
             disk.sync(self._stream)
             disk.sync_folder(path.parent)
         except BaseException as error:

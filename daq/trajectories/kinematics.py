@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from daq.contracts.machine import Joint, Machine
@@ -28,17 +30,13 @@ def _transformation(joint: Joint, value: Floats) -> tuple[Floats, Floats]:
     geometry = joint.geometry
     revolute = joint.kind == "revolute"
     theta = geometry.theta.value + (value if revolute else np.zeros_like(value))
-    d = geometry.d.value + (np.zeros_like(value) if revolute else value)
     cos_theta, sin_theta = np.cos(theta), np.sin(theta)
-    cos_alpha, sin_alpha = np.cos(geometry.alpha.value), np.sin(geometry.alpha.value)
-    zero = np.zeros_like(theta)
-    rotation = np.stack(
-        [
-            np.stack([cos_theta, -cos_alpha * sin_theta, sin_alpha * sin_theta], axis=-1),
-            np.stack([sin_theta, cos_alpha * cos_theta, -sin_alpha * cos_theta], axis=-1),
-            np.stack([zero, zero + sin_alpha, zero + cos_alpha], axis=-1),
-        ],
-        axis=-2,
-    )
-    origin = np.stack([geometry.a.value * cos_theta, geometry.a.value * sin_theta, d], axis=-1)
+    cos_alpha, sin_alpha = math.cos(geometry.alpha.value), math.sin(geometry.alpha.value)
+    rotation = np.empty((len(value), 3, 3))
+    rotation[:, 0, 0], rotation[:, 0, 1], rotation[:, 0, 2] = cos_theta, -cos_alpha * sin_theta, sin_alpha * sin_theta
+    rotation[:, 1, 0], rotation[:, 1, 1], rotation[:, 1, 2] = sin_theta, cos_alpha * cos_theta, -sin_alpha * cos_theta
+    rotation[:, 2] = 0.0, sin_alpha, cos_alpha
+    origin = np.empty((len(value), 3))
+    origin[:, 0], origin[:, 1] = geometry.a.value * cos_theta, geometry.a.value * sin_theta
+    origin[:, 2] = geometry.d.value if revolute else geometry.d.value + value
     return rotation, origin

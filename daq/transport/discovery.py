@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
+from daq.transport.url import TransportError
+
 
 @dataclass(frozen=True)
 class FoundPort:
@@ -31,6 +33,16 @@ def ports(found_by: Callable[[], Iterable[ListPortInfo]] = list_ports.comports) 
         )
         for port in found
     )
+
+
+def appeared(before: Iterable[FoundPort], after: Iterable[FoundPort]) -> FoundPort | None:
+    """The one port that is there after a cable was plugged in, and was not before; None where there is none. Raises
+    TransportError for several."""
+    known = {port.url for port in before}
+    new = [port for port in after if port.url not in known]
+    if len(new) > 1:
+        raise TransportError(f"{len(new)} ports appeared: {', '.join(port.url for port in new)}; plug in one cable")
+    return new[0] if new else None
 
 
 def _shown(text: str | None) -> str | None:

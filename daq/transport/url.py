@@ -97,6 +97,7 @@ MOCK_VALUES = (
     "gains",
     "memory_map",
     "secret_map",
+    "secret_sensors",
     "documented",
     "plant",
     "board",

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from daq.commissioning.memory.procedure import Operator
     from daq.commissioning.memory.watch import WatchedByte
     from daq_cli.robot.memory_page import LinkPage
-    from daq_cli.robot.mock_hand import ControlPortArm
 
 WINDOW = 200
 """Number of readings that the live table looks back on."""
@@ -82,23 +81,35 @@ def find(
     json: JsonOption = False,
 ) -> None:
     """Find positions, set points, errors, powers, gains and inputs, with evidence. Asks you to move the arm by hand;
-    writes nothing but set points of which it is proved that they are, and these only at the end."""
+    writes nothing but set points of which it is proved that they are, and these only at the end. What ends it while the
+    emergency stop is pressed is kept beside the memory map: the next call begins with the safe release."""
+    from daq.config.robot_files import load_memory_map
     from daq_cli.app.output_file import check_folder
+    from daq_cli.commands.commission.record import Record
+    from daq_cli.robot.person import person_at
+    from daq_cli.robot.safe_release import release_after_interruption
 
     for path, what in ((output, "memory map"), (findings, "findings")):
         check_folder(path, what)
-    call = invocation(context)
-    with _page(call) as page, _operator(call, mock_control) as operator:
-        found, proofs = search(
-            call,
-            page,
-            operator,
-            ConsentPrompt(yes),
-            findings,
-            inputs=inputs,
-            commands=commands,
-            when_found=lambda found: keep_map(found, output),
-        )
+    call, record = invocation(context), Record.of(output.absolute().parent)
+    _require_robot(call)
+    with person_at(call, mock_control) as operator:
+        if record.stop_pressed:
+            known = output if output.exists() else call.settings.robot.memory_map
+            memory_map = load_memory_map(known)
+            release_after_interruption(call.port, operator, memory_map, output.exists(), record.note_stop)
+        with _page(call) as page:
+            found, proofs = search(
+                call,
+                page,
+                operator,
+                ConsentPrompt(yes),
+                findings,
+                inputs=inputs,
+                commands=commands,
+                when_found=lambda found: keep_map(found, output),
+                pressed=record.note_stop,
+            )
     written = found.memory_map("") is not None
     if json:
         print_json(findings_data(found, proofs) | {"memory_map": str(output) if written else None})
@@ -118,7 +129,7 @@ def search(
     inputs: bool,
     commands: bool,
     when_found: Callable[[Findings], object],
-    pressed: Callable[[bool], None] = lambda _pressed: None,
+    pressed: Callable[[bool], None],
 ) -> tuple[Findings, list[CommandProof]]:
     """The whole search; the findings so far are written to `keep` after every stage that changes them.
 
@@ -222,6 +233,7 @@ def findings_data(found: Findings, proofs: list[CommandProof]) -> dict[str, obje
         "size": found.size,
         "findings": [one.as_data() for one in found.all],
         "free_running": [f"{address:04X}" for address in found.free_running],
+        "unchanged": {f"{address:04X}": value for address, value in found.unchanged},
         "proved_by_command": [asdict(proof) for proof in proofs],
     }
 
@@ -287,24 +299,11 @@ def _page(call: Invocation) -> Iterator[LinkPage]:
     from daq.config.robot_files import load_memory_map
     from daq_cli.robot.memory_page import open_page
 
-    if call.port_option is None and call.settings.robot.port is None:
-        raise ReachError("no robot is configured: give --port, or set robot.port in daq.toml (`daq config show`)")
+    _require_robot(call)
     with open_page(call.port, load_memory_map(call.settings.robot.memory_map)) as page:
         yield page
 
 
-@contextmanager
-def _operator(call: Invocation, mock_control: str | None) -> Iterator[Operator]:
-    """The person at the terminal, or a mock's stand-in."""
-    if mock_control is None:
-        from daq_cli.robot.terminal_operator import TerminalOperator
-
-        yield TerminalOperator()
-        return
-    from daq_cli.robot.mock_hand import IN_REAL_TIME, ControlPortArm, MockOperator
-
-    arm: ControlPortArm = ControlPortArm(mock_control)
-    try:
-        yield MockOperator(arm, call.settings.machine(), IN_REAL_TIME, arm.postures())
-    finally:
-        arm.close()
+def _require_robot(call: Invocation) -> None:
+    if call.port_option is None and call.settings.robot.port is None:
+        raise ReachError("no robot is configured: give --port, or set robot.port in daq.toml (`daq config show`)")

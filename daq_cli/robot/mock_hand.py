@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import math
 import socket
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 from urllib.parse import urlsplit
 
 from daq.commissioning.memory.procedure import Task
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.machine import Machine
-from firmware_protocol.memory_map import JOINTS
 
 WIGGLE = ((35, 0.4), (-35, 0.7), (20, 0.5), (-12, 0.4), (0, 0.2))
 """Posture units from where the joint is, and seconds to get there: slow, about the set point, for the power."""
@@ -28,20 +27,21 @@ PLACES, PLACES_APART = 11, 3
 """Postures of a protractor over a joint's range, and from one to the next."""
 
 
+End = Literal["low", "high"]
+"""An end stop."""
+
+
 class MockArm(Protocol):
     """What a mock offers to somebody who stands beside it."""
 
     def now(self) -> float:
         """Time in s, that of the mock."""
 
-    def emergency_stop(self, *, pressed: bool) -> None:
-        """Presses or releases it."""
+    def emergency_stop(self, *, pressed: bool) -> Mapping[int, float]:
+        """Presses or releases it; where the joints are (degrees), as somebody beside the arm sees."""
 
-    def lead(self, degrees: Mapping[int, float], seconds: float) -> None:
-        """Moves joints by hand."""
-
-    def wait(self, seconds: float) -> None:
-        """Lets the mock's time pass."""
+    def lead(self, to: Mapping[int, float | End], seconds: float) -> Mapping[int, float]:
+        """Moves joints by hand to angles (degrees) or to an end stop; the angles."""
 
     def switch_off_and_on(self) -> None:
         """Interrupts the controller's supply."""
@@ -52,15 +52,17 @@ class MockArm(Protocol):
 
 @dataclass
 class MockOperator:
-    """Carries out the tasks of a search on a mock that begins at `postures` (posture units)."""
+    """Carries out the tasks of a search on a mock. Postures are true angles in the stated calibration's units, since a
+    person sees where the arm is, whatever its sensors say."""
 
     arm: MockArm
     machine: Machine
     slow: float = 1.0
     """Factor on all times of a movement."""
-    postures: dict[int, float] = field(default_factory=lambda: dict.fromkeys(range(1, JOINTS + 1), 500.0))
-    _path: list[tuple[dict[int, float], float]] = field(default_factory=list)
+    postures: dict[int, float] = field(default_factory=dict)
+    _path: list[tuple[dict[int, float | End], float]] = field(default_factory=list)
     _until: float = 0.0
+    _before: dict[int, float] = field(default_factory=dict)
 
     def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
         """It always may."""
@@ -71,7 +73,8 @@ class MockOperator:
         """Begins a task; everything can be done."""
         self._path, self._until = [], self.arm.now()
         if task.kind == "press_emergency_stop":
-            self.arm.emergency_stop(pressed=True)
+            held = self.arm.emergency_stop(pressed=True)
+            self.postures = {joint: self._posture(joint, degrees) for joint, degrees in held.items()}
         elif task.kind == "release_emergency_stop":
             self.arm.emergency_stop(pressed=False)
         elif task.kind == "switch_off_and_on":
@@ -81,18 +84,27 @@ class MockOperator:
             self.arm.switch_off_and_on()
         elif task.kind == "set_inputs":
             self.arm.inputs(task.inputs)
-        elif task.kind == "lead" and task.joint is not None:
-            here = self.postures[task.joint]
-            centre = min(max(here, 60.0), 940.0)
-            self._path = [({task.joint: centre + by}, seconds) for by, seconds in WIGGLE]
-            self._path += [({task.joint: to}, seconds) for to, seconds in SWEEP]
-            self._path.append(({task.joint: here}, 1.2))
-        elif task.kind == "push" and task.joint is not None:
-            here = self.postures[task.joint]
-            self._path = [({task.joint: here + (12 if here < 500 else -12)}, 0.5)]
         elif task.kind == "place":
             self._path = [({joint: float(to) for joint, to in task.targets.items()}, 1.0)]
+        elif task.joint is not None and task.joint in self.postures:
+            self._path = self._led(task, task.joint)
         return True
+
+    def _led(self, task: Task, joint: int) -> list[tuple[dict[int, float | End], float]]:
+        """Where a joint is led, and within what time (s)."""
+        here = self.postures[joint]
+        if task.kind == "lead":
+            centre = min(max(here, 60.0), 940.0)
+            there: list[tuple[float | End, float]] = [(centre + by, seconds) for by, seconds in WIGGLE]
+            return [({joint: to}, seconds) for to, seconds in [*there, *SWEEP, (here, 1.2)]]
+        if task.kind == "push":
+            return [({joint: here + (12 if here < 500 else -12)}, 0.5)]
+        if task.kind == "end_stop":
+            self._before[joint] = here
+            return [({joint: "low"}, 2.0)]
+        if task.kind == "other_end_stop":
+            return [({joint: "high"}, 4.0)]
+        return [({joint: self._before[joint]}, 2.0)] if task.kind == "bring_back" else []
 
     def finished(self) -> bool:
         """Goes on to the next part of a movement when one is done."""
@@ -102,23 +114,20 @@ class MockOperator:
             return True
         to, seconds = self._path.pop(0)
         seconds *= self.slow
-        self.postures |= to
-        self.arm.lead({joint: self._degrees(joint, posture) for joint, posture in to.items()}, seconds)
+        places = {joint: p if isinstance(p, str) else self._degrees(joint, p) for joint, p in to.items()}
+        reached = self.arm.lead(places, seconds)
+        self.postures |= {joint: self._posture(joint, degrees) for joint, degrees in reached.items()}
         self._until = self.arm.now() + seconds
         return False
 
-    def read_angle(self, joint: int, number: int) -> float | None:
+    def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
         """Moves a joint by hand to posture `number` (from 1) of its range; the angle, read to half a degree."""
         to = 100.0 + 800.0 * ((number * PLACES_APART) % PLACES) / (PLACES - 1)
-        self._path = [({joint: to}, 1.0)]
+        self._path, self._until = [({joint: to}, 1.0)], self.arm.now()
         while not self.finished():
-            self.arm.wait(0.05)
-        self.arm.wait(0.2)
-        degrees = self._degrees(joint, to)
-        offset = round(2 * degrees) / 2 - degrees
-        self.arm.lead({joint: degrees + offset}, 0.1)
-        self.arm.wait(0.3)
-        return degrees + offset
+            wait(0.05)
+        wait(0.2)
+        return round(2 * self._degrees(joint, to)) / 2
 
     def show(self, text: str) -> None:
         """Nobody reads it."""
@@ -129,9 +138,23 @@ class MockOperator:
     def _degrees(self, joint: int, posture: float) -> float:
         return math.degrees(self.machine.calibration(joint).posture_to_rad(posture))
 
+    def _posture(self, joint: int, degrees: float) -> float:
+        stated = self.machine.calibration(joint)
+        return (math.radians(degrees) - stated.angle_at_zero_rad) / stated.rad_per_posture_unit
+
 
 class MockRefusedError(DaqError):
     """The mock did not do what it was asked to."""
+
+
+@contextmanager
+def mock_operator(control: str, machine: Machine, *, lock_step: bool) -> Iterator[MockOperator]:
+    """The stand-in at a mock's control port; unhurried where the mock follows the clock. Raises SpecError."""
+    arm = ControlPortArm(control)
+    try:
+        yield MockOperator(arm, machine, 1.0 if lock_step else IN_REAL_TIME)
+    finally:
+        arm.close()
 
 
 class ControlPortArm:
@@ -160,24 +183,15 @@ class ControlPortArm:
         """The board's time in s."""
         return float(self.ask("state")["time_us"]) * 1e-6
 
-    def wait(self, seconds: float) -> None:
-        """Sleeps. Raises MockRefusedError for a mock in lock-step, whose time stands still meanwhile."""
-        before = self.now()
-        time.sleep(seconds)
-        if self.now() == before:
-            raise MockRefusedError("a mock in lock-step has no time of its own: start it without --lock-step")
-
-    def postures(self) -> dict[int, float]:
-        """Where its set points are (posture units)."""
-        return {joint: float(posture) for joint, posture in enumerate(self.ask("state")["set_points"], start=1)}
-
-    def emergency_stop(self, *, pressed: bool) -> None:
+    def emergency_stop(self, *, pressed: bool) -> Mapping[int, float]:
         """Presses or releases it."""
-        self.ask("emergency_stop", pressed=pressed)
+        degrees = self.ask("emergency_stop", pressed=pressed)["degrees"]
+        return {int(joint): float(angle) for joint, angle in degrees.items()}
 
-    def lead(self, degrees: Mapping[int, float], seconds: float) -> None:
+    def lead(self, to: Mapping[int, float | End], seconds: float) -> Mapping[int, float]:
         """Moves joints by hand."""
-        self.ask("hand", to={str(joint): angle for joint, angle in degrees.items()}, seconds=seconds)
+        there = self.ask("hand", to={str(joint): place for joint, place in to.items()}, seconds=seconds)["to"]
+        return {int(joint): float(angle) for joint, angle in there.items()}
 
     def switch_off_and_on(self) -> None:
         """Interrupts the controller's supply."""

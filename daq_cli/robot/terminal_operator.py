@@ -15,7 +15,7 @@ from daq.commissioning.memory.procedure import Task
 from daq_cli.app.consent import can_be_asked
 from daq_cli.app.context import console
 
-NO_PAUSE = ("press_emergency_stop", "hold_for_release", "set_inputs", "rest", "command")
+NO_PAUSE = ("press_emergency_stop", "hold_for_release", "set_inputs", "rest", "command", "unplug", "plug_in")
 """Tasks that are over when the person says that they are done."""
 AT_ONCE = ("release_emergency_stop",)
 """Tasks that begin without a question, for one has just been answered."""
@@ -30,6 +30,11 @@ def words(task: Task) -> str:
         "lead": f"Move joint {task.joint} by hand, and no other: first a few degrees to and fro around where it is, "
         "slowly (some 10 s), then evenly to one end of its range, to the other end, and back to where it was.",
         "push": f"Move joint {task.joint} by hand by about 3 degrees, leave it there, and let go of it.",
+        "end_stop": f"Move joint {task.joint} by hand, gently, until it meets an end stop, and hold it there.",
+        "other_end_stop": f"Now move joint {task.joint} the other way until it meets its other end stop, and hold it.",
+        "bring_back": f"Bring joint {task.joint} back to about where it was, well clear of its end stops.",
+        "unplug": "Unplug the cable between this computer and the bridge.",
+        "plug_in": "Plug it in again, and wait a moment.",
         "place": "Bring the joints to about these postures (0 to 999 over a joint's range), and hold them there: "
         + ", ".join(f"joint {joint}: {posture}" for joint, posture in task.targets.items()),
         "switch_off_and_on": "With the emergency stop still pressed, switch the controller off and on again. The arm "
@@ -140,8 +145,9 @@ class TerminalOperator:
         self._answer()
         return True
 
-    def read_angle(self, joint: int, number: int) -> float | None:
+    def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
         """Asks for the angle of a joint that was moved by hand."""
+        del wait  # a person takes the time that it takes
         while True:
             self.lines.forget()
             console().print(

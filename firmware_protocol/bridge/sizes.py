@@ -1,4 +1,4 @@
-"""Sizes of a linked image by the folder of its sources, from the linker's map, for `make size`."""
+"""Sizes of a linked image by its sources, from the linker's map, for `make size`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,18 @@ def sizes(text: str) -> tuple[Counter[str], Counter[str]]:
     return flash, ram
 
 
+def core_files(text: str) -> Counter[str]:
+    """Bytes in flash by file of the core."""
+    flash: Counter[str] = Counter()
+    for kind, size, source in SECTION.findall(text):
+        if "core+" in source and kind in IN_FLASH:
+            flash[Path(source.partition("core+")[2]).stem] += int(size, 16)
+    return flash
+
+
 if __name__ == "__main__":
-    in_flash, in_ram = sizes(Path(sys.argv[1]).read_text("utf-8").split("Linker script and memory map")[1])
+    linked = Path(sys.argv[1]).read_text("utf-8").split("Linker script and memory map")[1]
+    in_flash, in_ram = sizes(linked)
     for folder in sorted(in_flash | in_ram):
         print(f"{folder:<12}{in_flash[folder]:>6} bytes of flash {in_ram[folder]:>6} bytes of RAM")
+    print("of the core:", ", ".join(f"{file} {size}" for file, size in core_files(linked).most_common()))

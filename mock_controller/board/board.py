@@ -239,6 +239,11 @@ class Board:
         self._advance_plant(now)
         self.hand.lead({joint - 1: angle for joint, angle in angles.items()}, now, round(seconds * 1e6))
 
+    def end_stop(self, joint: int, *, high: bool) -> float:
+        """Where a joint (from 1) meets an end stop (rad)."""
+        stops = self.plant.parameters.joints[joint - 1]
+        return stops.upper_stop if high else stops.lower_stop
+
     def _now_on_step(self) -> int:
         """The present, rounded up to a step of the plant (µs)."""
         step = self.plant.step_us

@@ -5,6 +5,7 @@ the functions it calls: after an edit of the dynamics it would go on running the
 unchanged simulation kernel. The machine code of a function is therefore kept in a folder named by a hash of its
 module and of every module of ours that this one reaches by imports: an edit of any of them gives a fresh folder, an
 edit of a report does not. What is compiled must take functions and constants by import, never by name at run time.
+Since that name tells all, it does not matter where the sources lie: another clone of them finds the same machine code.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Any
 
 import numba
 import platformdirs
+from numba.core.caching import UserProvidedCacheLocator
 
 CACHE_DAYS = 30
 """Caches of older sources that have not been written for this long are removed."""
@@ -34,6 +36,7 @@ PACKAGES = ("model", "daq", "firmware_protocol")
 
 _ROOT = Path(__file__).resolve().parents[2]
 _numba_settings: Any = numba.config
+_LOCATORS = getattr(_numba_settings, "CACHE_LOCATOR_CLASSES", "")
 _PARENT = Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
 
 
@@ -128,12 +131,33 @@ def _remove_old(parent: Path, before: float) -> None:
             shutil.rmtree(sibling, ignore_errors=True)
 
 
+class SharedCacheLocator(UserProvidedCacheLocator):
+    """Tells numba where to keep machine code: for sources of ours by their place in the project, not on the disk."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Folder below that of the module."""
+        path = Path(py_file).resolve()
+        if not path.is_relative_to(_ROOT):
+            own: str = super().get_suitable_cache_subpath(py_file)  # type: ignore[no-untyped-call]
+            return own
+        return ".".join(path.relative_to(_ROOT).parts[:-1])
+
+    def get_source_stamp(self) -> str:
+        """Of the content of the function's file; older versions of numba take its time."""
+        return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+
+
 def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> Any:
     """Compiles so that division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as
     a C compiler does with -march=native. So results repeat to the bit on one machine, not across machines."""
-    if cached:
-        _numba_settings.CACHE_DIR = str(cache_folder(function.__module__))  # read when the function is decorated
-    return numba.njit(cache=cached, error_model="numpy", fastmath={"contract"}, **options)(function)
+    if cached:  # both settings are read when the function is decorated
+        _numba_settings.CACHE_DIR = str(cache_folder(function.__module__))
+        _numba_settings.CACHE_LOCATOR_CLASSES = f"{__name__}.{SharedCacheLocator.__name__}"
+    try:
+        return numba.njit(cache=cached, error_model="numpy", fastmath={"contract"}, **options)(function)
+    finally:
+        _numba_settings.CACHE_LOCATOR_CLASSES = _LOCATORS
 
 
 def compiled(function: Callable[..., Any], *, nogil: bool = False) -> Any:

@@ -202,8 +202,9 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
     if sensor is not None:
         row[at.AT_ZERO] = sensor.at_zero.value
         row[at.RAD_PER_COUNT] = sensor.direction * sensor.range.value / 2**sensor.bits
-    if isinstance(machine.controller, BoardPid) and sensor is not None:
-        row[at.VOLTS_PER_COUNT] *= sensor.direction
+        row[at.RANGE] *= sensor.direction
+    if isinstance(machine.controller, BoardPid):
+        row[at.VOLTS_PER_COUNT] *= machine.drive_sign(number)
 
 
 def _fill_drive(row: NDArray[np.float64], drive: DcMotor | CurrentDrive | PlainGain) -> None:
@@ -235,12 +236,12 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
     if isinstance(drive, DcMotor):
         supply = NO_LIMIT if drive.supply_limit is None else drive.supply_limit.value
         volts = min(supply, drive.scale.counts_to_volts(DAC_COUNTS))
-        torque = drive.gear_ratio.value * drive.torque_constant.value * volts / drive.resistance.value
+        gear = abs(drive.gear_ratio.value)
+        torque = gear * drive.torque_constant.value * volts / drive.resistance.value
         if drive.back_emf_constant.value > 0:
-            speed = volts / (drive.back_emf_constant.value * drive.gear_ratio.value)
-        gear = drive.gear_ratio.value
+            speed = volts / (drive.back_emf_constant.value * gear)
     else:
-        gear = drive.gear_ratio.value if isinstance(drive, CurrentDrive) else 1.0
+        gear = abs(drive.gear_ratio.value) if isinstance(drive, CurrentDrive) else 1.0
         gain = gear * drive.torque_constant.value if isinstance(drive, CurrentDrive) else drive.gain.value
         supply, volts, torque = NO_LIMIT, 10.0, abs(gain) * 10.0
     bounded = isinstance(drive, DcMotor)

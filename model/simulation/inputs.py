@@ -149,9 +149,16 @@ def _rows(trace: Trace, period: float) -> Floats:
 
 
 def _taken_from(trace: Trace, rows: Floats) -> Floats:
-    """From which period on each recorded set point was taken. On a slow line the host writes the next set point right
-    after a sampled period, so it was taken in all of the periods up to the next sample."""
-    return rows if trace.tick is None else rows - (trace.record.every - 1)
+    """From which period on each recorded set point was used: as the record tells, which can only be after the sample
+    before. Where it does not tell, the host of a slow line has written the next set point right after a sampled period,
+    so it was taken in all of the periods up to the next sample."""
+    if trace.tick is None:
+        return rows
+    assumed = rows - (trace.record.every - 1)
+    if trace.taken is None:
+        return assumed
+    taken = np.where(trace.taken > 0, trace.taken - trace.tick[0], assumed)
+    return np.asarray(np.clip(taken, np.concatenate([rows[:1], rows[:-1] + 1]), rows))
 
 
 def _held(samples: Floats, rows: Floats, count: int) -> Floats:

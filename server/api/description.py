@@ -9,13 +9,14 @@ from typing import Any
 from fastapi import FastAPI, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from daq.contracts.service.problems import ProblemDetails
 from server.api.examples import examples, untyped
 from server.api.problem_examples import PROBLEM_EXAMPLES
-from server.problems import MEDIA_TYPE
+from server.problems import MEDIA_TYPE, SCHEMA
 
 JSON = "application/json"
-PROBLEM = {"$ref": "#/components/schemas/ProblemDetails"}
 FIRST_ERROR = 400
+IN_COMPONENTS = "#/components/schemas/{model}"
 Document = dict[str, Any]
 
 
@@ -50,7 +51,8 @@ def _encoded(app: FastAPI) -> bytes:
 
 
 def completed(document: Document) -> Document:
-    """Adds examples to `document`, in place, and returns it."""
+    """Adds the schema of problems and the examples to `document`, in place, and returns it."""
+    document["components"]["schemas"] = dict(sorted((document["components"]["schemas"] | _problem_schemas()).items()))
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             _complete_operation(operation, f"{method} {path}")
@@ -61,14 +63,21 @@ def _complete_operation(operation: Document, name: str) -> None:
     bodies = [operation.get("requestBody", {})]
     for status, answer in operation["responses"].items():
         content = answer.get("content", {})
-        if int(status) >= FIRST_ERROR and content.get(JSON, {}).get("schema") == PROBLEM:
-            answer["content"] = {MEDIA_TYPE: {"schema": PROBLEM, "examples": _problems(int(status), name)}}
+        if content.get(MEDIA_TYPE) == {"schema": SCHEMA}:
+            answer["content"] = {MEDIA_TYPE: {"schema": SCHEMA, "examples": _problems(int(status), name)}}
         elif int(status) < FIRST_ERROR or JSON in content:
             bodies.append(answer)
     for body in bodies:
         content = body.get("content", {}).get(JSON)
         if content is not None:
             content["examples"] = _examples(content.get("schema", {}), operation["operationId"])
+
+
+def _problem_schemas() -> Document:
+    """The schema of problems, and those that it refers to, by name."""
+    schema = ProblemDetails.model_json_schema(ref_template=IN_COMPONENTS)
+    del schema["properties"]["request_id"]["default"]  # null: FastAPI tells no such default of other schemas either
+    return {**schema.pop("$defs"), ProblemDetails.__name__: schema}
 
 
 def _problems(status: int, operation: str) -> Document:

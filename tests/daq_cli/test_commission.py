@@ -16,8 +16,8 @@ from daq.commissioning.memory.procedure import Task, is_alive, release, switched
 from daq.commissioning.potentiometer import Interval, Potentiometer
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import load_machine, parse_machine
-from daq_cli.commands.commission.machine_text import measured_machine_text
+from daq.contracts.machine import BoardPid, load_machine, parse_machine
+from daq_cli.commands.commission.machine_text import machine_file_text, with_controller, with_limits, with_sensors
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import acceptance_sheet, memory_picture
 from daq_cli.commands.commission.steps import STEPS, lacking, resting_on, step_named
@@ -25,6 +25,7 @@ from daq_cli.robot.memory_page import UnprovedWriteError, open_page
 from daq_cli.robot.pressed import KEEP_PRESSED, EmergencyStop
 from daq_cli.robot.terminal_operator import Lines, TerminalOperator, words
 from firmware_protocol.memory_map import default_memory_map
+from model.reports.page import Text
 from tests.daq_cli.invoke import CommandLine
 
 MOCK = "mock://?lock_step=1&seed=3"
@@ -65,7 +66,9 @@ def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: P
     record = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]
     assert record["line"]["capabilities"] == ["sample", "lock_step", "simulated", "compact"]
     assert record["memory"]["skipped"]
-    assert "Acceptance sheet" in (tmp_path / "acceptance.html").read_text("utf-8")
+    page = (tmp_path / "acceptance.html").read_text("utf-8")
+    assert "1 of 12 steps are done, 11 are left out, 0 are open." in page
+    assert page.count("Left out on ") == 11
     assert tomllib.loads((tmp_path / "daq.toml").read_text("utf-8"))["robot"]["port"] == MOCK
     done = record["line"]["done"]
     assert daq("--port", MOCK, "commission", "--folder", tmp_path).code == 0
@@ -77,6 +80,7 @@ SKIPPED = (
     "memory",
     "bridge",
     "potentiometers",
+    "end_stops",
     "emergency_stop",
     "stop",
     "period",
@@ -103,9 +107,47 @@ def test_files_that_ship_are_copied_and_never_over_another(daq: CommandLine, tmp
     daq("config", "copy", "gripper").complains(2, "memory-map, machine")
 
 
+def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place_of_a_table(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    options = [word for step in STEPS for word in ("--skip", step.name)]
+    daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
+    why = "the arm is on loan"
+    assert daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why, *options).code == 0
+    sheet = acceptance_sheet(Record.of(tmp_path))
+    assert sheet.answer.startswith("0 of 12 steps are done, 12 are left out, 0 are open. Left out: Port and line, ")
+    blocks = [block for section in sheet.sections for block in section.blocks]
+    assert len(blocks) == 12
+    assert all(isinstance(block, Text) and why in block.text for block in blocks)
+    daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why).complains(2, "it needs --skip")
+
+
+def test_limits_are_made_narrower_by_end_stops_and_never_wider() -> None:
+    text = machine_file_text("ma2000")
+    before = parse_machine(text).limits
+    limits = parse_machine(with_limits(text, {1: (1.0, 9.0), 3: (-9.0, 2.0)})).limits
+    assert (limits.joint(1).low, limits.joint(1).high) == (1.0, before.joint(1).high)
+    assert (limits.joint(3).low, limits.joint(3).high) == (before.joint(3).low, 2.0)
+    assert limits.joint(2) == before.joint(2)
+    assert limits.floor_height == before.floor_height
+
+
+def test_what_was_measured_of_the_controller_stands_in_the_machine_file_once() -> None:
+    text = machine_file_text("ma2000")
+    line = '{ value = 0.9, unit = "1", source = "measured", deviation = 0.01 }'
+    for _ in range(2):
+        text = with_controller(text, {"dac_counts_per_adc_count": line, "gains": str([[3, 0, 0]] * 6)})
+    controller = parse_machine(text).controller
+    assert isinstance(controller, BoardPid)
+    assert controller.dac_counts_per_adc_count.value == 0.9
+    assert not controller.dac_counts_per_adc_count.assumed
+    assert controller.gains == ((3, 0, 0),) * 6
+    assert text.count("dac_counts_per_adc_count = ") == 1
+
+
 def test_measured_sensors_stand_in_the_machine_file() -> None:
     sensor = Potentiometer(2, -1, Interval(0.5, 0.01), Interval(4.7, 0.02), Interval(0.0, 0.0), 0.0, (), (), ())
-    machine = parse_machine(measured_machine_text([sensor]))
+    machine = parse_machine(with_sensors(machine_file_text("ma2000"), [sensor]))
     found, untouched = machine.joint(2).sensor, machine.joint(1).sensor
     assert found is not None
     assert (found.direction, found.range.value, found.at_zero.value) == (-1, 4.7, 0.5)
@@ -258,9 +300,9 @@ def test_lines_of_a_script_that_come_together_are_all_read() -> None:
 
 
 def test_an_angle_that_is_no_number_is_asked_for_again() -> None:
-    person = operator(["ninety\n", "90.5\n", "\n"])
-    assert person.read_angle(1, 1) == 90.5
-    assert person.read_angle(1, 2) is None
+    person, waits = operator(["ninety\n", "90.5\n", "\n"]), list[float]()
+    assert person.read_angle(1, 1, waits.append) == 90.5
+    assert person.read_angle(1, 2, waits.append) is None
 
 
 def test_every_task_that_takes_the_drives_power_says_that_the_arm_may_sink() -> None:

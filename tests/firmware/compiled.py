@@ -5,6 +5,8 @@ from __future__ import annotations
 import fcntl
 import shutil
 import subprocess
+import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -23,13 +25,18 @@ def need(*programs: str) -> None:
             pytest.skip(f"no {program}: apt install {PACKAGES[program]}")
 
 
-def made(file: str, *settings: str) -> Path:
-    """A file in build/firmware that the bridge's Makefile makes, up to date."""
-    BUILD.mkdir(parents=True, exist_ok=True)
+def made(file: str, *settings: str, memory_map: Path | None = None) -> Path:
+    """A file in build/firmware that the bridge's Makefile makes, up to date; in a folder of its own for another memory
+    map than the one that ships."""
+    folder = BUILD
+    if memory_map is not None:
+        folder = BUILD / sha256(memory_map.read_bytes()).hexdigest()[:16]
+        settings = (*settings, f"MAP={memory_map.absolute()}", f"PYTHON={sys.executable}")
+    folder.mkdir(parents=True, exist_ok=True)
     with (BUILD / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        subprocess.run(["make", "-s", "-C", SOURCES, f"BUILD={BUILD}", *settings, str(BUILD / file)], check=True)
-    return BUILD / file
+        subprocess.run(["make", "-s", "-C", SOURCES, f"BUILD={folder}", *settings, str(folder / file)], check=True)
+    return folder / file
 
 
 def need_simavr() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from secrets import randbits
 
 from mock_controller.device import Device
@@ -16,10 +17,10 @@ STEP_US = 200
 class HostedLink(BridgeLink):
     """The core as a shared library."""
 
-    def __init__(self, device: Device, *, sees_period: bool) -> None:
+    def __init__(self, device: Device, *, sees_period: bool, memory_map: Path | None = None) -> None:
         super().__init__(device)
         source = PeriodSource.WATCHED if sees_period else PeriodSource.UNSEEN
-        library = made("libbridge-32.so")
+        library = made("libbridge-32.so", memory_map=memory_map)
         self._core = Core(library, self.read_memory, self.write_memory, self._clock_us, source)
         self._core.start(randbits(16) << 16)
         self._input = b""

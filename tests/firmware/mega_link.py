@@ -16,11 +16,11 @@ SLICE_US = 500
 
 
 class MegaLink(BridgeLink):
-    """The firmware on a simulated board."""
+    """The firmware on a simulated board, built for a memory map."""
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: Device, memory_map: Path | None = None) -> None:
         super().__init__(device)
-        library, image = made("libmega2560.so"), made("mega2560.elf")
+        library, image = made("libmega2560.so"), made("mega2560.elf", memory_map=memory_map)
         self.simulator = Simulator(library, image, self._read, self._write)
 
     def _read(self, address: int, clock: int) -> int:

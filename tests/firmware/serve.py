@@ -1,7 +1,8 @@
 """The mock's board behind the bridge in C, at a port: `python -m tests.firmware.serve BRIDGE [options of the mock]`.
 
 BRIDGE is `hosted`, the core as a shared library of this computer, or `mega2560`, the firmware of that board on a
-simulated one. Everything else is the mock's: `--pty`, `--no-sample`, `--start`, its control port.
+simulated one. Everything else is the mock's: `--pty`, `--no-sample`, `--start`, its control port. The bridge is built
+for the map that `--memory-map` names, or for the one that ships.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from tests.firmware.mega_link import MegaLink, board_on_the_bus
 
 
 def _hosted(device: Device, options: Options) -> Any:
-    return HostedLink(device, sees_period=options.sample)
+    return HostedLink(device, sees_period=options.sample, memory_map=options.memory_map)
 
 
 def _mega2560(device: Device, options: Options) -> Any:
-    return MegaLink(device)
+    return MegaLink(device, options.memory_map)
 
 
 LINKS: dict[str, Callable[[Device, Options], Any]] = {"hosted": _hosted, "mega2560": _mega2560}

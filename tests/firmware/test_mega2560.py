@@ -21,27 +21,36 @@ pytestmark = pytest.mark.slow
 PERIOD_US = 20_000
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def link() -> MegaLink:
+    """A new board, whose EEPROM is empty."""
     need("gcc", "avr-gcc", "make")
     need_simavr()
     return MegaLink(build_device(board_on_the_bus(Options(tcp="nowhere:0")), lambda _: None))
 
 
-@pytest.fixture(scope="module")
-def host(link: MegaLink) -> Host:
+@pytest.fixture
+def new_host(link: MegaLink) -> Host:
+    """A host that has greeted a new board."""
     host = Host(link, line_is_modelled=True)
     host.run_until(5 * PERIOD_US)
     host.greet()
     return host
 
 
-def test_a_new_board_starts_frozen_and_is_released(host: Host) -> None:
-    status: Any = host.ask(c.ReadStatus())
+@pytest.fixture
+def host(new_host: Host) -> Host:
+    """A host whose board has been released."""
+    new_host.release()
+    return new_host
+
+
+def test_a_new_board_starts_frozen_and_is_released(new_host: Host) -> None:
+    status: Any = new_host.ask(c.ReadStatus())
     assert status.status & c.StatusFlag.FROZEN
     assert status.stop > 0
-    host.release()
-    assert not host.ask(c.ReadStatus()).status & c.StatusFlag.FROZEN
+    new_host.release()
+    assert not new_host.ask(c.ReadStatus()).status & c.StatusFlag.FROZEN
 
 
 class Port:
@@ -80,6 +89,7 @@ class Port:
 def test_the_dialogue_of_a_bridge_that_starts_again_goes_as_written(link: MegaLink) -> None:
     (dialogue,) = [each for each in DIALOGUES if "RESTART" in each.needs]
     nonces = count(0x5EED0000)
+    link.run_until(5 * PERIOD_US)
     play(dialogue.steps, Port(link), lambda: next(nonces))
 
 

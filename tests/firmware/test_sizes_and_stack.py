@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_protocol.bridge.sizes import sizes
+from firmware_protocol.bridge.sizes import core_files, sizes
 from firmware_protocol.bridge.stack import RETURN_ADDRESS, deepest, functions
 from tests.firmware.compiled import need
 
@@ -32,6 +32,10 @@ def test_flash_holds_code_constants_and_the_beginnings_of_data_and_ram_holds_wha
     flash, ram = sizes(MAP)
     assert dict(flash) == {"core": 0x6E + 0x20 + 0x10 + 0x4, "ring": 0, "mega2560": 0x2, "libraries": 0x1C}
     assert dict(ram) == {"core": 0x4, "ring": 0x400, "mega2560": 0x8 + 0x2 + 0x1, "libraries": 0}
+
+
+def test_flash_is_told_by_file_of_the_core() -> None:
+    assert dict(core_files(MAP)) == {"bridge.c": 0x6E + 0x20 + 0x4, "codes.c": 0x10}
 
 
 LISTING = """

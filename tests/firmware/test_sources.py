@@ -10,7 +10,7 @@ import pytest
 
 from tests.firmware.compiled import BUILD, SOURCES, made, need
 
-MOST_CORE_FLASH = 6_900
+MOST_CORE_FLASH = 6_144
 """Bytes that the core may take of an AVR's flash, compiled alone."""
 MOST_CORE_RAM = 1_536
 """Bytes of RAM that it may take, its ring of 32 snapshots included."""

@@ -120,21 +120,25 @@ def test_what_was_carried_out_is_told_though_no_event_of_it_can_be_written(
     assert api.post("queue/pause").json()["paused"]
 
 
-@pytest.mark.parametrize(
-    ("number", "status", "kind"), [(errno.ENOSPC, 507, "no-room"), (errno.EROFS, 503, "disk"), (errno.EIO, 503, "disk")]
-)
 def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(
-    api: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, status: int, kind: str
+    api: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    number = 0
+
     def refuses(_descriptor: int) -> NoReturn:
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(os, "fsync", refuses)
     table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
-    answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
-    assert (answer.status_code, answer.json()["type"]) == (status, f"docs/service.md#{kind}"), answer.text
-    assert _listed(api, "traces") == []
-    assert list((tmp_path / "traces").glob("*.mcap")) == []
+    for number, status, kind in (  # noqa: B007  # `refuses` reads the number
+        (errno.ENOSPC, 507, "no-room"),
+        (errno.EROFS, 503, "disk"),
+        (errno.EIO, 503, "disk"),
+    ):
+        answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
+        assert (answer.status_code, answer.json()["type"]) == (status, f"docs/service.md#{kind}"), answer.text
+        assert _listed(api, "traces") == []
+        assert list((tmp_path / "traces").glob("*.mcap")) == []
 
 
 def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(

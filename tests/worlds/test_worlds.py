@@ -82,7 +82,14 @@ def test_a_seed_gives_the_same_folder_to_the_bit(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("kind", ["axis-rounded", "planar-torques", "planar-board", "arm-rounded"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "axis-rounded",
+        "planar-torques",
+        *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("planar-board", "arm-rounded")),
+    ],
+)
 def test_the_product_reads_what_a_lab_has(tmp_path: Path, kind: str) -> None:
     write_world(tmp_path, kind, 2)
     machine = load_machine(str(tmp_path / "lab" / "machine.toml"))

@@ -54,6 +54,8 @@ class Findings:
     joints: tuple[JointEvidence, ...] = field(repr=False, default=())
     free_running: tuple[int, ...] = ()
     """Addresses that change while nothing moves."""
+    unchanged: tuple[tuple[int, int], ...] = ()
+    """(address, byte) of what neither motion nor switching off and on has changed."""
 
     def of(self, register: str, joint: int | None = None) -> Finding:
         """The finding on a register."""
@@ -95,8 +97,14 @@ def judge(recording: Recording) -> Findings:
     found.sort(key=lambda one: (order.index(one.register), one.joint or 0))
     rest = [stage for stage in recording.stages if stage.kind == "rest"]
     running = np.flatnonzero(np.max([spread(stage.pages) for stage in rest], axis=0) > 16) if rest else ()
+    held = constants(recording.stages)
     return Findings(
-        recording.base, recording.size, tuple(found), joints, tuple(int(recording.base + offset) for offset in running)
+        recording.base,
+        recording.size,
+        tuple(found),
+        joints,
+        tuple(int(recording.base + offset) for offset in running),
+        tuple((int(recording.base + offset), int(held[offset])) for offset in np.flatnonzero(held >= 0)),
     )
 
 

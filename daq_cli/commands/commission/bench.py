@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
-
-import numpy as np
 
 from daq.commissioning.memory.procedure import Operator
 from daq.contracts import exit_codes
@@ -17,8 +16,8 @@ from daq_cli.app.context import Invocation
 from daq_cli.commands.commission.record import Record
 
 if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
     from daq.driver import Controller
-    from daq_cli.robot.memory_page import LinkPage
     from firmware_protocol.memory_map import MemoryMap
 
 CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings.json", "machine.toml"
@@ -36,8 +35,9 @@ class Commissioner(Operator, Protocol):
     def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
         """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
 
-    def read_angle(self, joint: int, number: int) -> float | None:
-        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more."""
+    def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
+        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more.
+        `wait` lets time (s) pass."""
 
 
 @dataclass
@@ -57,12 +57,40 @@ class Bench:
         """An invocation that uses the files which the steps have written."""
         return Invocation(config_file=self.folder / CONFIG, port_option=self.call.port)
 
+    def adapter(self) -> str | None:
+        """Serial number of the USB adapter at the port; None where it has none, or the port is no serial one."""
+        from daq.transport.discovery import ports
+
+        device = self.call.port.partition("?")[0]
+        return next((one.serial_number for one in ports() if one.url == device), None)
+
     def memory_map(self) -> MemoryMap:
         """The memory map that was found, or the configured one."""
         from daq.config.robot_files import load_memory_map
 
         path = self.folder / MAP
         return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
+
+    def machine_text(self) -> str:
+        """The machine file as it stands: this arm's, or the configured one before anything was measured."""
+        from daq_cli.commands.commission.machine_text import machine_file_text
+
+        own = self.folder / MACHINE
+        return machine_file_text(str(own) if own.exists() else self.call.settings.robot.machine)
+
+    def machine(self) -> Machine:
+        """The same, loaded."""
+        from daq.contracts.machine import parse_machine
+
+        return parse_machine(self.machine_text(), MACHINE)
+
+    def write_machine(self, text: str) -> None:
+        """Writes this arm's machine file, and daq.toml that names it."""
+        from daq_cli.app.output_file import replacing
+
+        with replacing(self.folder / MACHINE) as part:
+            part.write_text(text, "utf-8")
+        self.configure()
 
     def basis(self) -> dict[str, str]:
         """What a result rests on: the port, and the memory map and machine file that there are."""
@@ -93,15 +121,3 @@ def connected(bench: Bench) -> Controller:
     from daq.driver import Controller
 
     return Controller.connect(bench.call.port, bench.memory_map())
-
-
-def typical(page: LinkPage, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
-    """A register of each joint: the median of its readings, of which some may be torn."""
-    register = memory_map[name]
-    values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
-    for _ in range(count):
-        data = page.read().data
-        for joint, of_joint in values.items():
-            high = 0 if register.high is None else data[register.high[joint - 1] - page.base]
-            of_joint.append(register.decode(data[register.low[joint - 1] - page.base], high))
-    return {joint: float(np.median(one)) for joint, one in values.items()}

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import SpecError
+from daq_cli.commands.commission.arm import note_period
 from daq_cli.commands.commission.bench import Bench, NotCommissionedError, connected
+from daq_cli.commands.commission.periods import followed_periods
 
-PERIODS = 150
-"""Number of control periods over which the period is measured."""
+if TYPE_CHECKING:
+    from daq.calibration.gain import GainEstimate
+    from daq.contracts.trace import Trace
+    from model.machine_model.model import Model
+
 TO_GAIN = (1, 2, 3)
+FLOORS = 2.0
+"""Errors of this many times the noise floor are more than noise, and are diagnosed."""
+DIAGNOSIS = "diagnosis.html"
 
 
 def stop(bench: Bench) -> dict[str, Any]:
@@ -36,37 +41,62 @@ def stop(bench: Bench) -> dict[str, Any]:
 def period(bench: Bench) -> dict[str, Any]:
     """The control period by the host's clock."""
     with connected(bench) as controller:
-        ticks, times, after = [], [], None
-        for _ in range(PERIODS):
-            snapshot = controller.next_snapshot(after, (1,))
-            after = snapshot.tick
-            ticks.append(snapshot.tick)
-            times.append(snapshot.host_time)
+        found = followed_periods(controller)
         missed = controller.status().missed
-    slope = float(np.polyfit(ticks, times, 1)[0]) if ticks[-1] > ticks[0] else math.nan
-    left = np.asarray(times) - np.polyval(np.polyfit(ticks, times, 1), ticks)
+    note_period(bench, found.period_ms, found.error_ms)
     return {
-        "period_ms": round(1e3 * slope, 4),
-        "jitter_ms": round(1e3 * float(np.std(left)), 3),
+        "period_ms": round(found.period_ms, 4),
+        "jitter_ms": round(found.jitter_ms, 3),
         "missed_set_points": missed,
         "computing_delay": "not measured: the machine file's assumption stands",
     }
 
 
 def gain(bench: Bench) -> dict[str, Any]:
-    """Volts per radian of each joint, by `daq calibrate gain`."""
+    """Volts per radian of each joint, by `daq calibrate gain`; what all joints share goes into the machine file."""
     from daq.calibration import gain_experiment, gains_from_trace
+    from daq.calibration.gain import GainEstimate, common_gain
     from daq.traces.reader import read_trace
+    from daq_cli.commands.commission.machine_text import with_controller
     from daq_cli.robot.access import robot_access
     from daq_cli.robot.experiment import acquire_complete
 
     robot = robot_access(bench.configured)
     joints = tuple(joint for joint in bench.joints if joint in TO_GAIN)
     done = acquire_complete(robot, gain_experiment(joints), robot.machine, robot.call.trace_folder, bench.consent)
-    found = gains_from_trace(read_trace(done.trace), robot.machine)
-    for one in found:
+    trace = read_trace(done.trace)
+    estimates = [one for one in gains_from_trace(trace, robot.machine) if one.joint in joints]
+    for one in estimates:
         bench.operator.show(str(one))
-    return {"trace": str(done.trace), "gains": {f"joint_{one.joint}": str(one) for one in found if one.joint in joints}}
+    result: dict[str, Any] = {"trace": str(done.trace)}
+    for one in estimates:
+        result[f"joint_{one.joint}"] = _gain_data(one) if isinstance(one, GainEstimate) else {"problem": str(one)}
+    common = common_gain([one for one in estimates if isinstance(one, GainEstimate)])
+    if common is None:
+        return result | {"machine_file": "not changed: the joints have no gain per unit of P in common"}
+    source = f"measured at joints {', '.join(map(str, common.joints))} by errors and powers"
+    lines = {
+        "dac_counts_per_adc_count": f'{{ value = {common.value!r}, unit = "1", source = "{source}", '
+        f"deviation = {common.deviation!r} }}"
+    }
+    if trace.record.gains is not None and len(trace.record.gains) == len(robot.machine.joints):
+        lines["gains"] = str([list(trace.record.gains[joint]) for joint in sorted(trace.record.gains)])
+    bench.write_machine(with_controller(bench.machine_text(), lines))
+    return result | {
+        "machine_file": f"{common.value:.4f} ± {common.deviation:.4f} DAC counts per ADC count and unit of P"
+    }
+
+
+def _gain_data(one: GainEstimate) -> dict[str, Any]:
+    return {
+        "volts_per_rad": round(one.volts_per_rad, 2),
+        "standard_error": round(one.volts_per_rad_error, 2),
+        "dac_counts_per_adc_count": round(one.gain, 5),
+        "lowest": round(one.lowest, 5),
+        "highest": round(one.highest, 5),
+        "p": None if one.per_unit is None else round(one.gain / one.per_unit),
+        "different_errors": one.errors,
+    }
 
 
 def first_ramp(bench: Bench) -> dict[str, Any]:
@@ -91,7 +121,7 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
 
 
 def model(bench: Bench) -> dict[str, Any]:
-    """Whether the arm behaves as its machine file says."""
+    """Whether the arm behaves as its machine file says; where it does not, the diagnosis of the difference."""
     from daq.traces.reader import read_trace
     from model.comparison.compare import compare
     from model.machine_model.model import base_model
@@ -99,15 +129,52 @@ def model(bench: Bench) -> dict[str, Any]:
     if "trace" not in bench.record.steps.get("ramp", {}):
         raise SpecError("the step ramp has left no trace: do it first (--only ramp)")
     trace = read_trace(Path(bench.record.steps["ramp"]["trace"]))
-    machine = bench.configured.settings.machine()
-    compared = compare([("machine file", base_model(machine))], [trace])
+    begin = base_model(bench.machine())
+    compared = compare([("machine file", begin)], [trace])
     joints = compared.models[0].in_sample or ()
-    left = {f"joint_{one.joint}_counts": round(one.counts, 2) for one in joints if one.counts is not None}
-    above = [one.joint for one in joints if one.rmse > 2 * one.floor]
+    above = [one.joint for one in joints if one.rmse > FLOORS * one.floor]
+    result: dict[str, Any] = {
+        "behaves_like_the_machine_file": not above,
+        "joints_above_the_noise_floor": above,
+        **{
+            f"joint_{one.joint}": {
+                "error_counts": round(one.counts, 2),
+                "error_in_floors": round(one.rmse / one.floor, 1),
+            }
+            for one in joints
+            if one.counts is not None
+        },
+    }
+    if not above:
+        return result
+    try:
+        return result | _diagnosed(bench, begin, trace)
+    except SpecError as error:  # the comparison stands without it
+        bench.operator.show(f"no diagnosis: {error}")
+        return result | {"verdict": "no diagnosis", "diagnosis": str(error)}
+
+
+def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
+    """What a diagnosis says of the ramp, and its report."""
+    from daq_cli.app.progress import shown_progress
+    from model.comparison.compare import compare
+    from model.discrepancy.explanation.headline import headline
+    from model.discrepancy.workflow import diagnose
+    from model.reports.diagnosis_report import LABELS, diagnosis_report
+    from model.reports.page import write_report
+    from server.jobs.next_experiment import experiment_chooser
+
+    bench.operator.show("The arm does not behave like its machine file. A diagnosis follows; it only computes.")
+    with shown_progress("diagnosing") as progress:
+        found = diagnose(begin, [trace], progress=progress, chooser=experiment_chooser(begin.machine))
+    pair = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
+    write_report(diagnosis_report(found, compare(pair, [trace])), bench.folder / DIAGNOSIS)
+    said = headline(found)
+    bench.operator.show(said)
+    asked = found.next_experiment
     return {
-        **left,
-        "above_the_noise_floor": above,
-        "next": f"daq diagnose {bench.record.steps['ramp']['trace']}"
-        if above
-        else "nothing: the model explains the ramp",
+        "verdict": found.verdict.replace("-", " "),
+        "diagnosis": said,
+        "report": DIAGNOSIS,
+        "to_be_run_next": "nothing" if asked is None else asked.name,
     }

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from daq.commissioning.end_stops import EndStops, end_stops_of
 from daq.commissioning.memory.procedure import Task
 from daq.contracts.errors import SafetyError
-from daq_cli.commands.commission.bench import MACHINE, MAP, Bench, NotCommissionedError, typical
-from firmware_protocol.units import POSTURE_UNITS
+from daq_cli.commands.commission.bench import MACHINE, MAP, Bench, NotCommissionedError
+from daq_cli.robot.safe_release import give_power_back, release_after_interruption, typical
+from firmware_protocol.units import counts_to_posture
 
 if TYPE_CHECKING:
     from daq.commissioning.potentiometer import Potentiometer
@@ -25,8 +27,7 @@ PUSHED, STAYS = 25, 5
 def potentiometers(bench: Bench) -> dict[str, Any]:
     """Direction, zero, range and bend of the sensors, by a protractor."""
     from daq.commissioning.potentiometer import calibrate_potentiometer
-    from daq_cli.app.output_file import replacing
-    from daq_cli.commands.commission.machine_text import measured_machine_text
+    from daq_cli.commands.commission.machine_text import with_sensors
     from daq_cli.robot.memory_page import open_page
 
     memory_map = bench.memory_map()
@@ -38,18 +39,16 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
         for joint in bench.joints:
             counts, angles = [], []
             for number in range(1, bench.postures + 1):
-                angle = bench.operator.read_angle(joint, number)
+                angle = bench.operator.read_angle(joint, number, page.wait)
                 if angle is None:
                     break
                 counts.append(typical(page, memory_map, "position", AVERAGED)[joint])
                 angles.append(math.radians(angle))
             sensors.append(calibrate_potentiometer(joint, counts, angles))
             bench.operator.show(sensor_line(sensors[-1]))
-            with replacing(bench.folder / MACHINE) as part:
-                part.write_text(measured_machine_text(sensors), "utf-8")
-        _give_power_back(bench, page, memory_map)
+            bench.write_machine(with_sensors(bench.machine_text(), sensors[-1:]))
+        give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
-    bench.configure()
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
 
@@ -77,6 +76,38 @@ def _sensor_data(found: Potentiometer) -> dict[str, Any]:
     }
 
 
+def end_stops(bench: Bench) -> dict[str, Any]:
+    """Where each joint meets its end stops, led there by hand; the limits in the machine file keep clear of them."""
+    from daq_cli.commands.commission.machine_text import with_limits
+    from daq_cli.robot.memory_page import open_page
+
+    memory_map, machine = bench.memory_map(), bench.machine()
+    found: dict[int, EndStops] = {}
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
+        for joint in bench.joints:
+            ends = [_reading_at(bench, page, memory_map, Task(kind, joint)) for kind in ("end_stop", "other_end_stop")]
+            found[joint] = end_stops_of(machine.calibration(joint), *ends)
+            bench.operator.show(str(found[joint]))
+            _reading_at(bench, page, memory_map, Task("bring_back", joint))
+        give_power_back(page, bench.operator, memory_map)
+        stop.tell(False)
+    bench.write_machine(with_limits(bench.machine_text(), {joint: one.limits for joint, one in found.items()}))
+    return {"machine": MACHINE, **{f"joint_{joint}": one.as_data() for joint, one in found.items()}}
+
+
+def _reading_at(bench: Bench, page: LinkPage, memory_map: MemoryMap, task: Task) -> float:
+    """The reading (ADC counts) of the joint that a person has moved, once they say that it is there."""
+    joint = task.joint or 1
+    if not bench.operator.begin(task):
+        raise SafetyError(f"joint {joint} was not led to its end stops")
+    while not bench.operator.finished():
+        bench.operator.watch({joint: counts_to_posture(round(typical(page, memory_map, "position", 1)[joint]))})
+    return typical(page, memory_map, "position", AVERAGED)[joint]
+
+
 def emergency_stop(bench: Bench) -> dict[str, Any]:
     """Whether the emergency stop takes the drives' power: a joint then stays off its set point, whatever its power."""
     from daq_cli.robot.memory_page import open_page
@@ -99,60 +130,16 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
                 f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved {after - before:.0f} counts; "
                 f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
             )
-        _give_power_back(bench, page, memory_map)
+        give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
     return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
 
 
 def release_if_pressed(bench: Bench) -> None:
-    """The safe release of an emergency stop that was pressed when the last call ended. Without a memory map no error
-    can be read: then it is released while the controller is off."""
-    from daq.commissioning.memory.procedure import switched_off_and_on
-    from daq_cli.robot.memory_page import open_page
-
-    if not bench.record.stop_pressed:
-        return
-    bench.operator.show("The emergency stop was pressed and not released safely. Keep it pressed; this comes first.")
-    memory_map = bench.memory_map()
-    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
-        stop.pressed = True
-        if not (bench.folder / MAP).exists():
-            if not switched_off_and_on(page, bench.operator, "start_as_usual"):
-                raise SafetyError("the controller was not switched off and on: keep the emergency stop pressed")
-        else:
-            if not bench.operator.begin(Task("press_emergency_stop")):
-                raise SafetyError("the emergency stop must be pressed before the controller is switched off and on")
-            _give_power_back(bench, page, memory_map)
-        stop.tell(False)
-
-
-def _give_power_back(bench: Bench, page: LinkPage, memory_map: MemoryMap) -> None:
-    """Makes the posture the set points by switching off and on, and has the emergency stop released. Raises SafetyError
-    where the arm would jump."""
-    from daq.commissioning.memory.procedure import release, switched_off_and_on
-
-    if not switched_off_and_on(page, bench.operator):
-        raise SafetyError("the controller was not switched off and on: its set points are not where the arm is")
-    if why := release(page, bench.operator, lambda: _against_power(page, memory_map)):
-        raise SafetyError(why)
-
-
-def _against_power(page: LinkPage, memory_map: MemoryMap) -> str:
-    """Why the drives may not have power; empty if the memory is alive, error + position is each joint's set point by
-    this map, and every error is small."""
-    from daq.commissioning.memory.procedure import SAFE_ERROR, is_alive
-    from firmware_protocol.units import posture_to_counts
-
-    if not is_alive(page.read().data):
-        return "the memory is not alive"
-    told = {name: typical(page, memory_map, name, 5) for name in ("set_point", "position", "error")}
-    for joint, error in told["error"].items():
-        if abs(error) > SAFE_ERROR:
-            return f"joint {joint} is {error:.0f} counts from its set point and would jump"
-        set_point = posture_to_counts(min(max(round(told["set_point"][joint]), 0), POSTURE_UNITS - 1))
-        if abs(told["position"][joint] + error - set_point) > SAFE_ERROR:
-            return f"joint {joint}: error + position is not its set point, so the memory map is wrong"
-    return ""
+    """The safe release of an emergency stop that was pressed when the last call ended."""
+    if bench.record.stop_pressed:
+        found = (bench.folder / MAP).exists()
+        release_after_interruption(bench.call.port, bench.operator, bench.memory_map(), found, bench.record.note_stop)
 
 
 def _emergency_stop(bench: Bench) -> EmergencyStop:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -13,11 +12,15 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import parse_joints
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
-from daq_cli.commands.commission.bench import MAP, Bench, Commissioner
+from daq_cli.commands.commission.arm import Said, begin_anew, require_same_arm
+from daq_cli.commands.commission.bench import CONFIG, MAP, Bench
 from daq_cli.commands.commission.by_hand import release_if_pressed
+from daq_cli.commands.commission.port import port_by_plugging
 from daq_cli.commands.commission.record import Record
 from daq_cli.commands.commission.sheet import write_sheet
 from daq_cli.commands.commission.steps import STEPS, Step, lacking, resting_on, stale, step_named
+from daq_cli.robot.person import person_at
+from daq_cli.robot.terminal_operator import TerminalOperator
 
 app = typer.Typer(add_completion=False)
 
@@ -28,6 +31,18 @@ def commission(
     folder: Annotated[Path, typer.Option(help="Folder of the arm: its record, files and page.")] = Path(),
     only: Annotated[str | None, typer.Option(help="Do this step alone, again if it is done.")] = None,
     skip: Annotated[list[str] | None, typer.Option(help="Leave this step out; may be repeated.")] = None,
+    because: Annotated[str, typer.Option(help="Why steps are left out, for the acceptance sheet.")] = "",
+    find_port: Annotated[
+        bool, typer.Option("--find-port", help="Find the port by unplugging the cable and plugging it in.")
+    ] = False,
+    baud: Annotated[int | None, typer.Option(help="Baud rate of the port that is found.", min=300)] = None,
+    arm: Annotated[
+        Said | None,
+        typer.Option(
+            help="What to do where the arm at the port is not that of the folder: begin anew (new), or go on, because "
+            "a part of it was exchanged (same)."
+        ),
+    ] = None,
     joints: Annotated[str, typer.Option(help="Joints whose potentiometers and gains are measured.")] = "1-3",
     postures: Annotated[int, typer.Option(help="Postures at which each potentiometer is read.", min=5, max=50)] = 6,
     mock_control: Annotated[
@@ -39,28 +54,31 @@ def commission(
     """Commission an arm: line, memory map, potentiometers, stop, period, gains, first ramps, model.
 
     Every result is kept at once; a step that is done is not done again. Nothing moves without your word."""
-    call = invocation(context)
-    if call.port_option is None and call.settings.robot.port is None:
-        raise SpecError("no robot is configured: give --port, or set robot.port in daq.toml (`daq ports` lists ports)")
     if not folder.is_dir():
         raise SpecError(f"folder {folder}: there is none; make it first")
-    record = Record.of(folder)
     left_out = {step_named(name).name for name in skip or ()}
     if only and only in left_out:
         raise SpecError(f"--only {only} --skip {only}: nothing would be done")
-    if "memory" in left_out and not (folder / MAP).exists():
-        raise SpecError(f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map")
     if only:
         step_named(only)
-    with _person(call, mock_control) as person:
+    if because and not left_out:
+        raise SpecError("--because: says why steps are left out, so it needs --skip")
+    call = _with_port(invocation(context), folder, find_port=find_port, baud=baud)
+    record = begin_anew(folder) if arm == "new" else Record.of(folder)
+    if "memory" in left_out and not (folder / MAP).exists():
+        raise SpecError(f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map")
+    with person_at(call, mock_control) as person:
         bench = Bench(call, folder, person, ConsentPrompt(yes), record, parse_joints(joints), postures)
+        chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
+        if any(step.at_the_port and step.name not in left_out for step in chosen):
+            require_same_arm(bench, arm)
         release_if_pressed(bench)
         if gone := record.drop(stale(bench)):
             _say_dropped(gone, "the port, the memory map or the machine file has changed")
         chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
         for step in chosen:
             if step.name in left_out:
-                record.keep(step.name, {"skipped": True})
+                record.keep(step.name, {"skipped": True} | ({"reason": because} if because else {}))
                 continue
             if missing := lacking(step, record):
                 raise SpecError(f"step {step.name}: first do {', '.join(missing)}")
@@ -70,6 +88,27 @@ def commission(
         print_json({"page": page, "steps": record.steps})
     else:
         print(page)
+
+
+def _with_port(call: Invocation, folder: Path, *, find_port: bool, baud: int | None) -> Invocation:
+    """The invocation with the port that is found, given, configured, or in the folder's daq.toml. Raises SpecError."""
+    if find_port:
+        if call.port_option is not None:
+            raise SpecError("--find-port and --port: give one of them")
+        found = port_by_plugging(TerminalOperator()).url
+        return replace(call, port_option=found if baud is None else f"{found}?baud={baud}")
+    if baud is not None:
+        raise SpecError("--baud: belongs to --find-port; a port that is given has it in its URL, as in ?baud=115200")
+    if call.port_option is None and call.settings.robot.port is None:
+        own = folder / CONFIG
+        port = Invocation(config_file=own).settings.robot.port if own.exists() else None
+        if port is None:
+            raise SpecError(
+                "no robot is configured: give --port (`daq ports` lists ports), or --find-port to find it by "
+                "unplugging the cable and plugging it in"
+            )
+        return replace(call, port_option=port)
+    return call
 
 
 def _carry_out(bench: Bench, step: Step) -> None:
@@ -93,20 +132,3 @@ def _carry_out(bench: Bench, step: Step) -> None:
 
 def _say_dropped(names: list[str], why: str) -> None:
     console().print(f"To be done again, for {why}: {', '.join(names)}")
-
-
-@contextmanager
-def _person(call: Invocation, mock_control: str | None) -> Iterator[Commissioner]:
-    """The person at the terminal, or a mock's stand-in."""
-    if mock_control is None:
-        from daq_cli.robot.terminal_operator import TerminalOperator
-
-        yield TerminalOperator()
-        return
-    from daq_cli.robot.mock_hand import IN_REAL_TIME, ControlPortArm, MockOperator
-
-    arm = ControlPortArm(mock_control)
-    try:
-        yield MockOperator(arm, call.settings.machine(), IN_REAL_TIME, arm.postures())
-    finally:
-        arm.close()

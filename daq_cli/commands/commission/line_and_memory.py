@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from daq_cli.app.context import console
-from daq_cli.commands.commission.bench import FINDINGS, MAP, Bench, NotCommissionedError, connected, typical
+from daq_cli.commands.commission.arm import note_adapter, note_memory
+from daq_cli.commands.commission.bench import FINDINGS, MAP, Bench, NotCommissionedError, connected
+from daq_cli.robot.safe_release import typical
 
 if TYPE_CHECKING:
     from daq.commissioning.memory.commands import CommandProof
@@ -35,9 +37,12 @@ def line(bench: Bench) -> dict[str, Any]:
         counters = page.link.counters.numbers()
         hello = page.hello
     bench.configure()
+    adapter = bench.adapter()
+    note_adapter(bench, adapter)
     capabilities = [flag.name.lower() for flag in Capability(hello.capabilities) if flag.name]
     return {
         "port": bench.call.port,
+        "adapter": adapter or "has no serial number",
         "protocol": hello.version,
         "capabilities": capabilities,
         "period_stated_ms": hello.period_us / 1e3,
@@ -55,6 +60,7 @@ def memory(bench: Bench) -> dict[str, Any]:
     def when_found(found: Findings) -> None:
         if keep_map(found, bench.folder / MAP):
             bench.configure()
+            note_memory(bench)
             bench.record.keep("memory", _memory_result(found, []))
 
     with _page(bench) as page:

@@ -22,6 +22,8 @@ class Record:
     steps: dict[str, dict[str, Any]] = field(default_factory=dict)
     stop_pressed: bool = False
     """Whether the emergency stop was pressed and not yet released safely."""
+    identity: dict[str, Any] = field(default_factory=dict)
+    """What identifies the arm that the results belong to (`daq.commissioning.identity`)."""
 
     @staticmethod
     def of(folder: Path) -> Record:
@@ -33,7 +35,25 @@ class Record:
         steps = data.get("step", {})
         if not isinstance(steps, dict) or not all(isinstance(one, dict) and "done" in one for one in steps.values()):
             raise SpecError(f"{path}: not a record of a commissioning: each [step.NAME] needs `done`")
-        return Record(folder, steps, data.get("stop_pressed", False) is not False)
+        identity = data.get("identity", {})
+        if not isinstance(identity, dict):
+            raise SpecError(f"{path}: identity: must be a table")
+        return Record(folder, steps, data.get("stop_pressed", False) is not False, identity)
+
+    @property
+    def done(self) -> dict[str, dict[str, Any]]:
+        """The results of the steps that were carried out."""
+        return {name: one for name, one in self.steps.items() if not one.get("skipped")}
+
+    @property
+    def left_out(self) -> dict[str, dict[str, Any]]:
+        """The steps that were left out on purpose, with the reason."""
+        return {name: one for name, one in self.steps.items() if one.get("skipped")}
+
+    def identify(self, identity: dict[str, Any]) -> None:
+        """Keeps what identifies the arm."""
+        self.identity = identity
+        self._write()
 
     def keep(self, name: str, result: dict[str, Any]) -> None:
         """Adds the result of a step, and writes the file at once."""
@@ -51,12 +71,15 @@ class Record:
     def note_stop(self, pressed: bool) -> None:
         """Notes that the emergency stop is about to be pressed, or was released safely."""
         self.stop_pressed = pressed
-        self._write()
+        if pressed or self.steps or self.identity:
+            self._write()
+        else:
+            (self.folder / FILE).unlink(missing_ok=True)
 
     def _write(self) -> None:
         from daq.config.toml_text import tables_text
         from daq_cli.app.output_file import replacing
 
-        data = {"version": 1, "stop_pressed": self.stop_pressed, "step": self.steps}
+        data = {"version": 1, "stop_pressed": self.stop_pressed, "identity": self.identity, "step": self.steps}
         with replacing(self.folder / FILE) as part:
             part.write_text(tables_text(data), "utf-8")

@@ -15,6 +15,15 @@ if TYPE_CHECKING:
     from model.reports.page import Block, Report
 
 SHEET = "acceptance.html"
+NO_REASON = "no reason was given"
+NOT_SHOWN = ("done", "basis")
+"""What the record keeps for the program alone."""
+INTERVALS = ("range_deg", "at_zero_deg", "bend_percent")
+"""Values with half the width of their interval."""
+UNITS = {"_deg": "°", "_percent": "%", "_ms": "ms"}
+"""Ends of names that are units."""
+DRAWN = ("counts", "angles_deg", "residuals_deg")
+"""What a picture shows, of potentiometers."""
 COLUMNS, CELL = 16, 30
 REGISTER_COLOURS = {
     "position": 1,
@@ -57,48 +66,86 @@ def write_sheet(record: Record) -> Path:
 
 def acceptance_sheet(record: Record) -> Report:
     """The page of everything that is done, and what is open."""
-    from model.reports.page import Report, Section, Text
+    from model.reports.page import Report, Section
 
-    done = [step for step in STEPS if step.name in record.steps]
-    open_steps = [step.title for step in STEPS if step.name not in record.steps]
-    sections = []
-    for step in done:
-        result = record.steps[step.name]
-        blocks: list[Block] = [
-            Text(f"{step.does} Done {result['done']}.", "quiet"),
-            *_pictures(record, step.name, result),
-        ]
-        blocks.append(_table(result))
-        sections.append(Section(step.title, tuple(blocks)))
-    answer = f"{len(done)} of {len(STEPS)} steps are done."
-    if open_steps:
-        answer += f" Open: {', '.join(open_steps)}."
-    skipped = [one for one in done if record.steps[one.name].get("skipped")]
-    if skipped:
-        answer += f" Skipped: {', '.join(one.title for one in skipped)}."
+    sections = tuple(
+        Section(step.title, tuple(_blocks(record, step.name, step.does))) for step in STEPS if step.name in record.steps
+    )
     facts = (
         ("folder", record.folder.absolute().name),
         ("port", str(record.steps.get("line", {}).get("port", "not known"))),
     )
-    return Report("Acceptance sheet", answer, facts, tuple(sections), errors="Intervals hold 95 %.")
+    return Report("Acceptance sheet", _answer(record), facts, sections, errors="Intervals hold 95 %.")
 
 
-def _table(result: dict[str, Any]) -> Block:
+def _answer(record: Record) -> str:
+    """How many steps are done, left out and open."""
+    done, left_out = [[step.title for step in STEPS if step.name in some] for some in (record.done, record.left_out)]
+    still_open = [step.title for step in STEPS if step.name not in record.steps]
+    answer = f"{len(done)} of {len(STEPS)} steps are done, {len(left_out)} are left out, {len(still_open)} are open."
+    if left_out:
+        answer += f" Left out: {', '.join(left_out)}."
+    if still_open:
+        answer += f" Open: {', '.join(still_open)}."
+    return answer
+
+
+def _blocks(record: Record, name: str, does: str) -> list[Block]:
+    """What a section shows: the result of a step that is done, or why it was left out."""
+    from model.reports.page import Text
+
+    result = record.steps[name]
+    when = _when(str(result["done"]))
+    if name in record.left_out:
+        return [Text(f"Left out on {when}: {result.get('reason', NO_REASON)}.", "warning")]
+    return [Text(f"{does} Done on {when}.", "quiet"), *_pictures(record, name, result), *_tables(result)]
+
+
+def _when(iso: str) -> str:
+    """A moment as 2026-11-23 08:15 UTC."""
+    return f"{iso[:16].replace('T', ' ')} UTC" if iso.endswith("+00:00") else iso
+
+
+def _tables(result: dict[str, Any]) -> list[Block]:
+    """What a step found: a table of its single values, and one with a row for each joint."""
     from model.reports.page import Cell, Table
 
-    rows = []
-    for name, value in result.items():
-        if name == "done":
-            continue
-        if isinstance(value, dict):
-            rows += [(Cell(f"{name}: {key}"), Cell(_shown(one))) for key, one in value.items()]
-        else:
-            rows.append((Cell(name), Cell(_shown(value))))
-    return Table(("what", "found"), tuple((Cell(c[0].text.replace("_", " ")), c[1]) for c in rows))
+    joints = {name: one for name, one in result.items() if name.startswith("joint_") and isinstance(one, dict)}
+    single = {name: one for name, one in result.items() if name not in joints and name not in NOT_SHOWN}
+    tables: list[Block] = []
+    if single:
+        rows = []
+        for name, value in single.items():
+            parts = value.items() if isinstance(value, dict) else [("", value)]
+            rows += [(Cell(_words(f"{name} {part}")), Cell(_shown(one))) for part, one in parts]
+        tables.append(Table(("what", "found"), tuple(rows)))
+    if joints:
+        columns = list(dict.fromkeys(key for one in joints.values() for key in one if key not in DRAWN))
+        body = [
+            (Cell(_words(name)), *(Cell(_shown(one.get(key, ""), key in INTERVALS), number=True) for key in columns))
+            for name, one in joints.items()
+        ]
+        tables.append(Table(("joint", *map(_words, columns)), tuple(body)))
+    return tables
 
 
-def _shown(value: Any) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+def _words(name: str) -> str:
+    """A name of the record as people write it."""
+    for suffix, unit in UNITS.items():
+        if name.endswith(suffix):
+            return f"{name.removesuffix(suffix).replace('_', ' ')} ({unit})"
+    return name.replace("_", " ").strip()
+
+
+def _shown(value: Any, interval: bool = False) -> str:
+    """A value as people write it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if interval and isinstance(value, list):
+        return " ± ".join(map(str, value))
+    if isinstance(value, list) and value and all(isinstance(one, bool) for one in value):
+        return ", ".join(map(_shown, value))
+    return (", ".join(map(str, value)) or "none") if isinstance(value, list) else str(value)
 
 
 def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:

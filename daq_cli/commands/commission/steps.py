@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from daq.contracts.errors import SpecError
 from daq_cli.commands.commission.bench import Bench
 from daq_cli.commands.commission.by_command import first_ramp, gain, model, period, ramp, stop
-from daq_cli.commands.commission.by_hand import emergency_stop, potentiometers
+from daq_cli.commands.commission.by_hand import emergency_stop, end_stops, potentiometers
 from daq_cli.commands.commission.line_and_memory import bridge, line, memory
 from daq_cli.commands.commission.record import Record
 
@@ -17,6 +17,7 @@ NOT_TO_BE_SKIPPED = ("bridge", "ramp")
 RESTS_ON = {
     "bridge": ("port", "memory_map"),
     "potentiometers": ("memory_map",),
+    "end_stops": ("memory_map",),
     "emergency_stop": ("port", "memory_map"),
     "gain": ("machine",),
     "first_ramp": ("machine",),
@@ -39,11 +40,13 @@ class Step(NamedTuple):
     """Steps that have to be done, or left out on purpose where that is safe, before this one."""
     at_the_arm: bool = True
     """Whether a person at the arm has to say that it may begin, even with --yes."""
+    at_the_port: bool = True
+    """Whether it talks to the controller."""
 
 
 SEE = "It only reads; nothing moves."
 KEY = "Ctrl-C, `daq stop` in another terminal, or the emergency stop"
-BEFORE_MOVING = ("bridge", "potentiometers", "emergency_stop", "stop")
+BEFORE_MOVING = ("bridge", "potentiometers", "end_stops", "emergency_stop", "stop")
 STEPS = (
     Step("line", "Port and line", "Reads one byte 200 times.", SEE, "Ctrl-C", line, at_the_arm=False),
     Step(
@@ -74,6 +77,15 @@ STEPS = (
         ("memory",),
     ),
     Step(
+        "end_stops",
+        "End stops",
+        "Reads each joint at its end stops, to which you lead it by hand; the limits then keep two degrees from them.",
+        "The arm, which may sink while the emergency stop is pressed.",
+        "the emergency stop stays pressed throughout",
+        end_stops,
+        ("potentiometers",),
+    ),
+    Step(
         "emergency_stop",
         "Emergency stop",
         "Reads whether a joint that you push off its set point stays there while the emergency stop is pressed.",
@@ -97,7 +109,7 @@ STEPS = (
     Step(
         "gain",
         "Gain of each joint",
-        "Moves the joints by steps of 1 to 3 degrees at three postures.",
+        "Moves the joints by steps of 1 to 3 degrees at three postures, and writes the gain into the machine file.",
         "The arm.",
         KEY,
         gain,
@@ -124,12 +136,13 @@ STEPS = (
     Step(
         "model",
         "The model",
-        "Compares the ramp with the machine file.",
+        "Compares the ramp with the machine file; where they differ, a diagnosis says what may be missing.",
         "It only computes.",
         "Ctrl-C",
         model,
         ("ramp",),
         at_the_arm=False,
+        at_the_port=False,
     ),
 )
 """All steps, in order."""

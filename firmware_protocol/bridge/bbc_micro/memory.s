@@ -7,7 +7,7 @@
 .import body, reply, put, put_long, fresh_reading, wait_until_clear, find_begun, send_reply
 
 .export read_all, read_block, write_block, write_set_points, write_points, report_gains, set_gains, report_all
-.export read_process, write_outputs, set_gripper, read_status, put_status, put_readings
+.export next_reading, read_process, write_outputs, set_gripper, read_status, put_status, put_readings
 
 STAMPED = body+12
 
@@ -43,6 +43,15 @@ each:   lda SET_POINT_LOW,x
         inx
         cpx #JOINTS
         bne each
+        rts
+
+; From one reading of seven bytes to the next: X. Zero flag: that was the last.
+next_reading:
+        txa
+        clc
+        adc #7
+        tax
+        cpx #7 * JOINTS
         rts
 
 read_block:

@@ -5,7 +5,8 @@
 .importzp tick, ring_newest, ring_count, ring_pointer, sampling, sample_sequence, sample_after, sample_mask, sample_begun
 .importzp sample_mark, begun, oldest, product, scratch, frozen, restarted, missed, missed_one, written_tick, mask, now
 .importzp reply_bytes, count, sample_opcode, taken
-.import body, reply, fresh_reading, snapshots, put, put_long, put_readings, send_reply, write_points, find_begun, to_posture, read_now
+.import body, reply, fresh_reading, snapshots, put, put_long, put_readings, send_reply, write_points, find_begun
+.import to_posture, read_now, next_reading
 
 .export keep_snapshot, ring_place, sample, move_and_sample, sample_work
 
@@ -129,11 +130,7 @@ within: jsr to_posture
         sta fresh_reading,x
         lda product+1
         sta fresh_reading+1,x
-        txa
-        clc
-        adc #7
-        tax
-        cpx #7 * JOINTS
+        jsr next_reading
         bne each
         rts
 

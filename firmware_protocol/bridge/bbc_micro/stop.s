@@ -6,7 +6,7 @@
 .importzp frozen, frozen_tick, fresh, stop, begun, count, scratch, product, joint, following, ring_count, ring_newest
 .importzp ring_pointer, written_tick, now, tick, mask, read_once
 .import body, put, put_long, next_number, frozen_postures, fresh_reading, held, read_all, wait_until_clear, find_begun
-.import ring_place, begin_2_ms, end_2_ms, to_posture
+.import ring_place, begin_2_ms, end_2_ms, to_posture, next_reading
 
 .export stop_arm, release, begin_frozen, same_reading
 
@@ -64,13 +64,7 @@ note:   lda fresh_reading,x
         sta frozen_postures,y
         lda fresh_reading+1,x
         sta frozen_postures+1,y
-        iny
-        iny
-        txa
-        clc
-        adc #7
-        tax
-        cpx #7 * JOINTS
+        jsr next_joint
         bne note
         rts
 
@@ -126,15 +120,15 @@ take:   lda frozen_postures,y
         sta fresh_reading+2,x
         lda frozen_postures+1,y
         sta fresh_reading+3,x
-        iny
-        iny
-        txa
-        clc
-        adc #7
-        tax
-        cpx #7 * JOINTS
+        jsr next_joint
         bne take
         rts
+
+; From one joint to the next: Y among pairs of bytes, X among readings. Zero flag: that was the last.
+next_joint:
+        iny
+        iny
+        jmp next_reading
 
 ; Reads the positions alone into `fresh_reading`.
 read_positions:
@@ -178,21 +172,14 @@ differs:
         inc scratch
         lda mask
         and joint
-        bne next_joint
+        bne go_on
 note_position:
         lda fresh_reading+2,x
         sta frozen_postures,y
         lda fresh_reading+3,x
         sta frozen_postures+1,y
-next_joint:
-        asl joint
-        iny
-        iny
-        txa
-        clc
-        adc #7
-        tax
-        cpx #7 * JOINTS
+go_on:  asl joint
+        jsr next_joint
         bne each_joint
         lda scratch
         rts
@@ -217,11 +204,7 @@ look:   lda fresh_reading+2,x
         ora fresh_reading+3,x
         ora scratch
         sta scratch
-        txa
-        clc
-        adc #7
-        tax
-        cpx #7 * JOINTS
+        jsr next_reading
         bne look
         lda scratch
         beq no_supply
@@ -236,11 +219,7 @@ convert:
         sta fresh_reading,x
         lda product+1
         sta fresh_reading+1,x
-        txa
-        clc
-        adc #7
-        tax
-        cpx #7 * JOINTS
+        jsr next_reading
         bne convert
         jsr note_postures
         jsr wait_until_clear

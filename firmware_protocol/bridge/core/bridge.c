@@ -20,7 +20,7 @@ void bridge_start(const struct bridge_settings *settings)
 {
     can_sample = settings->period_source != PERIOD_UNSEEN;
     simulated = settings->simulated;
-    moments_read_clock();
+    moments_start();
     framing_start();
     session_start(settings->first_number);
     stop_start(settings->frozen);
@@ -28,17 +28,11 @@ void bridge_start(const struct bridge_settings *settings)
     period_start(settings->period_source);
 }
 
-static uint8_t status(void)
-{
-    return (uint8_t)((stop_is_in_force() ? STATUS_FROZEN : 0) | (session_restarted() ? STATUS_RESTARTED : 0));
-}
-
-/* ---- requests that only read */
+/* ---- requests that only read, each into a reply that has been begun */
 
 static void hello(const struct frame *frame)
 {
     const bool is_this_version = frame->length > 0 && frame->payload[0] == PROTOCOL_VERSION;
-    reply_to(frame);
     reply_u8(PROTOCOL_VERSION);
     reply_u16((uint16_t)((can_sample ? CAPABILITY_SAMPLE : 0) | (simulated ? CAPABILITY_SIMULATED : 0)));
     reply_u32(PERIOD_US);
@@ -49,34 +43,27 @@ static void hello(const struct frame *frame)
         reply_u32(nonce);
         reply_u32(session_greet(nonce));
     }
-    reply_send();
 }
 
-static void read_block(const struct frame *frame)
+static void read_block(const uint8_t *payload)
 {
-    const uint16_t address = u16_at(frame->payload);
-    reply_to(frame);
-    for (uint8_t i = 0; i < frame->payload[2]; ++i) {
+    const uint16_t address = u16_at(payload);
+    for (uint8_t i = 0; i < payload[2]; ++i) {
         reply_u8(board_read_byte((uint16_t)(address + i)));
     }
-    reply_send();
 }
 
-static void report_gains(const struct frame *frame)
+static void report_gains(void)
 {
-    reply_to(frame);
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
         for (uint8_t gain = 0; gain < GAINS; ++gain) {
             reply_u8(read_gain(joint, gain));
         }
     }
-    reply_send();
 }
 
-static void report_errors_positions_powers(const struct frame *frame)
+static void report_errors_positions_powers(uint8_t mask)
 {
-    const uint8_t mask = frame->payload[0];
-    reply_to(frame);
     reply_u8(mask);
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
         if (has_joint(mask, joint)) {
@@ -85,32 +72,32 @@ static void report_errors_positions_powers(const struct frame *frame)
             reply_reading(&reading);
         }
     }
-    reply_send();
 }
 
-static void read_process(const struct frame *frame)
+static void read_process(void)
 {
-    reply_to(frame);
     reply_u8(read_inputs());
     reply_u8(read_outputs());
     reply_u8(read_gripper());
-    reply_send();
 }
 
-static void read_status(const struct frame *frame)
+static void reply_tick_and_status(void)
 {
-    reply_to(frame);
     reply_u32(period_tick());
-    reply_u8(status());
+    reply_u8((uint8_t)((stop_is_in_force() ? STATUS_FROZEN : 0) | (session_restarted() ? STATUS_RESTARTED : 0)));
+}
+
+static void read_status(void)
+{
+    reply_tick_and_status();
     reply_u16(session_boots());
     reply_u32(period_missed_set_points());
     reply_u32(stop_number());
-    reply_send();
 }
 
 /* ---- commands: `values` is the payload after the stamp */
 
-static void set_set_points(const struct frame *frame, const uint8_t *values)
+static void set_set_points(const uint8_t *values)
 {
     const uint8_t mask = *values++;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
@@ -119,24 +106,13 @@ static void set_set_points(const struct frame *frame, const uint8_t *values)
             values += 2;
         }
     }
-    moments_read_clock();
-    period_set_points_written();
-    reply_to(frame);
-    reply_u32(period_tick());
-    reply_u8(status());
-    reply_send();
 }
 
-static void write_block(const struct frame *frame, const uint8_t *values)
+static void write_block(const uint8_t *values, uint8_t count)
 {
     const uint16_t address = u16_at(values);
-    const uint8_t count = (uint8_t)(frame->length - STAMP_BYTES - 2u);
     for (uint8_t i = 0; i < count; ++i) {
         board_write_byte((uint16_t)(address + i), values[2u + i]);
-    }
-    if (block_reaches_set_points(address, count)) {
-        moments_read_clock();
-        period_set_points_written();
     }
 }
 
@@ -166,10 +142,10 @@ static void obey(const struct frame *frame)
     const uint8_t *values = frame->payload + STAMP_BYTES;
     switch (frame->opcode) {
     case WRITE_SET_POINTS:
-        set_set_points(frame, values);
-        return;
+        set_set_points(values);
+        break;
     case WRITE_BLOCK:
-        write_block(frame, values);
+        write_block(values, (uint8_t)(frame->length - STAMP_BYTES - 2u));
         break;
     case SET_GAINS:
         for (uint8_t gain = 0; gain < GAINS; ++gain) {
@@ -185,8 +161,16 @@ static void obey(const struct frame *frame)
     default: /* RELEASE is done */
         break;
     }
-    acknowledge(frame);
+    if (writes_set_points(frame)) {
+        moments_read_clock();
+        period_set_points_written();
+    }
+    if (frame->opcode == WRITE_SET_POINTS) {
+        reply_tick_and_status();
+    }
 }
+
+/* ---- all requests */
 
 static void carry_out(const struct frame *frame)
 {
@@ -195,25 +179,19 @@ static void carry_out(const struct frame *frame)
         hello(frame);
         break;
     case READ_BLOCK:
-        read_block(frame);
+        read_block(frame->payload);
         break;
     case REPORT_GAINS:
-        report_gains(frame);
+        report_gains();
         break;
     case REPORT_ERRORS_POSITIONS_POWERS:
-        report_errors_positions_powers(frame);
-        break;
-    case SAMPLE:
-        sampling_request(frame->sequence, u32_at(frame->payload), frame->payload[4]);
-        break;
-    case STOP:
-        stop_request(frame->sequence);
+        report_errors_positions_powers(frame->payload[0]);
         break;
     case READ_PROCESS:
-        read_process(frame);
+        read_process();
         break;
     case READ_STATUS:
-        read_status(frame);
+        read_status();
         break;
     default:
         obey(frame);
@@ -229,8 +207,14 @@ static void answer(const struct frame *frame)
     }
     if (reason != NOT_REFUSED) {
         refuse(frame->sequence, frame->opcode, reason);
+    } else if (frame->opcode == SAMPLE) {
+        sampling_request(frame->sequence, u32_at(frame->payload), frame->payload[4]);
+    } else if (frame->opcode == STOP) {
+        stop_request(frame->sequence);
     } else {
+        reply_begin(frame->sequence, (uint8_t)(frame->opcode | REPLY_BIT));
         carry_out(frame);
+        reply_send();
     }
 }
 

@@ -2,20 +2,34 @@
 
 #include "core.h"
 
-static uint32_t now_us;
+static uint32_t present_us;
+static uint16_t ages_us[MOMENTS];
+
+void moments_start(void)
+{
+    present_us = board_time_us();
+    for (uint8_t moment = 0; moment < MOMENTS; ++moment) {
+        ages_us[moment] = LONG_AGO;
+    }
+}
 
 void moments_read_clock(void)
 {
-    now_us = board_time_us();
+    const uint32_t now_us = board_time_us();
+    const uint16_t passed_us = now_us - present_us < LONG_AGO ? (uint16_t)(now_us - present_us) : LONG_AGO;
+    present_us = now_us;
+    for (uint8_t moment = 0; moment < MOMENTS; ++moment) {
+        const uint16_t age_us = ages_us[moment];
+        ages_us[moment] = passed_us < LONG_AGO - age_us ? (uint16_t)(age_us + passed_us) : LONG_AGO;
+    }
 }
 
-uint32_t present_us(void)
+void moment_was(enum moment moment, uint16_t ago_us)
 {
-    return now_us;
+    ages_us[moment] = ago_us;
 }
 
-uint16_t us_since(const uint32_t *moment_us)
+uint16_t us_since(enum moment moment)
 {
-    const uint32_t since_us = now_us - *moment_us;
-    return since_us < UINT16_MAX ? (uint16_t)since_us : UINT16_MAX;
+    return ages_us[moment];
 }

@@ -1,8 +1,7 @@
-/* Numbers in a message, little-endian, and masks of joints. */
+/* Numbers in a message, little-endian. */
 #ifndef BRIDGE_NUMBERS_H
 #define BRIDGE_NUMBERS_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 static inline uint16_t u16_at(const uint8_t *bytes)
@@ -13,12 +12,6 @@ static inline uint16_t u16_at(const uint8_t *bytes)
 static inline uint32_t u32_at(const uint8_t *bytes)
 {
     return u16_at(bytes) | ((uint32_t)u16_at(bytes + 2) << 16);
-}
-
-/* Whether a mask has the bit of a joint, which is counted from 0. */
-static inline bool has_joint(uint8_t mask, uint8_t joint)
-{
-    return ((unsigned)mask >> joint & 1u) != 0;
 }
 
 #endif

@@ -57,52 +57,45 @@ enum following {
 
 static enum period_source source;
 static enum following following;
-static uint32_t tick;           /* number of the period whose results were stored last */
-static uint32_t stored_us;      /* when their storing began */
-static uint32_t looked_us;      /* when the memory was read last */
-static bool has_looked;
+static uint32_t tick; /* number of the period whose results were stored last */
 static bool has_supply;
-static uint8_t positions[POSITION_BYTES]; /* at the last look */
+static uint16_t positions[JOINTS]; /* at the last look */
 static uint8_t unchanged_periods;
 static struct snapshot first_reading;
 static bool is_read_once;
 static uint16_t read_again_us;
-static uint32_t written_tick; /* period_tick() when set points were written last */
+static uint8_t periods_to_take; /* results still to come before those that must show what is in the set points */
 static uint32_t missed;
-static uint32_t kept_us; /* when the newest snapshot was put into the ring */
-static bool kept_lately;
+
+/* Nothing is known of the controller: the state at the start, and after a reset of the board. */
+static void forget(void)
+{
+    following = SEARCHING;
+    tick = 0;
+    unchanged_periods = 0;
+    is_read_once = false;
+    periods_to_take = 0;
+    ring_clear();
+}
 
 void period_start(enum period_source period_source)
 {
     source = period_source;
-    following = SEARCHING;
-    tick = 0;
-    has_looked = false;
     has_supply = true;
-    unchanged_periods = 0;
-    is_read_once = false;
-    written_tick = 0;
     missed = 0;
-    kept_lately = false;
-    ring_clear();
-}
-
-/* Whether the newest snapshot was kept less than so long ago. Asked at every turn, so that the clock may wrap. */
-static bool was_kept_lately(void)
-{
-    kept_lately = kept_lately && us_since(&kept_us) < OLD_AFTER_US;
-    return kept_lately;
+    forget();
+    (void)read_positions(positions);
 }
 
 bool period_newest_is_current(void)
 {
-    return was_kept_lately() && ring_newest() != NULL && tick - ring_newest_tick() <= 1u;
+    return us_since(SNAPSHOT_KEPT) < OLD_AFTER_US && ring_newest() != NULL && tick - ring_newest_tick() <= 1u;
 }
 
 /* Whether so much time has passed since the latest results began to be stored. */
 static bool has_passed(uint16_t us)
 {
-    return following != SEARCHING && us_since(&stored_us) >= us;
+    return following != SEARCHING && us_since(RESULTS_STORED) >= us;
 }
 
 uint32_t period_tick(void)
@@ -118,7 +111,7 @@ bool period_wants_memory(void)
 
 void period_set_points_written(void)
 {
-    written_tick = period_tick();
+    periods_to_take = period_tick() == tick ? 1 : 2;
 }
 
 uint32_t period_missed_set_points(void)
@@ -132,45 +125,26 @@ static void begin_new_life(void)
 {
     session_board_was_reset();
     sampling_board_was_reset();
-    ring_clear();
-    following = SEARCHING;
-    tick = 0;
-    written_tick = 0;
-    unchanged_periods = 0;
-    is_read_once = false;
-}
-
-/* A memory in which all positions are zero belongs to a board without supply. */
-static bool all_zero(const uint8_t bytes[POSITION_BYTES])
-{
-    for (uint8_t i = 0; i < POSITION_BYTES; ++i) {
-        if (bytes[i] != 0) {
-            return false;
-        }
-    }
-    return true;
+    forget();
 }
 
 /* Reads the positions. True when they differ from the last look, and the board had its supply at both. */
 static bool look(void)
 {
-    uint8_t seen[POSITION_BYTES];
-    read_positions(seen);
-    const bool powered = !all_zero(seen);
-    const bool changed = has_looked && has_supply && powered && memcmp(seen, positions, POSITION_BYTES) != 0;
+    const bool differ = read_positions(positions);
+    const bool powered = !all_zero(positions);
+    const bool changed = has_supply && powered && differ;
     if (powered != has_supply && (!powered || session_is_open())) {
         begin_new_life(); /* when the supply fails, and when it returns to hosts that have greeted meanwhile */
     }
     has_supply = powered;
-    has_looked = true;
-    looked_us = present_us();
-    memcpy(positions, seen, POSITION_BYTES);
+    moment_was(POSITIONS_SEEN, 0);
     return changed;
 }
 
 static bool look_is_due(uint16_t every_us)
 {
-    return !has_looked || us_since(&looked_us) >= every_us;
+    return us_since(POSITIONS_SEEN) >= every_us;
 }
 
 /* ---- snapshots */
@@ -179,16 +153,8 @@ static void read_snapshot(struct snapshot *snapshot)
 {
     snapshot->status = 0;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        struct reading reading;
-        read_joint(joint, &reading);
-        pack(&reading, snapshot->joints[joint]);
+        read_joint(joint, &snapshot->joints[joint]);
     }
-}
-
-/* Whether the controller has left set points in the memory that it should have taken in period `tick`. */
-static bool has_missed(uint16_t in_memory, uint16_t taken)
-{
-    return written_tick < tick && in_memory <= LARGEST_SET_POINT && in_memory != taken;
 }
 
 /* Puts in the set points that the controller took, which are not those in the memory while it has missed some, or when
@@ -197,66 +163,66 @@ static void keep_snapshot(struct snapshot *snapshot)
 {
     bool missed_one = false;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        struct reading reading;
-        unpack(snapshot->joints[joint], &reading);
-        const uint16_t taken = set_point_taken(&reading);
-        missed_one = missed_one || has_missed(reading.set_point, taken);
-        reading.set_point = taken;
-        pack(&reading, snapshot->joints[joint]);
+        missed_one |= !put_in_taken(&snapshot->joints[joint]);
     }
+    missed_one &= periods_to_take == 0;
     snapshot->status = (uint8_t)((stop_is_in_force() ? STATUS_FROZEN : 0) | (missed_one ? STATUS_SET_POINT_MISSED : 0));
     missed += missed_one;
     ring_add(tick, snapshot);
-    kept_us = present_us();
-    kept_lately = true;
+    moment_was(SNAPSHOT_KEPT, 0);
 }
 
 /* ---- following */
 
-static void begin_settling(uint32_t began_us, bool was_seen)
+/* One more period has ended. */
+static void count_period(void)
 {
-    stored_us = began_us;
-    read_again_us = was_seen ? READ_AGAIN_US : READ_AGAIN_UNSURE_US;
     ++tick;
+    if (periods_to_take > 0) {
+        --periods_to_take;
+    }
+}
+
+/* The controller began so long ago to store a period's results. */
+static void begin_settling(uint16_t ago_us, bool was_seen)
+{
+    moment_was(RESULTS_STORED, ago_us);
+    read_again_us = was_seen ? READ_AGAIN_US : READ_AGAIN_UNSURE_US;
+    count_period();
     following = SETTLING;
     is_read_once = false;
 }
 
 static void search(void)
 {
-    if (tick > 0 && us_since(&stored_us) >= PERIOD_US) { /* once followed, ticks go on by the bridge's own clock */
-        stored_us += PERIOD_US;
-        ++tick;
+    const uint16_t since_us = us_since(RESULTS_STORED);
+    if (tick > 0 && since_us >= PERIOD_US) { /* once followed, ticks go on by the bridge's own clock */
+        moment_was(RESULTS_STORED, (uint16_t)(since_us - PERIOD_US));
+        count_period();
     }
     if (look_is_due(SEARCH_EVERY_US) && look()) {
         unchanged_periods = 0;
-        begin_settling(present_us(), true);
+        begin_settling(0, true);
     }
-}
-
-/* When results that are seen now began to be stored. */
-static uint32_t storing_began_us(uint16_t since_us)
-{
-    const uint16_t late_us = since_us < PERIOD_US ? 0 : (uint16_t)(since_us - PERIOD_US);
-    return present_us() - (uint16_t)(late_us - late_us / LATE_SHARE);
 }
 
 static void expect(void)
 {
-    const uint16_t since_us = us_since(&stored_us);
+    const uint16_t since_us = us_since(RESULTS_STORED);
     if (since_us < PERIOD_US - EXPECT_EARLY_US || !look_is_due(EXPECT_EVERY_US)) {
         return;
     }
-    const bool looked_just_now = us_since(&looked_us) < JUST_NOW_US;
+    const uint16_t late_us = since_us < PERIOD_US ? 0 : (uint16_t)(since_us - PERIOD_US);
+    const bool looked_just_now = us_since(POSITIONS_SEEN) < JUST_NOW_US;
     if (look()) {
         unchanged_periods = 0;
-        begin_settling(storing_began_us(since_us), looked_just_now);
-    } else if (following == EXPECTING && since_us >= PERIOD_US + EXPECT_LATE_US) {
+        begin_settling((uint16_t)(late_us - late_us / LATE_SHARE), looked_just_now);
+    } else if (following == EXPECTING && late_us >= EXPECT_LATE_US) {
         if (++unchanged_periods > MOST_UNCHANGED_PERIODS) {
             following = SEARCHING;
             ring_clear();
         } else {
-            begin_settling(stored_us + PERIOD_US, false);
+            begin_settling(late_us, false);
         }
     }
 }
@@ -271,7 +237,7 @@ static void settle(void)
     const bool agree = is_read_once && memcmp(&reading, &first_reading, sizeof reading) == 0;
     first_reading = reading;
     is_read_once = true;
-    looked_us = present_us();
+    moment_was(POSITIONS_SEEN, 0);
     if (!agree && !has_passed(GIVE_UP_US)) {
         return;
     }
@@ -284,7 +250,6 @@ static void settle(void)
 
 void period_work(void)
 {
-    (void)was_kept_lately();
     if (source != PERIOD_WATCHED) {
         if (look_is_due(has_supply ? SUPPLY_EVERY_US : SEARCH_EVERY_US)) {
             (void)look();
@@ -304,7 +269,7 @@ void period_ended(void)
         return;
     }
     struct snapshot reading;
-    ++tick;
+    count_period();
     read_snapshot(&reading);
     keep_snapshot(&reading);
 }

@@ -10,7 +10,6 @@
 #define STAMP_BYTES 8u
 #define LARGEST_SET_POINT 999u
 #define LARGEST_GAIN 20u
-#define READING_BYTES 7u
 
 #ifndef RING_DEPTH
 #define RING_DEPTH 32u /* snapshots; at least 8 */

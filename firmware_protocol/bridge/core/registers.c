@@ -2,6 +2,7 @@
 
 #include "core.h"
 #include "memory_map.h"
+#include "numbers.h"
 
 #define MASK_OF(bits) ((uint16_t)((1ul << (bits)) - 1u))
 #define LARGEST_ERROR ((int16_t)(MASK_OF(ERROR_BITS) >> 1))
@@ -34,28 +35,58 @@ static uint16_t read_word(uint8_t low, uint8_t high)
     return (uint16_t)(low_byte | ((uint16_t)read_at(high) << 8));
 }
 
-static int16_t read_error(uint8_t joint)
+uint16_t read_position(uint8_t joint)
 {
+    return (uint16_t)(read_word(position_low[joint], position_high[joint]) & MASK_OF(POSITION_BITS));
+}
+
+/* In 16 bits, whatever the memory has. */
+static uint16_t read_error(uint8_t joint)
+{
+#if ERROR_BITS == 16
+    return read_word(error_low[joint], error_high[joint]);
+#else
 #if ERROR_BITS > 8
     const uint16_t raw = (uint16_t)(read_word(error_low[joint], error_high[joint]) & MASK_OF(ERROR_BITS));
 #else
     const uint16_t raw = read_at(error_low[joint]);
 #endif
     const uint16_t sign = (uint16_t)(1u << (ERROR_BITS - 1));
-    return (int16_t)(uint16_t)((raw ^ sign) - sign);
+    return (uint16_t)((raw ^ sign) - sign);
+#endif
+}
+
+bool has_joint(uint8_t mask, uint8_t joint)
+{
+    return ((unsigned)mask >> joint & 1u) != 0;
 }
 
 void read_joint(uint8_t joint, struct reading *reading)
 {
-    reading->set_point = read_set_point(joint);
-    reading->position = (uint16_t)(read_word(position_low[joint], position_high[joint]) & MASK_OF(POSITION_BITS));
-    reading->error = read_error(joint);
-    reading->power = (int8_t)read_at(power_low[joint]);
+    const uint16_t set_point = read_set_point(joint);
+    const uint16_t position = read_position(joint);
+    const uint16_t error = read_error(joint);
+    reading->set_point_low = (uint8_t)set_point;
+    reading->high_bits = (uint8_t)((set_point >> 8) | ((position >> 8) << 4));
+    reading->position_low = (uint8_t)position;
+    reading->error[0] = (uint8_t)error;
+    reading->error[1] = (uint8_t)(error >> 8);
+    reading->power = read_at(power_low[joint]);
+}
+
+uint16_t set_point_of(const struct reading *reading)
+{
+    return (uint16_t)(reading->set_point_low | ((reading->high_bits & 0x03u) << 8));
+}
+
+uint16_t position_of(const struct reading *reading)
+{
+    return (uint16_t)(reading->position_low | ((reading->high_bits >> 4) << 8));
 }
 
 uint16_t read_set_point(uint8_t joint)
 {
-    return (uint16_t)(read_word(set_point_low[joint], set_point_high[joint]) & MASK_OF(10));
+    return (uint16_t)(read_word(set_point_low[joint], set_point_high[joint]) & MASK_OF(SET_POINT_BITS));
 }
 
 void write_set_point(uint8_t joint, uint16_t posture)
@@ -64,17 +95,24 @@ void write_set_point(uint8_t joint, uint16_t posture)
     write_at(set_point_high[joint], (uint8_t)(posture >> 8));
 }
 
-void read_positions(uint8_t bytes[POSITION_BYTES])
+bool read_positions(uint16_t counts[JOINTS])
 {
+    bool differ = false;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        bytes[joint] = read_at(position_low[joint]);
-        bytes[JOINTS + joint] = read_at(position_high[joint]);
+        const uint16_t before = counts[joint];
+        counts[joint] = read_position(joint);
+        differ |= counts[joint] != before;
     }
+    return differ;
 }
 
-uint16_t position_in(const uint8_t bytes[POSITION_BYTES], uint8_t joint)
+bool all_zero(const uint16_t counts[JOINTS])
 {
-    return (uint16_t)((bytes[joint] | ((uint16_t)bytes[JOINTS + joint] << 8)) & MASK_OF(POSITION_BITS));
+    uint16_t any = 0;
+    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+        any |= counts[joint];
+    }
+    return any == 0;
 }
 
 uint8_t read_gain(uint8_t joint, uint8_t gain)
@@ -130,15 +168,23 @@ bool block_reaches_set_points(uint16_t address, uint8_t count)
     return false;
 }
 
+/* (2000 counts + 4096) div 8192, both over 16. Of 512 counts each, 125 come off exactly: so 16 bits suffice. */
 uint16_t posture_of(uint16_t counts)
 {
-    const uint16_t posture = (uint16_t)((125ul * counts + 256u) >> 9); /* both over 16: (2000 counts + 4096) / 8192 */
+    const uint16_t posture = (uint16_t)(125u * (counts >> 9) + ((125u * (counts & 0x1FFu) + 256u) >> 9));
     return posture < LARGEST_SET_POINT ? posture : LARGEST_SET_POINT;
 }
 
-uint16_t set_point_taken(const struct reading *reading)
+bool put_in_taken(struct reading *reading)
 {
-    const uint16_t target = (uint16_t)(reading->position + (uint16_t)reading->error); /* far above, if below 0 */
-    const bool error_is_limited = reading->error >= LARGEST_ERROR || reading->error <= -LARGEST_ERROR;
-    return error_is_limited || target > MASK_OF(POSITION_BITS) ? reading->set_point : posture_of(target);
+    const uint16_t in_memory = set_point_of(reading);
+    const int16_t error = (int16_t)u16_at(reading->error);
+    const uint16_t target = (uint16_t)(position_of(reading) + (uint16_t)error); /* far above, if below 0 */
+    if (error >= LARGEST_ERROR || error <= -LARGEST_ERROR || target > MASK_OF(POSITION_BITS)) {
+        return true; /* the memory's error is limited: it does not tell */
+    }
+    const uint16_t taken = posture_of(target);
+    reading->set_point_low = (uint8_t)taken;
+    reading->high_bits = (uint8_t)((reading->high_bits & 0xF0u) | (taken >> 8));
+    return in_memory == taken || in_memory > LARGEST_SET_POINT;
 }

@@ -7,26 +7,37 @@
 
 #include "protocol.h"
 
-struct reading {
-    uint16_t set_point; /* posture units */
-    uint16_t position;  /* ADC counts */
-    int16_t error;      /* ADC counts */
-    int8_t power;       /* DAC counts */
-};
+/* Whether a mask has the bit of a joint. */
+bool has_joint(uint8_t mask, uint8_t joint);
 
-/* Bytes of all positions, as they lie in the memory. */
-#define POSITION_BYTES (2u * JOINTS)
+/* What the memory has of a joint, packed: 10 + 12 + 16 + 8 bits. */
+struct reading {
+    uint8_t set_point_low; /* posture units */
+    uint8_t high_bits;     /* of the set point from bit 0 on, of the position from bit 4 on */
+    uint8_t position_low;  /* ADC counts */
+    uint8_t error[2];      /* ADC counts, two's complement, low byte first */
+    uint8_t power;         /* DAC counts, two's complement */
+};
 
 /* Gains of a joint: proportional, integral, derivative. */
 #define GAINS 3u
 
 /* Reads a joint byte by byte: low and high byte may be of different periods. */
 void read_joint(uint8_t joint, struct reading *reading);
+uint16_t set_point_of(const struct reading *reading);
+uint16_t position_of(const struct reading *reading);
+
 uint16_t read_set_point(uint8_t joint);
 void write_set_point(uint8_t joint, uint16_t posture);
 
-void read_positions(uint8_t bytes[POSITION_BYTES]);
-uint16_t position_in(const uint8_t bytes[POSITION_BYTES], uint8_t joint);
+/* Reads a position (ADC counts) byte by byte. */
+uint16_t read_position(uint8_t joint);
+
+/* Reads all positions. Whether one is another than was there. */
+bool read_positions(uint16_t counts[JOINTS]);
+
+/* Whether no position is other than 0: the memory of a board without supply. */
+bool all_zero(const uint16_t counts[JOINTS]);
 
 uint8_t read_gain(uint8_t joint, uint8_t gain);
 void write_gain(uint8_t joint, uint8_t gain, uint8_t value);
@@ -44,7 +55,8 @@ bool block_reaches_set_points(uint16_t address, uint8_t count);
 /* Posture units of a position (ADC counts), rounded half up (PROTOCOL.md, section 8). */
 uint16_t posture_of(uint16_t counts);
 
-/* The set point that a controller has taken, by what it made of it: error = set point - position. */
-uint16_t set_point_taken(const struct reading *reading);
+/* Puts in the set point that the controller has taken, by what it made of it: error = set point - position. False
+ * where another one was read that it could have taken. */
+bool put_in_taken(struct reading *reading);
 
 #endif

@@ -1,15 +1,6 @@
 #include "replies.h"
 
-void reply_to(const struct frame *frame)
-{
-    reply_begin(frame->sequence, (uint8_t)(frame->opcode | REPLY_BIT));
-}
-
-void acknowledge(const struct frame *frame)
-{
-    reply_to(frame);
-    reply_send();
-}
+#include "framing.h"
 
 void refuse(uint16_t sequence, uint8_t opcode, enum refusal reason)
 {
@@ -21,8 +12,9 @@ void refuse(uint16_t sequence, uint8_t opcode, enum refusal reason)
 
 void reply_reading(const struct reading *reading)
 {
-    reply_u16(reading->set_point);
-    reply_u16(reading->position);
-    reply_u16((uint16_t)reading->error);
-    reply_u8((uint8_t)reading->power);
+    reply_u16(set_point_of(reading));
+    reply_u16(position_of(reading));
+    reply_u8(reading->error[0]);
+    reply_u8(reading->error[1]);
+    reply_u8(reading->power);
 }

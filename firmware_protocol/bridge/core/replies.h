@@ -4,15 +4,8 @@
 
 #include <stdint.h>
 
-#include "framing.h"
 #include "protocol.h"
 #include "registers.h"
-
-/* Begins the reply to a request. */
-void reply_to(const struct frame *frame);
-
-/* A reply without payload. */
-void acknowledge(const struct frame *frame);
 
 void refuse(uint16_t sequence, uint8_t opcode, enum refusal reason);
 

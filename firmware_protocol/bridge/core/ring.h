@@ -7,15 +7,10 @@
 
 #include "registers.h"
 
-#define PACKED_BYTES 6u /* 10 + 12 + 16 + 8 = 46 bits of a reading */
-
 struct snapshot {
     uint8_t status; /* flags of this period: FROZEN, SET_POINT_MISSED */
-    uint8_t joints[JOINTS][PACKED_BYTES];
+    struct reading joints[JOINTS];
 };
-
-void pack(const struct reading *reading, uint8_t packed[PACKED_BYTES]);
-void unpack(const uint8_t packed[PACKED_BYTES], struct reading *reading);
 
 void ring_clear(void);
 

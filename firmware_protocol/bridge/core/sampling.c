@@ -11,17 +11,16 @@
 #include "ring.h"
 #include "session.h"
 
-#define LONGEST_WAIT_US (25ul * PERIOD_US)
+#define LONGEST_WAIT 25u /* periods */
 
-static bool waiting;
+static uint8_t waiting; /* periods for which the request may still wait; 0 where there is none */
 static uint16_t sequence;
 static uint32_t after;
 static uint8_t mask;
-static uint32_t since_us;
 
 void sampling_start(void)
 {
-    waiting = false;
+    waiting = 0;
 }
 
 void sampling_board_was_reset(void)
@@ -31,11 +30,11 @@ void sampling_board_was_reset(void)
 
 void sampling_request(uint16_t request_sequence, uint32_t after_tick, uint8_t joints)
 {
-    waiting = true;
+    waiting = LONGEST_WAIT;
     sequence = request_sequence;
     after = after_tick > period_tick() ? ring_newest_tick() : after_tick;
     mask = joints;
-    since_us = present_us();
+    moment_was(SAMPLE_WAITS, 0);
     sampling_work();
 }
 
@@ -47,9 +46,7 @@ static void answer(uint32_t tick, const struct snapshot *snapshot)
     reply_u8(mask);
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
         if (has_joint(mask, joint)) {
-            struct reading reading;
-            unpack(snapshot->joints[joint], &reading);
-            reply_reading(&reading);
+            reply_reading(&snapshot->joints[joint]);
         }
     }
     reply_send();
@@ -57,16 +54,19 @@ static void answer(uint32_t tick, const struct snapshot *snapshot)
 
 void sampling_work(void)
 {
-    if (!waiting) {
+    if (waiting == 0) {
         return;
     }
     uint32_t tick = after;
     const struct snapshot *snapshot = ring_oldest_after(&tick);
+    const uint16_t waited_us = us_since(SAMPLE_WAITS);
     if (snapshot != NULL) {
-        waiting = false;
+        waiting = 0;
         answer(tick, snapshot);
-    } else if (present_us() - since_us >= LONGEST_WAIT_US) {
-        waiting = false;
-        refuse(sequence, SAMPLE, NOTHING_NEW);
+    } else if (waited_us >= PERIOD_US) {
+        moment_was(SAMPLE_WAITS, (uint16_t)(waited_us - PERIOD_US));
+        if (--waiting == 0) {
+            refuse(sequence, SAMPLE, NOTHING_NEW);
+        }
     }
 }

@@ -12,9 +12,8 @@ static bool restarted;
 void session_start(uint32_t first_number)
 {
     newest_given = first_number;
-    present = 0;
-    boots = 1;
-    restarted = true;
+    boots = 0;
+    session_board_was_reset();
 }
 
 uint32_t fresh_number(void)

@@ -1,7 +1,5 @@
 #include "stop.h"
 
-#include <string.h>
-
 #include "framing.h"
 #include "moments.h"
 #include "numbers.h"
@@ -20,11 +18,10 @@ static bool reading_posture;
 static uint32_t number;
 static uint32_t frozen_tick;
 static uint16_t sequence;
-static uint32_t read_us;
 static uint8_t readings;
-static uint8_t positions[POSITION_BYTES]; /* the newest reading */
-static uint16_t counts_read[JOINTS];      /* of each joint what two readings in a row agreed on last, else the newest */
-static uint8_t joints_agreed;             /* a mask: two readings in a row have agreed on them */
+static uint16_t newest[JOINTS];    /* ADC counts, of the newest reading */
+static uint16_t to_freeze[JOINTS]; /* of each joint what two readings in a row agreed on last, else the newest */
+static bool agreed[JOINTS];        /* two readings in a row have agreed on it */
 
 void stop_start(bool begin_frozen)
 {
@@ -44,41 +41,16 @@ static void answer(void)
     reply_send();
 }
 
-/* Set points become this posture. */
-static void freeze(const uint16_t counts[JOINTS])
+/* Set points become the posture `to_freeze`. Where that is all zero nothing is written: the board has no supply. */
+static void freeze(void)
 {
-    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        write_set_point(joint, posture_of(counts[joint]));
+    if (!all_zero(to_freeze)) {
+        for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+            write_set_point(joint, posture_of(to_freeze[joint]));
+        }
+        moments_read_clock();
+        period_set_points_written();
     }
-    moments_read_clock();
-    period_set_points_written();
-}
-
-static void freeze_newest_posture(void)
-{
-    uint16_t counts[JOINTS];
-    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        struct reading reading;
-        unpack(ring_newest()->joints[joint], &reading);
-        counts[joint] = reading.position;
-    }
-    freeze(counts);
-}
-
-/* Of positions that are all zero nothing is written: the board has no supply. */
-static void freeze_posture_read(void)
-{
-    uint16_t any = 0;
-    for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        any |= counts_read[joint];
-    }
-    if (any != 0) {
-        freeze(counts_read);
-    }
-}
-
-static void answer_frozen(void)
-{
     frozen_tick = period_tick();
     answer();
 }
@@ -93,50 +65,48 @@ void stop_request(uint16_t request_sequence)
     }
     frozen = true;
     if (period_newest_is_current()) {
-        freeze_newest_posture();
-        answer_frozen();
+        for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+            to_freeze[joint] = position_of(&ring_newest()->joints[joint]);
+        }
+        freeze();
     } else {
         reading_posture = true;
         readings = 1;
-        joints_agreed = 0;
-        read_us = present_us();
-        read_positions(positions);
+        for (uint8_t joint = 0; joint < JOINTS; ++joint) {
+            agreed[joint] = false;
+        }
+        moment_was(POSTURE_READ, 0);
+        (void)read_positions(newest);
     }
 }
 
 /* Reads the positions again. True when every joint reads as before. */
 static bool read_again(void)
 {
-    uint8_t again[POSITION_BYTES];
     bool all_agree = true;
-    read_us = present_us();
-    read_positions(again);
+    moment_was(POSTURE_READ, 0);
     ++readings;
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
-        const uint16_t counts = position_in(again, joint);
-        if (counts == position_in(positions, joint)) {
-            joints_agreed = (uint8_t)(joints_agreed | (1u << joint));
-            counts_read[joint] = counts;
-        } else {
-            all_agree = false;
-            if (!has_joint(joints_agreed, joint)) {
-                counts_read[joint] = counts;
-            }
+        const uint16_t counts = read_position(joint);
+        const bool agrees = counts == newest[joint];
+        if (agrees || !agreed[joint]) {
+            to_freeze[joint] = counts;
         }
+        newest[joint] = counts;
+        agreed[joint] |= agrees;
+        all_agree &= agrees;
     }
-    memcpy(positions, again, POSITION_BYTES);
     return all_agree;
 }
 
 void stop_work(void)
 {
-    if (!reading_posture || us_since(&read_us) < READ_AGAIN_US || period_wants_memory()) {
+    if (!reading_posture || us_since(POSTURE_READ) < READ_AGAIN_US || period_wants_memory()) {
         return;
     }
     if (read_again() || readings == MOST_READINGS) {
         reading_posture = false;
-        freeze_posture_read();
-        answer_frozen();
+        freeze();
     }
 }
 

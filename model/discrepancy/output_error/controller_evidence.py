@@ -192,7 +192,7 @@ class _JointRecords:
         if any(gains[1:]):
             return None
         column = trace.column(self.joint)
-        unit = sensor.range.value / 2**sensor.bits
+        unit = sensor.direction * sensor.range.value / 2**sensor.bits
         wanted = gains[0] * controller.dac_counts_per_adc_count.value * trace.error[:, column] / unit
         power = trace.power_raw[:, column].astype(np.float64)
         free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_POWER)

@@ -51,4 +51,5 @@ def thinned(trace: Trace) -> Trace:
         tick=None,
         host_time=picked(trace.host_time),
         status=None,
+        taken=None,
     )

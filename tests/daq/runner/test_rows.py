@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
@@ -11,6 +12,7 @@ from daq.contracts.machine import load_machine
 from daq.driver import BoardSnapshot
 from daq.runner.rows import RowMaker
 from firmware_protocol.commands import JointReading, StatusFlag
+from tests.turned_arms import turned
 
 MACHINE = load_machine("ma2000")
 FULL_TURN_OF_JOINT_1 = math.radians(270)
@@ -35,6 +37,15 @@ def test_a_row_has_the_chosen_joints_in_si_units() -> None:
     assert row.drive == pytest.approx((-volts, volts))
     assert row.power_raw == (-127, 127)
     assert (row.status, row.host_time, row.tick) == (5, 7.5, 100)
+
+
+def test_a_positive_power_turns_a_joint_to_where_its_counts_grow() -> None:
+    for sensor, gear, sign in ((False, False, 1), (True, False, -1), (False, True, -1), (True, True, 1)):
+        machine = turned(MACHINE, (sensor,), (gear,))
+        row = RowMaker(machine, (1,), 0.02).row(snapshot(100))
+        assert row.power_raw == (127,)
+        assert np.sign(row.drive[0]) == sign
+        assert np.sign(row.error[0]) == (1 if sensor else -1)
 
 
 def test_time_is_counted_in_periods_from_the_first_row() -> None:

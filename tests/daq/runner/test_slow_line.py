@@ -60,16 +60,23 @@ def slow_plan(arm: Rig) -> Plan:
 
 @LINES
 @KINDS
-def test_no_motion_is_faster_than_its_plan(tmp_path: Path, baud: int, every: int, every_period: bool) -> None:
+def test_no_motion_is_faster_than_its_plan_and_an_arm_has_the_time_it_was_given_to_arrive(
+    tmp_path: Path, baud: int, every: int, every_period: bool
+) -> None:
     with rig(tmp_path, f"seed=5&baud={baud}") as arm:
         assert arm.controller.line_rate(EVERY_JOINT, EVERY_JOINT).every == every
         plan, rows, sent = slow_plan(arm), Rows(), list[int]()
         follower = follower_of(arm, rows, every, every_period=every_period)
         assert follower.follow(plan, sent.append).kind == "finished"
-    passed = [later - earlier for earlier, later in pairwise(rows.ticks)]
+        ticks = tuple(rows.ticks)
+        assert follower.last is not None
+        begun = follower.last.tick
+        assert follower.arrive(EVERY_JOINT, -1.0, 50).kind == "fault"
+        assert 50 <= follower.last.tick - begun < 50 + every
+    passed = [later - earlier for earlier, later in pairwise(ticks)]
     steps = [later - earlier for earlier, later in pairwise(sent)]
     assert sent[-1] == len(plan) - 1
-    assert len(sent) == len(rows.ticks), "nothing waited"
+    assert len(sent) == len(ticks), "nothing waited"
     assert steps[0] <= every
     assert steps[1:-1] == [min(every, ticks) for ticks in passed[: len(steps) - 2]]
     if every_period:
@@ -91,19 +98,6 @@ def test_a_sample_that_comes_early_does_not_make_the_motion_faster(
         assert follower.follow(plan, sent.append).kind == "finished"
     assert {later - earlier for earlier, later in pairwise(rows.ticks)} == {4}
     assert {later - earlier for earlier, later in pairwise(sent[1:-1])} == {4}
-
-
-@LINES
-@KINDS
-def test_an_arm_has_the_time_it_was_given_to_arrive(tmp_path: Path, baud: int, every: int, every_period: bool) -> None:
-    with rig(tmp_path, f"seed=5&baud={baud}") as arm:
-        plan, rows = slow_plan(arm), Rows()
-        follower = follower_of(arm, rows, every, every_period=every_period)
-        assert follower.follow(plan, lambda _index: None).kind == "finished"
-        assert follower.last is not None
-        begun = follower.last.tick
-        assert follower.arrive(EVERY_JOINT, -1.0, 50).kind == "fault"
-        assert 50 <= follower.last.tick - begun < 50 + every
 
 
 def test_a_run_on_a_slow_line_is_complete_and_says_at_what_rate(tmp_path: Path) -> None:

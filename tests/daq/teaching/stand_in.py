@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
@@ -27,13 +28,14 @@ class LinkBrokenError(DaqError):
 
 
 class StandIn:
-    """All six joints; `hand` gives the angles to which limp joints are led at each tick."""
+    """All six joints; `hand` gives the angles to which limp joints are led at each tick, `every` is the number of
+    periods from one sample to the next."""
 
     joints = (1, 2, 3, 4, 5, 6)
-    every = 1
 
-    def __init__(self, hand: Callable[[int], Mapping[int, float]] = lambda _: {}) -> None:
+    def __init__(self, hand: Callable[[int], Mapping[int, float]] = lambda _: {}, every: int = 1) -> None:
         self.tick = 0
+        self.every = every
         self.position = REST.copy()
         self.postures = [own.rad_to_posture(float(angle)) for own, angle in zip(CALIBRATIONS, REST, strict=True)]
         self.hand = hand
@@ -66,15 +68,9 @@ class StandIn:
     def next_sample(self) -> SampleRow:
         if self.broken_from is not None and self.tick >= self.broken_from:
             raise LinkBrokenError("the link is lost")
-        self.tick += 1
         targets = np.array([own.posture_to_rad(p) for own, p in zip(CALIBRATIONS, self.postures, strict=True)])
-        led = self.hand(self.tick)
-        for joint in self.joints:
-            if self.gain[joint] == (0, 0, 0):
-                self.position[joint - 1] = led.get(joint, self.position[joint - 1])
-            else:
-                self.position[joint - 1] += 0.5 * (targets[joint - 1] - self.position[joint - 1])
-            self.position[joint - 1] += self.push.get(joint, 0.0)
+        for _ in range(self.every):
+            self._pass_period(targets)
         counts = [round(own.rad_to_counts(float(p))) for own, p in zip(CALIBRATIONS, self.position, strict=True)]
         seen = np.array([own.counts_to_rad(c) for own, c in zip(CALIBRATIONS, counts, strict=True)])
         status = StatusFlag.FROZEN if self.frozen else 0
@@ -89,6 +85,16 @@ class StandIn:
             (0,) * 6,
             int(status),
         )
+
+    def _pass_period(self, targets: NDArray[np.float64]) -> None:
+        self.tick += 1
+        led = self.hand(self.tick)
+        for joint in self.joints:
+            if self.gain[joint] == (0, 0, 0):
+                self.position[joint - 1] = led.get(joint, self.position[joint - 1])
+            else:
+                self.position[joint - 1] += 0.5 * (targets[joint - 1] - self.position[joint - 1])
+            self.position[joint - 1] += self.push.get(joint, 0.0)
 
     def set_points(self, postures: Mapping[int, int]) -> None:
         assert self.running

@@ -33,6 +33,33 @@ def test_a_joint_moves_at_the_speed_asked_for_while_the_key_is_held() -> None:
     assert arm.position[1:] == pytest.approx(REST[1:], abs=0.005)
 
 
+@pytest.mark.parametrize("every", [2, 8])
+def test_a_joint_has_its_speed_however_far_samples_are_apart(every: int) -> None:
+    arm = StandIn(every=every)
+    driven(arm, {1: 0.2, 3: -0.1}, held_until=160, periods=160)
+    time = (160 - every) * PERIOD  # the last step has just been sent
+    assert arm.position[0] - REST[0] == pytest.approx(0.2 * time, abs=0.02)
+    assert arm.position[2] - REST[2] == pytest.approx(-0.1 * time, abs=0.02)
+
+
+def test_after_a_gap_a_joint_goes_on_where_it_was() -> None:
+    arm = StandIn(every=2)
+    jogger = Jogger(MA2000, LIMITS, arm.joints, every=2)
+    before = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
+    jogger.accept(before)
+    arm.tick += 50
+    after = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
+    assert after.angles[1] - before.angles[1] == pytest.approx(0.2 * 2 * PERIOD)
+
+
+@pytest.mark.parametrize("every", [2, 8])
+def test_a_jog_with_samples_far_apart_goes_to_the_limit_and_no_further(every: int) -> None:
+    arm = StandIn(every=every)
+    told = driven(arm, {4: JOG_SPEED}, held_until=560, periods=560)
+    assert arm.position[3] == pytest.approx(1.56, abs=0.01)
+    assert len(told) == 1
+
+
 def test_several_joints_are_jogged_at_once() -> None:
     arm = StandIn()
     driven(arm, {1: 0.2, 3: -0.1}, held_until=100, periods=100)

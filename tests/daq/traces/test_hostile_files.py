@@ -17,7 +17,7 @@ from benchmarks.trace_damage import campaign
 from benchmarks.trace_damage import record as sound_record
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces import layout
+from daq.traces import layout, set_points_taken
 from daq.traces.catalogue import list_traces
 from daq.traces.fields import CompressedChunk
 from daq.traces.inflate import inflate
@@ -212,6 +212,22 @@ def test_a_value_that_no_rig_can_have_measured_is_refused(
 
     line = refused(tmp_path / "a.mcap", recompressed(sound["finished"].data, "zstd", changed))
     assert complaint in line
+
+
+def test_a_record_of_a_slow_line_that_does_not_tell_each_sample_s_set_points_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap", every=2)
+    least = HEAD + 22 + set_points_taken.DTYPE.itemsize
+    left_out = 0
+
+    def changed(chunk: bytes) -> bytes:
+        nonlocal left_out
+        spans = [(b - 8, e - 8) for op, b, e in records(bytes(8) + chunk) if op == Opcode.MESSAGE and e - b == least]
+        left_out += len(spans[:1])
+        return chunk[: spans[0][0]] + chunk[spans[0][1] :] if spans else chunk
+
+    line = refused(tmp_path / "b.mcap", recompressed(path.read_bytes(), "zstd", changed))
+    assert left_out >= 1
+    assert "the topics do not have the same ticks" in line
 
 
 @pytest.mark.parametrize(

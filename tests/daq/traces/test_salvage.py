@@ -26,21 +26,22 @@ from daq.traces.naming import finished_path, part_path
 from daq.traces.reader import read_trace
 from daq.traces.recording import Recording
 from daq.traces.salvage import salvage, salvage_folder
-from daq.traces.writer import RECORDED_SIGNALS, TraceWriter
+from daq.traces.writer import RECORDED_SIGNALS, SLOW_LINE_SIGNALS, TraceWriter
 from tests.daq.traces.samples import JOINTS, record, row, write
 
 ROOT = Path(__file__).parents[3]
 
 
-def unfinished(part: Path, synced: int = 3, each: int = 40) -> tuple[bytes, list[int]]:
+def unfinished(part: Path, synced: int = 3, each: int = 40, every: int = 1) -> tuple[bytes, list[int]]:
     """A recording that was never closed: its bytes, and its length after every sync."""
     lengths = []
+    signals = RECORDED_SIGNALS if every == 1 else SLOW_LINE_SIGNALS
     with part.open("wb") as stream:
-        recording = Recording(stream, record(), JOINTS, RECORDED_SIGNALS, {"config.toml": b"a = 1\n"})
+        recording = Recording(stream, record(every=every), JOINTS, signals, {"config.toml": b"a = 1\n"})
         recording.event(TraceEvent(time=0.0, kind="start", message=""))
         for number in range(synced):
             for tick in range(number * each, (number + 1) * each):
-                recording.row(row(tick))
+                recording.row(row(tick, taken=tick // 2))
             recording.flush()
             lengths.append(stream.tell())
     return part.read_bytes(), lengths
@@ -96,6 +97,15 @@ def test_a_recording_cut_at_any_byte_gives_what_was_whole_before(
     assert read_trace(part).record.outcome is None
     assert salvage(part).samples >= least
     check_salvaged(finished_path(part), len(read_trace(finished_path(part))))
+
+
+def test_a_recording_of_a_slow_line_keeps_the_periods_in_which_set_points_were_taken(tmp_path: Path) -> None:
+    part = tmp_path / "a.mcap.part"
+    data, lengths = unfinished(part, every=2)
+    part.write_bytes(data[: lengths[1] + 9])
+    assert salvage(part).samples == 80
+    check_salvaged(finished_path(part), 80)
+    np.testing.assert_array_equal(read_trace(finished_path(part)).taken, np.arange(80) // 2)  # type: ignore[arg-type]
 
 
 def test_a_run_that_was_killed_between_its_end_and_its_name_is_not_complete(tmp_path: Path) -> None:

@@ -25,10 +25,11 @@ def recorded(
     outcome: Outcome = "complete",
     counters: dict[str, float] | None = None,
     event: TraceEvent | None = None,
+    every: int = 1,
     **changes: object,
 ) -> Path:
     """A trace whose last row has `changes`."""
-    with TraceWriter(path, record(), JOINTS) as writer:
+    with TraceWriter(path, record(every=every), JOINTS) as writer:
         for tick in ticks:
             writer.sample(row(tick, **(changes if tick == ticks[-1] else {})))
         if event:
@@ -61,6 +62,11 @@ def test_a_good_trace_has_no_findings_but_notes(tmp_path: Path) -> None:
             "claims to be complete, but has events link_lost",
         ),
         ({"ticks": []}, ("warning", "samples"), "has no samples"),
+        (
+            {"ticks": [0, 2, 4], "every": 2, "taken": 5},
+            ("error", "set_points"),
+            "the set points of tick 4 are said to have been taken in tick 5",
+        ),
     ],
 )
 def test_what_is_wrong_is_found(tmp_path: Path, made: dict[str, object], expected: tuple[str, str], words: str) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 from firmware_protocol.memory_map import default_memory_map
 from mock_controller.board.board import Board
@@ -14,18 +12,16 @@ from mock_controller.board.parameters import default_board
 from mock_controller.plant import Plant
 from mock_controller.plant.parameters import default_plant
 from tests.firmware.bbc_micro.machine import BbcMicro
+from tests.firmware.compiled import made
 
-SOURCES = Path(__file__).parents[3] / "firmware_protocol" / "bridge" / "bbc_micro"
 ACCESS_US = 1
 """Time of one access of the BBC Micro to the shared memory: one cycle of the 1 MHz bus."""
 
 
 @cache
 def images() -> Path:
-    """The folder with BRIDGE and BRIDG96, built once."""
-    folder = Path(mkdtemp(prefix="bbc-micro-"))
-    subprocess.run([SOURCES / "build.sh", folder], check=True, capture_output=True)
-    return folder
+    """The folder with BRIDGE and BRIDG96, up to date."""
+    return made("bbc_micro/bridge.ssd").parent
 
 
 def board(seed: int = 1) -> Board:

@@ -44,3 +44,13 @@ def test_a_hand_does_not_pass_an_end_stop() -> None:
     board.press_emergency_stop(True)
     with pytest.raises(BoardError, match="end stop"):
         board.lead({1: math.radians(400)}, 1.0)
+
+
+def test_the_end_stops_are_where_the_plant_has_them() -> None:
+    board = make_device().board
+    board.press_emergency_stop(True)
+    ends = [board.end_stop(1, high=high) for high in (False, True)]
+    assert ends == pytest.approx([math.radians(45), math.radians(315)])
+    board.lead({1: ends[1]}, 1.0)
+    board.run_until(1_500_000)
+    assert board.plant.joint_angles[0] == pytest.approx(ends[1])

@@ -5,6 +5,9 @@ from __future__ import annotations
 import ast
 import fcntl
 import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +16,7 @@ import model
 from model.dynamics import compilation, recursive
 from model.dynamics.compilation import (
     CACHE_DAYS,
+    SharedCacheLocator,
     _remove_old,
     cache_folder,
     dependencies,
@@ -115,6 +119,34 @@ def test_numba_caches_into_the_folder_of_these_sources() -> None:
     assert cache_folder(kernel.__name__).name == source_hash(kernel.__name__)
     assert cache_folder(kernel.__name__) != cache_folder(recursive.__name__)
     assert cache_folder(kernel.__name__).parent == compilation._PARENT
+
+
+USES_ONE = """
+import numpy
+from model.drives.sensor import sensed_angle as function
+function(1.0, numpy.ones(200))
+print(sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values()))
+"""
+
+
+@pytest.mark.slow
+def test_another_clone_of_the_same_sources_compiles_nothing_again(tmp_path: Path) -> None:
+    told = []
+    for name in ("first", "second"):
+        clone = tmp_path / name
+        for package in ("model", "daq", "firmware_protocol"):
+            shutil.copytree(compilation._ROOT / package, clone / package, ignore=shutil.ignore_patterns("__pycache__"))
+        environment = os.environ | {"PYTHONPATH": str(clone), "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}
+        run = subprocess.run(
+            [sys.executable, "-c", USES_ONE], cwd=clone, env=environment, capture_output=True, text=True, check=True
+        )
+        told.append(run.stdout.split())
+    assert told == [["0", "1"], ["1", "0"]]
+
+
+def test_machine_code_does_not_lie_by_where_the_sources_do() -> None:
+    assert Path(kernel.run_closed_form.stats.cache_path).name == "model.simulation"
+    assert SharedCacheLocator.get_suitable_cache_subpath("/a/user/s/own/effect.py").startswith("own_")
 
 
 def test_one_process_compiles_while_others_wait() -> None:

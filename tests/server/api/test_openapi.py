@@ -157,7 +157,7 @@ def test_requests_that_fit_the_description_meet_no_fault_and_answers_are_as_desc
     """Without a robot, whose answers come from another process; the long one has it."""
     with service_inside(tmp_path, SystemClock(), monkeypatch) as api:
         url = str(api.base_url.join("/")).rstrip("/")
-        few = ("--phases", "examples,stateful", "--max-examples", "1", "--max-time", "6")
+        few = ("--phases", "examples,stateful", "--max-examples", "1", "--max-time", "3")
         ended = _tried(url, tmp_path, *few, "--exclude-operation-id", "connect_robot")
     assert ended.returncode == 0, ended.stdout[-4000:]
 

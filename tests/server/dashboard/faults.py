@@ -9,17 +9,18 @@ from playwright.sync_api import Page
 from tests.repository.tracked import ROOT
 
 AXE = ROOT / "server" / "dashboard" / "node_modules" / "axe-core" / "axe.min.js"
-RULES = {
+RULES: dict[str, Any] = {
     "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
     "resultTypes": ["violations"],
 }
-
+COLOURS = RULES | {"runOnly": {"type": "rule", "values": ["color-contrast", "link-in-text-block"]}}
+"""For a page that RULES have been asked about in another scheme of colours."""
 
 TALL = 2400
 """px: nothing has to be scrolled, so that no header that stays in view covers half of a button."""
 
 
-def faults_of(page: Page) -> list[str]:
+def faults_of(page: Page, rules: dict[str, Any] = RULES) -> list[str]:
     """One line a fault. The page's policy lets no script in from elsewhere: axe comes through the debugger."""
     assert AXE.is_file(), "make page installs it"
     size = page.viewport_size
@@ -27,7 +28,7 @@ def faults_of(page: Page) -> list[str]:
     page.set_viewport_size({"width": size["width"], "height": TALL})
     if page.evaluate("typeof axe") == "undefined":
         page.evaluate(AXE.read_text("utf-8"))
-    found: dict[str, Any] = page.evaluate("rules => axe.run(document, rules)", RULES)
+    found: dict[str, Any] = page.evaluate("rules => axe.run(document, rules)", rules)
     page.set_viewport_size(size)
     return [_told(one) for one in found["violations"]]
 

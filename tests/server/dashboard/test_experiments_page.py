@@ -103,7 +103,7 @@ def test_a_preset_fills_the_form_and_can_be_changed_as_text(dashboard: Dashboard
 
 def test_joints_can_have_amplitudes_starts_and_gains_of_their_own(dashboard: Dashboard, form: Page) -> None:
     form.get_by_role("checkbox", name="Joint 3 moves").uncheck()
-    form.get_by_role("checkbox", name="An amplitude of its own").check()
+    form.get_by_role("checkbox", name="A different amplitude for each joint").check()
     form.get_by_role("textbox", name="Amplitude of joint 1").fill("4")
     form.get_by_role("textbox", name="Amplitude of joint 2").fill("-3")
     form.get_by_role("textbox", name="Start of joint 3").fill("30")
@@ -228,7 +228,7 @@ def test_whoever_uses_the_page_attends_what_runs_on_a_real_arm(paused: Dashboard
 
     page.on("request", note)
     paused.open("experiments")
-    expect(page.get_by_text("Paused", exact=True)).to_be_visible()
+    expect(page.get_by_text("Paused:", exact=True)).to_be_visible()
     expect(page.get_by_role("button", name="I am present")).to_be_visible()
     assert [url for url in requested if "attend" in url] == []
     with page.expect_request("**/queue/attend"):
@@ -307,7 +307,7 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
 def test_a_schedule_may_begin_later(dashboard: Dashboard, form: Page) -> None:
     form.get_by_label("Repeatedly").check()
     form.get_by_label("First run").fill("2199-01-02T03:04")
-    form.get_by_role("button", name="Schedule it").click()
+    form.get_by_role("button", name="Add the schedule").click()
     expect(form.get_by_text(re.compile("scheduled every .*, first 02 Jan 2199"))).to_be_visible()
     made = dashboard.service.robot.get("/schedules", params={"limit": 1}).json()["items"][0]
     assert made["next"].startswith(("2199-01-01", "2199-01-02"))

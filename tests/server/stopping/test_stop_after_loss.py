@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import httpx
-import pytest
 
 from tests.mock.process.running import RunningMock
 from tests.server.service import Service, running_service
@@ -16,29 +15,32 @@ def _until_link(service: Service, state: str) -> None:
         assert service.process.poll() is None
 
 
-@pytest.mark.parametrize("door", ["service", "listener"])
 def test_a_stop_while_the_link_is_lost_is_not_said_to_be_confirmed_and_is_there_when_the_link_is(
-    tmp_path: Path, door: str
+    tmp_path: Path,
 ) -> None:
+    """At either door: that of the service, and that of its listener."""
     with (
         RunningMock("--tcp", "127.0.0.1:0", "--lock-step") as mock,
         running_service(tmp_path, f"{mock.url}?lock_step=1") as service,
     ):
         service.until_connected()
         port = service.client.get("/system").json()["stop_port"]
-        host = service.url if door == "service" else f"http://127.0.0.1:{port}"
-        mock.control("disconnect")
-        _until_link(service, "lost")
-        queue = service.robot.get("/queue").json()
-        assert queue["paused"]
-        assert queue["reason"].startswith("the link to the robot was lost")
-        told = httpx.post(f"{host}/api/v1/robots/ma2000/stop", timeout=60).json()
-        assert not told["confirmed"]
-        assert "emergency stop" in told["text"]
-        assert not mock.control("state")["frozen"]
-        mock.control("reconnect")
-        service.until_arm("stopped")
-        assert mock.control("state")["frozen"] is True
-        refused = service.robot.post("/queue/resume", json={})
-        assert refused.json()["type"] == "docs/service.md#arm-stopped"
+        for door in (service.url, f"http://127.0.0.1:{port}"):
+            mock.control("disconnect")
+            _until_link(service, "lost")
+            queue = service.robot.get("/queue").json()
+            assert queue["paused"]
+            assert queue["reason"].startswith("the link to the robot was lost")
+            told = httpx.post(f"{door}/api/v1/robots/ma2000/stop", timeout=60).json()
+            assert not told["confirmed"]
+            assert "emergency stop" in told["text"]
+            assert not mock.control("state")["frozen"]
+            mock.control("reconnect")
+            service.until_arm("stopped")
+            assert mock.control("state")["frozen"] is True
+            refused = service.robot.post("/queue/resume", json={})
+            assert refused.json()["type"] == "docs/service.md#arm-stopped"
+            assert service.robot.post("/reset", json={}).status_code == 200
+            assert service.robot.post("/queue/resume", json={}).status_code == 200
+            assert mock.control("state")["frozen"] is False
         service.robot.post("/disconnect")

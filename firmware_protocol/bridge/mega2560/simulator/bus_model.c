@@ -29,7 +29,7 @@ static struct bus_report report;
 
 static uint64_t timer_since; /* when timer 0 was started */
 static uint8_t address;
-static uint8_t port_g = NPGFC | READ_NOT_WRITE;
+static uint8_t port_g;
 static uint8_t data_out;
 static uint8_t data_driven;
 static uint64_t address_since; /* since when address and R/W are as they are */
@@ -227,7 +227,9 @@ void bus_model_start(avr_t *processor, uint8_t (*read_byte)(uint16_t, uint64_t),
     memset(&report, 0, sizeof report);
     report.least_select_setup_ns = report.least_address_setup_ns = INT32_MAX;
     report.least_hold_ns = report.least_data_hold_ns = INT32_MAX;
-    timer_since = 0;
+    timer_since = address_since = data_since = selected_since = cycle_rises = cycle_falls = 0;
+    address = data_out = data_driven = 0;
+    port_g = NPGFC | READ_NOT_WRITE;
     avr->io[AVR_DATA_TO_IO(TCCR0B)].w.c = timer_starts;
     avr->io[AVR_DATA_TO_IO(TCNT0)].r.c = timer_is_read;
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('A'), IOPORT_IRQ_REG_PORT), port_a_written, NULL);

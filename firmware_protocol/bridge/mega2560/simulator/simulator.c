@@ -7,6 +7,7 @@
 #include <simavr/sim_elf.h>
 #include <simavr/sim_io.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "bus_model.h"
@@ -98,6 +99,15 @@ static void connect_uart(void)
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XOFF), uart_is_full, NULL);
 }
 
+static void discard_board(void)
+{
+    if (avr != NULL) {
+        avr_terminate(avr);
+        free(avr);
+        avr = NULL;
+    }
+}
+
 int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t, uint64_t),
                     void (*write_byte)(uint16_t, uint8_t, uint64_t))
 {
@@ -106,6 +116,7 @@ int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t, uint64_t),
     if (elf_read_firmware(image, &firmware) != 0) {
         return -1;
     }
+    discard_board();
     avr = avr_make_mcu_by_name("atmega2560");
     if (avr == NULL || avr_init(avr) != 0) {
         return -1;

@@ -29,8 +29,9 @@ struct bus_report {
     int32_t least_data_hold_ns;
 };
 
-/* Loads an image; `memory` is asked at the moment (in clocks of 62.5 ns since the start) at which the cycle ends.
- * Returns 0, or -1 when the image cannot be read. */
+/* Loads an image into a new board, with an empty EEPROM, in place of the one before. `read_byte` and `write_byte` get
+ * the moment (in clocks of 62.5 ns since the start) at which the cycle ends. Returns 0, or -1 when the image cannot be
+ * read. */
 int simulator_start(const char *image, uint8_t (*read_byte)(uint16_t address, uint64_t clock),
                     void (*write_byte)(uint16_t address, uint8_t value, uint64_t clock));
 

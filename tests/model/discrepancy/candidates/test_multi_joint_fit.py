@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import pytest
+
 from daq.contracts.progress import Never
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, judge, nearest, refit
 from model.discrepancy.candidates.library import hypotheses
@@ -52,6 +54,7 @@ def test_an_effect_on_one_joint_is_found_on_no_other() -> None:
     assert several == ()
 
 
+@pytest.mark.slow
 def test_an_effect_on_two_joints_is_not_found_on_the_third() -> None:
     _, several = fits((1, 3))
     assert max(several, key=lambda r: r.evidence).hypothesis.joints == (1, 3)

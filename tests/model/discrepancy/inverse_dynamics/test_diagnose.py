@@ -71,8 +71,8 @@ def test_nothing_is_named_on_a_sound_rig(rig: str) -> None:
     ("hidden", "effect", "parameter", "value"),
     [
         ({"coulomb": 8.0}, "coulomb_friction", "torque", 8.0),
-        ({"loss": 0.15}, "gear_loss", "loss", 0.15),
-        ({"hum": 3.0}, "periodic_disturbance", "frequency", 1.7),
+        pytest.param({"loss": 0.15}, "gear_loss", "loss", 0.15, marks=pytest.mark.slow),
+        pytest.param({"hum": 3.0}, "periodic_disturbance", "frequency", 1.7, marks=pytest.mark.slow),
         pytest.param({"viscous": 20.0}, "viscous_friction", "coefficient", 20.0, marks=pytest.mark.slow),
         pytest.param({"spring": 100.0}, "spring_torque", "stiffness", 100.0, marks=pytest.mark.slow),
         pytest.param({"ripple": 3.0, "cycles": 80.0}, "torque_ripple", "cycles", 80.0, marks=pytest.mark.slow),
@@ -98,7 +98,7 @@ def test_friction_that_falls_with_speed_is_added_to_coulomb_friction() -> None:
 @pytest.mark.parametrize(
     ("hidden", "effect", "parameter", "value"),
     [
-        ({"coulomb": 0.01}, "coulomb_friction", "torque", 0.01),
+        pytest.param({"coulomb": 0.01}, "coulomb_friction", "torque", 0.01, marks=pytest.mark.slow),
         ({"delay": 0.02}, "input_delay", "time", 0.02),
         pytest.param({"dead_zone": 0.6}, "dead_zone", "width", 0.6, marks=pytest.mark.slow),
     ],

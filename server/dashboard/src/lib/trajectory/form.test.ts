@@ -94,6 +94,21 @@ describe('a form filled with a specification', () => {
     expect([spec!.start, spec!.gains]).toEqual([{ 2: Math.PI / 4 }, { 1: [2, 0, 1] }]);
   });
 
+  it('gives back to the bit what it shows rounded, until something else is typed', () => {
+    const given: Spec = {
+      ...RAMP,
+      trajectory: { kind: 'ramp', amplitude: { 1: 0.05, 3: 0.1 }, duration: 0.1234567 },
+      joints: [1, 3],
+      start: { 2: 0.7 },
+      settle: 1 / 3,
+    };
+    const form = formOf(given, RULES);
+    expect(form.amplitudes).toEqual({ 1: '2.86479', 3: '5.72958' });
+    expect(specOf(form, RULES).spec).toEqual(given);
+    const typed = specOf({ ...form, start: { 2: '40' } }, RULES).spec!;
+    expect(typed.start![2]).toBeCloseTo((40 * Math.PI) / 180, 12);
+  });
+
   it('fills in what is usual where nothing is said', () => {
     const { settle, ...without } = RAMP;
     expect([settle, formOf(without, RULES).settle]).toEqual([0.5, '0.5']);

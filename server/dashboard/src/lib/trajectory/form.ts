@@ -36,6 +36,8 @@ export interface SpecForm {
   repeats: string;
   name: string;
   notes: string;
+  /** By field, as in the problems: the number that its text was rounded from. It counts until something else is typed. */
+  rounded: Record<string, { readonly text: string; readonly value: number }>;
   /** A trajectory that has no form, kept as it is. */
   kept: Spec['trajectory'] | null;
   /** Fields of the specification that the form does not show. */
@@ -90,13 +92,19 @@ export function rulesOf(schema: Schema): SpecRules {
 export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
   const spec = { ...rules.standard, ...given } as Spec;
   const kind = rules.kinds.find((one) => one.kind === spec.trajectory.kind);
-  const values = valuesOf(kind, spec.trajectory);
+  const rounded: SpecForm['rounded'] = {};
+  const show = (field: string, value: number, scale: number): string => {
+    const text = shownNumber(value * scale);
+    rounded[field] = { text, value };
+    return text;
+  };
+  const values = valuesOf(kind, spec.trajectory, show);
   const amplitude = spec.trajectory.amplitude;
   const perJoint = typeof amplitude === 'object' && amplitude !== null;
   const amplitudes: Record<number, string> = {};
   if (perJoint)
     for (const [joint, value] of Object.entries(amplitude as Record<string, number>))
-      amplitudes[Number(joint)] = shownNumber(value * DEGREES);
+      amplitudes[Number(joint)] = show(`trajectory.amplitude.${joint}`, value, DEGREES);
   return {
     kind: spec.trajectory.kind,
     values,
@@ -104,7 +112,10 @@ export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
     amplitudes,
     joints: [...spec.joints],
     start: Object.fromEntries(
-      Object.entries(spec.start ?? {}).map(([joint, angle]) => [joint, shownNumber(angle * DEGREES)]),
+      Object.entries(spec.start ?? {}).map(([joint, angle]) => [
+        joint,
+        show(`start.${joint}`, angle, DEGREES),
+      ]),
     ),
     gains: Object.fromEntries(
       Object.entries(spec.gains ?? {}).map(([joint, gain]) => [
@@ -112,11 +123,12 @@ export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
         gain.map(String) as [string, string, string],
       ]),
     ),
-    settle: shownNumber(spec.settle),
-    hold: shownNumber(spec.hold),
+    settle: show('settle', spec.settle, 1),
+    hold: show('hold', spec.hold, 1),
     repeats: String(spec.repeats),
     name: spec.name ?? '',
     notes: spec.notes ?? '',
+    rounded,
     kept: kind && kind.fields.length > 0 ? null : spec.trajectory,
     record: spec.record ?? null,
   };
@@ -132,9 +144,10 @@ export function withKind(form: SpecForm, kind: TrajectoryKind, given: readonly s
     ...form,
     kind: kind.kind,
     name: isGiven ? kind.kind : form.name,
-    values: valuesOf(kind, {}),
+    values: valuesOf(kind, {}, (_field, value, scale) => shownNumber(value * scale)),
     perJoint: false,
     amplitudes: {},
+    rounded: {},
     kept: null,
   };
 }
@@ -145,7 +158,8 @@ export function specOf(form: SpecForm, rules: SpecRules): FormResult {
   const number = (field: string, text: string, rule: NumberRule): number => {
     const { value, problem } = typedNumber(text, rule);
     if (problem) problems[field] = problem;
-    return value ?? 0;
+    const before = form.rounded[field];
+    return value !== null && before?.text === text ? before.value : (value ?? 0);
   };
   const kind = rules.kinds.find((one) => one.kind === form.kind);
   const trajectory = form.kept ?? trajectoryOf(form, kind?.fields ?? [], number);
@@ -214,13 +228,17 @@ function gainsOf(form: SpecForm, number: ReadNumber): Record<string, number[]> {
 function valuesOf(
   kind: TrajectoryKind | undefined,
   trajectory: Readonly<Record<string, unknown>>,
+  show: (field: string, value: number, scale: number) => string,
 ): Record<string, string> {
   return Object.fromEntries(
     (kind?.fields ?? []).map((field) => {
       const given = trajectory[field.name] ?? field.standard;
       const value = field.type === 'amplitude' && typeof given !== 'number' ? field.standard : given;
       if (field.type === 'boolean') return [field.name, String(value)];
-      return [field.name, typeof value === 'number' ? shownNumber(value * field.scale) : ''];
+      return [
+        field.name,
+        typeof value === 'number' ? show(`trajectory.${field.name}`, value, field.scale) : '',
+      ];
     }),
   );
 }

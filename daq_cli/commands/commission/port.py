@@ -1,0 +1,36 @@
+"""The port, found by unplugging the cable and plugging it in again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from daq.commissioning.memory.procedure import Operator, Task
+from daq.contracts.errors import ReachError
+from daq.transport.discovery import FoundPort, appeared, ports
+
+POLL_S, PATIENCE_S = 0.25, 15.0
+"""Time (s) between two looks at the list of ports, and for which a port may take to appear."""
+
+
+def port_by_plugging(
+    operator: Operator,
+    listed: Callable[[], Sequence[FoundPort]] = ports,
+    wait: Callable[[float], None] = time.sleep,
+) -> FoundPort:
+    """The port that appears when the cable is plugged in. Opens none. Raises ReachError, TransportError."""
+    if not operator.begin(Task("unplug")):
+        raise ReachError("the cable was not unplugged, so the port is not known: give --port (`daq ports` lists them)")
+    without = listed()
+    if not operator.begin(Task("plug_in")):
+        raise ReachError("the cable was not plugged in, so the port is not known: give --port (`daq ports` lists them)")
+    for _ in range(round(PATIENCE_S / POLL_S)):
+        if (found := appeared(without, listed())) is not None:
+            shown = ", ".join(text for text in (found.description, found.maker, found.serial_number) if text)
+            operator.show(f"{found.url}  {shown}")
+            return found
+        wait(POLL_S)
+    raise ReachError(
+        f"no port appeared within {PATIENCE_S:.0f} s of plugging in ({len(without)} were there before): "
+        "is the cable one for data, and the bridge alive?"
+    )

@@ -1,0 +1,108 @@
+"""Sensors that count down, and gears that turn the motion round: other signs of the same arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.calibration.gain import GainEstimate, gains_from_trace
+from daq.contracts.machine import load_machine
+from daq.contracts.trace import Trace
+from mock_controller.board.parameters import default_board
+from mock_controller.hidden.sensors import draw_sensors
+from model.discrepancy.output_error.controller_evidence import check_controller
+from model.fitting.fit import fit
+from model.fitting.options import FitOptions
+from model.machine_model.model import Model, base_model
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
+from tests.daq.runner.rig import LONG_RAMP, rig
+from tests.model.fitting import imagined
+from tests.model.simulation.records import ramp_trace
+from tests.turned_arms import AXES, mirrored, turned, with_sensors
+
+UNROUNDED = Options(quantise=False)
+SIGNS = list(product((False, True), repeat=3))
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return base_model(load_machine("ma2000"))
+
+
+@pytest.fixture(scope="module")
+def trace(model: Model) -> Trace:
+    return ramp_trace(model.machine, back=True)
+
+
+@pytest.mark.parametrize("sensors", SIGNS)
+def test_the_same_arm_moves_alike_whichever_way_its_sensors_and_motors_are_connected(
+    model: Model, trace: Trace, sensors: tuple[bool, ...]
+) -> None:
+    plain = simulate(model, trace, UNROUNDED)
+    for gears in (sensors, (False, False, True)):
+        other = simulate(base_model(turned(model.machine, sensors, gears)), trace, UNROUNDED)
+        assert other.reading == pytest.approx(plain.reading, abs=1e-9)
+        assert other.error == pytest.approx(plain.error, abs=1e-9)
+        assert other.drive == pytest.approx(plain.drive * np.where(gears, -1, 1), abs=1e-6)
+        assert other.power == pytest.approx(plain.power * np.where(sensors, -1, 1), abs=1e-6)
+
+
+def test_the_arm_in_a_mirror_moves_as_the_mirrored_arm_does(model: Model, trace: Trace) -> None:
+    assert trace.set_point is not None
+    plain = simulate(model, trace, UNROUNDED)
+    in_mirror = replace(trace, position=np.array(AXES) - trace.position, set_point=np.array(AXES) - trace.set_point)
+    other = simulate(base_model(mirrored(model.machine)), in_mirror, UNROUNDED)
+    assert other.reading == pytest.approx(np.array(AXES) - plain.reading, abs=1e-9)
+    assert other.drive == pytest.approx(-plain.drive, abs=1e-6)
+    assert other.power == pytest.approx(plain.power, abs=1e-6)
+
+
+def test_what_a_potentiometer_is_off_by_belongs_to_its_place_not_to_its_direction(model: Model, trace: Trace) -> None:
+    parts = {"potentiometer_gain": {"relative": 0.03}, "potentiometer_nonlinearity": {"bend_1": 0.02, "bend_3": -0.01}}
+    runs = []
+    for machine in (model.machine, turned(model.machine, (False, True, True))):
+        bent = base_model(machine)
+        for effect, values in parts.items():
+            bent = bent.with_effect(effect, (2,), values)
+        runs.append(simulate(bent, trace, UNROUNDED).reading)
+    assert np.abs(runs[0] - simulate(model, trace, UNROUNDED).reading).max() > 1e-3
+    assert runs[1] == pytest.approx(runs[0], abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [((True, False, True), ()), ((), (False, True, True)), ((True,) * 3, (True,) * 3)])
+def test_records_of_an_arm_with_other_signs_fit_the_same_numbers(turns: tuple[tuple[bool, ...], ...]) -> None:
+    truth = {"joint2.motor.back_emf_constant": 0.0460, "load.mass": 1.36}
+    quick = FitOptions(parameters=tuple(truth), sensor_bend=False, replicas=2, rounds=2)
+    plain, other = (
+        fit(arm, [imagined.trace(arm.with_values(truth))], quick)
+        for arm in (imagined.arm(), base_model(turned(imagined.machine(), *turns)))
+    )
+    for name, value in truth.items():
+        one, same = plain.parameter(name), other.parameter(name)
+        assert one.deviation is not None
+        assert same.deviation == pytest.approx(one.deviation, rel=0.5)  # of few replicas
+        assert same.model_value == pytest.approx(one.model_value, abs=4 * one.deviation)  # noise is turned as well
+        assert same.model_value == pytest.approx(value, abs=4 * one.deviation)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_what_the_controller_does_with_sensors_that_count_down_is_its_law(tmp_path: Path, seed: int) -> None:
+    sensors = draw_sensors(seed, default_board().calibrations)
+    assert {one.direction for one in sensors[:3]} == {-1, 1}
+    machine = with_sensors(load_machine("ma2000"), sensors)
+    with rig(tmp_path, f"seed=5&secret_sensors={seed}") as arm:
+        trace = arm.trace(arm.run(LONG_RAMP, machine=machine))
+    assert trace.drive is not None
+    turned_by = trace.position[-1, 0] - trace.position[0, 0]
+    assert abs(turned_by) > 0.3
+    assert np.sign(trace.drive[:, 0].mean()) == np.sign(turned_by), "nothing but its motor turns the waist"
+    assert check_controller([trace], machine) == ()
+    gains = [one for one in gains_from_trace(trace, machine) if isinstance(one, GainEstimate)]
+    assert gains
+    assert all(one.gain > 0 and one.volts_per_rad > 0 for one in gains)
