@@ -63,7 +63,8 @@ def test_a_fit_finds_the_bench_s_own_numbers(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_diagnosis_names_a_load_that_nobody_told_it_of(tmp_path: Path) -> None:
-    options = Options(torque=True, load=0.15)
-    traces = [recorded(options, motion(seed), tmp_path) for seed in (1, 2)]
-    answer = diagnose(base_model(pan_tilt()), traces[:1], traces[1:], DiagnosisOptions(most_steps=1))
+    bench = Options(torque=True, load=0.15)
+    first, second = (recorded(bench, motion(seed), tmp_path) for seed in (1, 2))
+    rivals = ("payload", "backlash", "stiction", "dead_zone", "resistance_drift")
+    answer = diagnose(base_model(pan_tilt()), [first], [second], DiagnosisOptions(effects=rivals, most_steps=1))
     assert [step.effect for step in answer.steps if step.kind == "effect"] == ["payload"]
