@@ -12,10 +12,6 @@ from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.trace import Trace
 from mock_controller.servos.bench import Options
 from model.arrays import Floats
-from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.workflow import diagnose
-from model.fitting.fit import fit
-from model.fitting.options import FitOptions
 from model.machine_model.model import Model, base_model
 from model.simulation.inputs import inputs_of
 from model.simulation.simulate import simulate
@@ -48,23 +44,3 @@ def test_a_record_is_an_input_for_each_tick_of_the_servos_loop(tmp_path: Path) -
 @pytest.mark.slow
 def test_the_model_with_the_numbers_of_the_data_sheet_comes_within_a_degree(tmp_path: Path) -> None:
     assert left(base_model(pan_tilt()), recorded(Options(torque=True), motion(1), tmp_path)).max() < 10
-
-
-@pytest.mark.slow
-def test_a_fit_finds_the_bench_s_own_numbers(tmp_path: Path) -> None:
-    first, second = (recorded(Options(torque=True, coulomb=0.14), motion(seed), tmp_path) for seed in (1, 2))
-    before = base_model(pan_tilt())
-    found = fit(before, [first], FitOptions(parameters=("*friction*",)))
-    values = dict(zip(found.names, found.values, strict=True))
-    for joint in (1, 2):
-        assert values[f"joint{joint}.coulomb_friction.torque"] == pytest.approx(0.14, abs=0.02)
-    assert (left(found.model, second) < 0.6 * left(before, second)).all()
-
-
-@pytest.mark.slow
-def test_a_diagnosis_names_a_load_that_nobody_told_it_of(tmp_path: Path) -> None:
-    bench = Options(torque=True, load=0.15)
-    first, second = (recorded(bench, motion(seed), tmp_path) for seed in (1, 2))
-    rivals = ("payload", "backlash", "stiction", "dead_zone", "resistance_drift")
-    answer = diagnose(base_model(pan_tilt()), [first], [second], DiagnosisOptions(effects=rivals, most_steps=1))
-    assert [step.effect for step in answer.steps if step.kind == "effect"] == ["payload"]
