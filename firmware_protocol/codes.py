@@ -18,6 +18,8 @@ class Capability(IntFlag):
     """There is no arm behind the bridge."""
     COMPACT = 8
     """With SAMPLE: understands `MoveAndSample`, the turn for slow lines."""
+    POLLED = 16
+    """With SAMPLE, of other dialects: a sample is what is measured when it is asked for; nothing keeps earlier ones."""
 
 
 class StatusFlag(IntFlag):
@@ -29,6 +31,10 @@ class StatusFlag(IntFlag):
     """The board has been reset since the last `Hello` that began a session; commands are refused until the next."""
     SET_POINT_MISSED = 4
     """In this period the host held the memory when the controller needed it, so the controller took no set points."""
+    NO_TORQUE = 8
+    """Of other dialects: a drive is switched off, and nothing holds its joint."""
+    HARDWARE_ERROR = 16
+    """Of other dialects: a drive reports that it is damaged, too hot, overloaded or badly supplied."""
 
 
 class Refusal(IntEnum):
@@ -49,3 +55,5 @@ class Refusal(IntEnum):
     replaced."""
     OTHER_STOP = 10
     """A `Release` that names a stop which is not the newest: only the newest can be ended."""
+    UNFIT = 11
+    """Of other dialects: what is behind the line is not in a state in which it can be driven."""

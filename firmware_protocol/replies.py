@@ -322,5 +322,15 @@ class Refused(Reply):
     reason: int
 
 
+@dataclass(frozen=True)
+class ExplainedRefusal(Refused):
+    """A refusal of another dialect, which says why in its own words. It has no frame."""
+
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        """Nothing to check: it is never packed."""
+
+
 REPLIES: dict[int, type[Reply]] = {kind.OPCODE: kind for kind in Reply.__subclasses__()}
 """Every reply by its opcode."""

@@ -112,11 +112,15 @@ class WriteSetPoints(Request):
     """(joint, posture units 0–999), joints ascending."""
 
     def __post_init__(self) -> None:
+        self._check(POSTURE_UNITS)
+
+    def _check(self, units: int) -> None:
         check_ascending("WriteSetPoints", tuple(joint for joint, _ in self.postures))
         for joint, posture in self.postures:
-            if not 0 <= posture < POSTURE_UNITS:
-                limit = POSTURE_UNITS - 1
-                raise ProtocolError(f"joint {joint}: set point of {posture} posture units: allowed are 0 to {limit}")
+            if not 0 <= posture < units:
+                raise ProtocolError(
+                    f"joint {joint}: set point of {posture} posture units: allowed are 0 to {units - 1}"
+                )
 
     def pack(self) -> bytes:
         """Mask, then one 16-bit value per joint."""
@@ -129,6 +133,16 @@ class WriteSetPoints(Request):
         joints, rest = split_mask(cls.__name__, payload)
         postures = unpack(f"<{len(joints)}H", rest, cls.__name__)
         return cls(tuple(zip(joints, postures, strict=True)))
+
+
+@dataclass(frozen=True)
+class FineSetPoints(WriteSetPoints):
+    """Set points of another dialect, with another number of units over a joint's range. It has no frame of its own."""
+
+    units: int = POSTURE_UNITS
+
+    def __post_init__(self) -> None:
+        self._check(self.units)
 
 
 @dataclass(frozen=True)

@@ -48,13 +48,16 @@ def counts_to_posture(counts: int) -> int:
 class JointCalibration:
     """Conversion of one joint's counts and posture units to an angle.
 
-    angle = angle_at_zero + direction · range · counts / 4096  (rad)
+    angle = angle_at_zero + direction · range · counts / 4096  (rad); other machines have other numbers of counts and of
+    posture units over the range.
     """
 
     joint: int
     range_rad: float
     angle_at_zero_rad: float
     direction: int = 1
+    counts: int = ADC_COUNTS
+    posture_units: int = POSTURE_UNITS
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.range_rad) and self.range_rad > 0):
@@ -67,12 +70,12 @@ class JointCalibration:
     @cached_property
     def rad_per_count(self) -> float:
         """Radians per ADC count, with the sign of the joint's direction."""
-        return self.direction * self.range_rad / ADC_COUNTS
+        return self.direction * self.range_rad / self.counts
 
     @cached_property
     def rad_per_posture_unit(self) -> float:
         """Radians per posture unit, with the sign of the joint's direction."""
-        return self.direction * self.range_rad / POSTURE_UNITS
+        return self.direction * self.range_rad / self.posture_units
 
     def counts_to_rad(self, counts: float) -> float:
         """Angle (rad) of an ADC reading."""
@@ -94,8 +97,8 @@ class JointCalibration:
         if not math.isfinite(angle_rad):
             raise UnitsError(f"joint {self.joint}: set point of {angle_rad} rad: must be finite")
         above_half = (angle_rad - self.angle_at_zero_rad) / self.rad_per_posture_unit + 0.5
-        if not 0 <= above_half < POSTURE_UNITS:
-            low, high = sorted((self.posture_to_rad(0), self.posture_to_rad(POSTURE_UNITS - 1)))
+        if not 0 <= above_half < self.posture_units:
+            low, high = sorted((self.posture_to_rad(0), self.posture_to_rad(self.posture_units - 1)))
             raise UnitsError(
                 f"joint {self.joint}: set point of {math.degrees(angle_rad):.6g}° is outside its range of "
                 f"{math.degrees(low):.2f}° to {math.degrees(high):.2f}°"
@@ -108,11 +111,12 @@ class DriveScale:
     """Volts for the controller's DAC counts.
 
     `full_scale_v` is the DAC's output at 127 counts (the source does not give it: an assumption of the
-    caller); `amplifier_gain` is 28 on joints 1–3 (section 6.2).
+    caller); `amplifier_gain` is 28 on joints 1–3 (section 6.2). Other machines have another count of full scale.
     """
 
     full_scale_v: float
     amplifier_gain: float
+    full_counts: int = DAC_MAX
 
     def __post_init__(self) -> None:
         for name, value in (("full scale", self.full_scale_v), ("amplifier gain", self.amplifier_gain)):
@@ -121,4 +125,4 @@ class DriveScale:
 
     def counts_to_volts(self, counts: float) -> float:
         """Volts at the motor for DAC counts, before any supply limit."""
-        return counts * self.full_scale_v * self.amplifier_gain / DAC_MAX
+        return counts * self.full_scale_v * self.amplifier_gain / self.full_counts

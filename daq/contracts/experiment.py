@@ -33,9 +33,12 @@ Duration = Annotated[FiniteFloat, Field(gt=0, le=3600)]
 Hold = Annotated[FiniteFloat, Field(ge=0, le=3600)]
 JointNumber = Annotated[int, Field(ge=1, le=JOINTS)]
 Angle = Annotated[FiniteFloat, Field(ge=-2 * math.pi, le=2 * math.pi)]
+Count = Annotated[int, Field(ge=0)]
 GainValue = Annotated[int, Field(ge=0, le=20)]
 Gain = tuple[GainValue, GainValue, GainValue]
 """P, I, D of one joint, each 0–20 (section 6.2)."""
+ReportedGain = tuple[Count, Count, Count]
+"""P, I, D of one joint as a controller reports them, in its own units and range."""
 Amplitude = Angle | dict[JointNumber, Angle]
 """One value for all joints of the experiment, or one per joint."""
 

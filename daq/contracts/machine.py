@@ -32,7 +32,7 @@ from daq.contracts.quantity import (
     in_unit,
 )
 from firmware_protocol.invalid import first_invalid
-from firmware_protocol.units import DriveScale, JointCalibration
+from firmware_protocol.units import POSTURE_UNITS, DriveScale, JointCalibration
 
 
 def _positive(quantity: Quantity) -> Quantity:
@@ -349,7 +349,18 @@ class Machine(FrozenRecord):
         sensor = self.joint(joint).sensor
         if sensor is None:
             raise SpecError(f"machine {self.name}: joint {joint} has no sensor, so no calibration")
-        return JointCalibration(joint, sensor.range.value, sensor.at_zero.value, sensor.direction)
+        step = of_joint(getattr(self.controller, "set_point_resolution", None), joint)
+        units = POSTURE_UNITS if step is None else round(sensor.range.value / step.value)
+        return JointCalibration(
+            joint, sensor.range.value, sensor.at_zero.value, sensor.direction, 2**sensor.bits, max(units, 1)
+        )
+
+    def drive_scale(self, joint: int) -> DriveScale:
+        """Counts of the controller's output ↔ motor volts, on joint `joint` (from 1): by the step of a sampled
+        controller's output where it is stated. Raises SpecError for a joint without a DC motor."""
+        motor = self.joint(joint).dc_motor
+        step = of_joint(getattr(self.controller, "drive_resolution", None), joint)
+        return motor.scale if step is None else DriveScale(step.value, 1.0, 1)
 
     def drive_sign(self, joint: int) -> int:
         """Sign of the drive for a positive output of the board's controller, on joint `joint` (from 1).

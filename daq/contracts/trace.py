@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from daq.contracts import tables
 from daq.contracts.errors import TraceError
-from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.experiment import ExperimentSpec, ReportedGain
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.sketch import html_of
@@ -93,7 +93,8 @@ class TraceRecord(FrozenRecord):
     machine: Machine | None = None
     memory_map: dict[str, object] | None = None
     spec: ExperimentSpec | None = None
-    gains: dict[int, Gain] | None = None
+    gains: dict[int, ReportedGain] | None = None
+    """P, I, D of each joint, as the controller reported them."""
     period: float | None = None
     """Control period (s); None where the record was not made tick by tick."""
     every: Annotated[int, Field(ge=1, exclude_if=lambda every: every == 1)] = 1

@@ -2,7 +2,13 @@
 
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.driver.controller import EVERY_JOINT, Controller, ControllerStatus, Identity
-from daq.driver.errors import ControllerRestartedError, GainsNotTakenError, NoSampleError, ProtocolVersionError
+from daq.driver.errors import (
+    ControllerRestartedError,
+    GainsNotTakenError,
+    HardwareFaultError,
+    NoSampleError,
+    ProtocolVersionError,
+)
 from daq.driver.line_rate import LineRate
 from daq.driver.snapshot import BoardSnapshot
 from daq.driver.stop import StopConfirmation
@@ -15,6 +21,7 @@ __all__ = [
     "ControllerRestartedError",
     "ControllerStatus",
     "GainsNotTakenError",
+    "HardwareFaultError",
     "Identity",
     "LineRate",
     "LockStepClock",

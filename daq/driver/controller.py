@@ -18,7 +18,8 @@ from typing import Self
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import GainsNotTakenError, ProtocolVersionError
-from daq.driver.line_rate import LineRate, line_rate
+from daq.driver.line_rate import LineRate, line_rate, polled_rate
+from daq.driver.polled_sampling import PolledSampling
 from daq.driver.sampling import Deliveries, MemorySampling, RingSampling, Sampling
 from daq.driver.set_point_watch import SetPointWatch
 from daq.driver.snapshot import BoardSnapshot
@@ -74,6 +75,11 @@ class Identity:
         """Whether no arm is behind it."""
         return Capability.SIMULATED in self.capabilities
 
+    @property
+    def keeps_samples(self) -> bool:
+        """Whether it samples every control period by itself, and keeps the samples until they are asked for."""
+        return Capability.SAMPLE in self.capabilities and Capability.POLLED not in self.capabilities
+
 
 @dataclass(frozen=True)
 class ControllerStatus:
@@ -95,12 +101,13 @@ class Controller:
     `stop` may be called from any thread at any moment; everything else from one thread at a time.
     """
 
-    def __init__(self, link: Link, memory_map: MemoryMap | None = None) -> None:
+    def __init__(self, link: Link, memory_map: MemoryMap | None = None, clock: Clock | None = None) -> None:
         self.link = link
+        self.joints = joints_of((1 << link.scale.joints) - 1)
         self.memory_map = memory_map or default_memory_map()
         self._watch = SetPointWatch()
         self.identity = self._ask_identity()
-        self.clock: Clock = LockStepClock(link, self.period_s) if link.lock_step else RealClock()
+        self.clock: Clock = clock or (LockStepClock(link, self.period_s) if link.lock_step else RealClock())
         self._sampling = self._make_sampling()
 
     @classmethod
@@ -124,7 +131,7 @@ class Controller:
         return self.link.counters
 
     def line_rate(
-        self, joints: Sequence[int] = EVERY_JOINT, moving: Sequence[int] = (), *, together: bool = True
+        self, joints: Sequence[int] | None = None, moving: Sequence[int] = (), *, together: bool = True
     ) -> LineRate:
         """Every how many periods the line has room for a sample of `joints`, with set points of the joints `moving`.
 
@@ -132,7 +139,10 @@ class Controller:
         set points are given to `next_snapshot`, else to `set_points`. Without SAMPLE it is every period, or none: the
         memory has to be read twice within one.
         """
+        joints = self.joints if joints is None else joints
         capabilities = self.identity.capabilities
+        if Capability.POLLED in capabilities:
+            return polled_rate(self.link.scale, self.link.bytes_per_second, self.period_s, len(joints), len(moving))
         compact = together and Capability.COMPACT in capabilities
         rate = line_rate(self.link.bytes_per_second, self.period_s, len(joints), len(moving), can_be_compact=compact)
         return rate if Capability.SAMPLE in capabilities else replace(rate, every=1, share=rate.share * rate.every)
@@ -160,7 +170,7 @@ class Controller:
     def next_snapshot(
         self,
         after: int | None = None,
-        joints: Sequence[int] = EVERY_JOINT,
+        joints: Sequence[int] | None = None,
         set_points: Mapping[int, int] | None = None,
     ) -> BoardSnapshot:
         """The oldest snapshot newer than tick `after`; None waits for the next to be made.
@@ -171,7 +181,7 @@ class Controller:
         ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were refused: the snapshot is
         still to be had.
         """
-        return self._sampling.next(after, joints, set_points or {})
+        return self._sampling.next(after, self.joints if joints is None else joints, set_points or {})
 
     def stop(self) -> StopConfirmation:
         """Freezes the arm at its measured posture. At once, from any thread, as often as one likes; never raises
@@ -182,7 +192,7 @@ class Controller:
             return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error))
         except RequestRefusedError as error:
             return StopConfirmation(sent=True, acknowledged=False, problem=str(error))
-        frozen = dict(zip(EVERY_JOINT, stopped.postures, strict=True))
+        frozen = dict(zip(self.joints, stopped.postures, strict=True))
         self._watch.replaced(frozen, stopped.tick + 1)
         return StopConfirmation(sent=True, acknowledged=True, tick=stopped.tick, frozen=frozen)
 
@@ -208,7 +218,7 @@ class Controller:
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
         """Joint → (P, I, D), each 0–20."""
-        return dict(zip(EVERY_JOINT, self.link.request(ReportGains(), Gains).gains, strict=True))
+        return dict(zip(self.joints, self.link.request(ReportGains(), Gains).gains, strict=True))
 
     def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
         """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20."""
@@ -285,6 +295,8 @@ class Controller:
 
     def _make_sampling(self) -> Sampling:
         self._deliveries = deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
+        if Capability.POLLED in self.identity.capabilities:
+            return PolledSampling(deliveries)
         if Capability.SAMPLE in self.identity.capabilities:
             return RingSampling(deliveries, self.line_rate)
         return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))

@@ -28,3 +28,9 @@ class GainsNotTakenError(DaqError):
     """Gains read back differ from those written."""
 
     exit_code = exit_codes.FAULT
+
+
+class HardwareFaultError(DaqError):
+    """A drive reports that something is wrong with it, or does not hold its joint any more."""
+
+    exit_code = exit_codes.FAULT

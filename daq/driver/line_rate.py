@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
+from firmware_protocol.scale import LineScale
 from firmware_protocol.stamp import STAMP_BYTES
 
 LARGEST_SHARE = 0.8
@@ -91,6 +92,14 @@ def line_rate(
     every = max(1, math.ceil(turn / (LARGEST_SHARE * period_s) - 1e-9))
     stop_s = stop_latency_s(bytes_per_second)
     return LineRate(joints, moving, every, turn / (every * period_s), period_s, stop_s, compact)
+
+
+def polled_rate(scale: LineScale, bytes_per_second: float, period_s: float, joints: int, moving: int) -> LineRate:
+    """The rate of a line in another dialect: one turn for all joints, asked for every `scale.every` periods, or as
+    seldom as the line needs. A stop is two turns."""
+    turn = (scale.turn_bytes or 0) / bytes_per_second
+    every = max(scale.every, math.ceil(turn / (LARGEST_SHARE * period_s) - 1e-9))
+    return LineRate(joints, moving, every, turn / (every * period_s), period_s, 2 * turn + STOP_ANSWER_S)
 
 
 def stop_latency_s(bytes_per_second: float) -> float:

@@ -16,6 +16,7 @@ from daq.link import Link, LinkTimeoutError, RequestRefusedError, expect
 from firmware_protocol.commands import (
     AFTER_NEWEST,
     CompactSnapshot,
+    FineSetPoints,
     JointReading,
     JointReadings,
     MoveAndSample,
@@ -31,6 +32,7 @@ from firmware_protocol.commands import (
     WriteSetPoints,
     mask_of,
 )
+from firmware_protocol.units import POSTURE_UNITS
 
 PHASE_STEP = 0.25
 """Periods by which the readings move away from the controller's own moment after they have met it."""
@@ -64,7 +66,9 @@ class Deliveries:
 
     def send(self, postures: Mapping[int, int]) -> tuple[SentSetPoints, WriteSetPoints]:
         """The request for a batch of set points, noted as sent."""
-        return self.watch.sending(postures), WriteSetPoints(tuple(sorted(postures.items())))
+        ordered, units = tuple(sorted(postures.items())), self.link.scale.set_point_units
+        batch = self.watch.sending(postures)
+        return batch, WriteSetPoints(ordered) if units == POSTURE_UNITS else FineSetPoints(ordered, units)
 
     def taken(self, batch: SentSetPoints, request: Request, reply: Reply, due: int | None) -> SetPointsTaken:
         """The confirmation of a batch, which must show from period `due` on (None: as the confirmation says).

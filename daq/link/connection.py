@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from daq.link.counters import Tally
 from daq.link.errors import LinkLostError
@@ -18,8 +19,9 @@ class Connection:
     """Shared by all threads that speak to one controller.
 
     `changed` guards everything but the writing, and is notified when a reply has come or the channel has ended.
-    The write lock is held for one write only, so that a stop never waits for another thread's reply; numbers are
-    given out under it, so that the order on the wire is the order of the numbers.
+    A dialect is called under a lock of its own. The write lock is held for one write only, so that a stop never waits
+    for another thread's reply; numbers are given out under it, so that the order on the wire is the order of the
+    numbers.
     """
 
     def __init__(
@@ -39,6 +41,7 @@ class Connection:
         self._dialect = dialect
         self._pending = PendingReplies(tally, first_number)
         self._write_lock = threading.Lock()
+        self._dialect_lock = threading.Lock()
         self._failure: str | None = None
 
     @property
@@ -50,6 +53,11 @@ class Connection:
     def description(self) -> str:
         """Where the channel leads."""
         return self._channel.description
+
+    @property
+    def complaint(self) -> str:
+        """What the dialect knows about why a request has no reply; empty where it knows nothing."""
+        return self._dialect.complaint
 
     @property
     def failure(self) -> str | None:
@@ -87,13 +95,17 @@ class Connection:
         except ChannelError as error:
             raise self.fail(str(error)) from error
         if data:
-            replies = self._dialect.feed(data)
+            with self._dialect_lock:
+                replies, answer = self._dialect.feed(data), self._dialect.answer()
             now = self.now()
             with self.changed:
                 for sequence, reply in replies:
                     transaction = self._pending.match(sequence, reply, now)
                     if transaction is not None:
                         self._note_round_trip(transaction)
+            if answer:
+                with self._write_lock:
+                    self._send(answer)
         return data
 
     def forget(self, transactions: Sequence[Transaction]) -> None:
@@ -115,12 +127,19 @@ class Connection:
         """Goes on over a new channel after a failure, without a session. Sequence numbers go on too, so no old reply is
         taken for a new one."""
         with self._write_lock, self.changed:
-            self._dialect.reset()
+            with self._dialect_lock:
+                self._dialect.reset()
             self._channel = channel
             self._failure = None
 
     def close(self) -> None:
         """Ends the channel for good."""
+        if self._failure is None:
+            with self._dialect_lock:
+                last = self._dialect.farewell()
+            if last:
+                with self._write_lock, suppress(ChannelError):
+                    self._channel.write(last)
         self.fail(f"{self.description}: closed")
 
     def check(self) -> None:
@@ -133,14 +152,20 @@ class Connection:
         now = self.now()
         for transaction in transactions:
             request = transaction.request
-            if not transaction.frame:
-                transaction.frame = self._dialect.encode(transaction.sequence, request)
-            frames += transaction.frame * copies_of(request)
+            with self._dialect_lock:
+                if transaction.frame:
+                    frame = self._dialect.again(request, transaction.frame)
+                else:
+                    frame = transaction.frame = self._dialect.encode(transaction.sequence, request)
+            frames += frame * (1 if self._dialect.scale.half_duplex else copies_of(request))
             transaction.written += 1
             transaction.written_at = now
             transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))
+        self._send(frames)
+
+    def _send(self, data: bytes) -> None:
         try:
-            self._channel.write(frames)
+            self._channel.write(data)
         except ChannelError as error:
             raise self.fail(str(error)) from error
 

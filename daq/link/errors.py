@@ -28,10 +28,11 @@ class RequestRefusedError(DaqError):
 
     exit_code = exit_codes.NOT_REACHED
 
-    def __init__(self, request: str, reason: int) -> None:
+    def __init__(self, request: str, reason: int, why: str = "") -> None:
         self.request = request
         self.reason = reason
-        super().__init__(f"the controller refused {request}: {_EXPLANATION.get(reason, f'unknown reason {reason}')}")
+        why = why or _EXPLANATION.get(reason, f"unknown reason {reason}")
+        super().__init__(f"the controller refused {request}: {why}")
 
 
 _EXPLANATION: dict[int, str] = {
@@ -45,5 +46,6 @@ _EXPLANATION: dict[int, str] = {
     Refusal.BAD_SESSION: "the session has ended: the controller has restarted, or another host has taken "
     "the control; connect again, or reset",
     Refusal.OTHER_STOP: "another stop has come meanwhile, and holds",
+    Refusal.UNFIT: "it is not in a state in which it can be driven",
     Refusal.STALE: "a later command (a stop, perhaps) has already been obeyed",
 }

@@ -13,6 +13,7 @@ from typing import Protocol, Self, TypeVar
 
 from daq.link.connection import Connection
 from daq.link.counters import LinkCounters, Mark, Tally
+from daq.link.dialects import dialect_of
 from daq.link.errors import LinkError, LinkLostError, RequestRefusedError
 from daq.link.timed_exchange import TimedExchange
 from daq.link.timing import CLEAN_TRANSACTIONS, LinkTiming
@@ -22,6 +23,7 @@ from firmware_protocol.commands import (
     PROTOCOL_VERSION,
     Advance,
     Advanced,
+    ExplainedRefusal,
     Hello,
     HelloReply,
     Refused,
@@ -60,7 +62,8 @@ class Link:
     number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
     that is not yet written.
 
-    `chance` draws the first sequence number and, except in lock-step, the nonces of `Hello`.
+    `scale` is what the line's dialect can say of its machine. `chance` draws the first sequence number and, except in
+    lock-step, the nonces of `Hello`.
     """
 
     def __init__(
@@ -75,8 +78,10 @@ class Link:
         self.tally = Tally()
         self._endpoint = endpoint
         timing = LinkTiming(endpoint.bytes_per_second, measured=not endpoint.lock_step)
+        dialect = dialect or FramedDialect()
+        self.scale = dialect.scale
         self._connection = Connection(
-            endpoint.connect(), dialect or FramedDialect(), timing, self.tally, now, self._chance.getrandbits(16)
+            endpoint.connect(), dialect, timing, self.tally, now, self._chance.getrandbits(16)
         )
         self._exchange = TurnExchange(self._connection) if endpoint.lock_step else TimedExchange(self._connection)
         self._clean = CLEAN_TRANSACTIONS
@@ -84,7 +89,9 @@ class Link:
 
     @classmethod
     def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
-        """A link to the controller at a port URL; nothing is sent. Raises TransportError."""
+        """A link to the controller at a port URL, in the dialect that the URL names; nothing is sent. Raises
+        TransportError."""
+        dialect = dialect or dialect_of(url)
         endpoint = open_endpoint(url)
         try:
             return cls(endpoint, dialect)
@@ -123,6 +130,11 @@ class Link:
     def counters(self) -> LinkCounters:
         """Everything counted so far."""
         return self.tally.snapshot(self._connection.damaged)
+
+    @property
+    def complaint(self) -> str:
+        """What is known about a controller that does not do what it is asked, for people; empty where nothing is."""
+        return self._connection.complaint
 
     def mark(self) -> Mark:
         """The counts now, for `counters_since`."""
@@ -221,6 +233,7 @@ class Link:
 def expect(request: Request, reply: Reply, kind: type[R]) -> R:
     """`reply` as the kind that answers `request`. Raises RequestRefusedError for a refusal."""
     if isinstance(reply, Refused):
-        raise RequestRefusedError(type(request).__name__, reply.reason)
+        why = reply.why if isinstance(reply, ExplainedRefusal) else ""
+        raise RequestRefusedError(type(request).__name__, reply.reason, why)
     assert isinstance(reply, kind)
     return reply

@@ -80,4 +80,5 @@ class TimedExchange:
 def no_reply(connection: Connection, transaction: Transaction) -> str:
     """One line about a request that was never answered."""
     name = type(transaction.request).__name__
-    return f"{connection.description}: no reply to {name}, asked {transaction.written} times: is the controller on?"
+    why = connection.complaint or "is the controller on?"
+    return f"{connection.description}: no reply to {name}, asked {transaction.written} times: {why}"

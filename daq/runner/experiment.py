@@ -15,7 +15,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.trace import SLOW_LINE, Outcome, TraceRecord
-from daq.driver import EVERY_JOINT, Controller, GainsNotTakenError
+from daq.driver import Controller, GainsNotTakenError
 from daq.link import LinkError
 from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.follower import Ending, Follower
@@ -118,11 +118,11 @@ def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
         run.control,
         run.machine,
         run.limits,
-        EVERY_JOINT,
+        run.controller.joints,
         ApproachObserver(run.listener),
         run.stop_requests.ended,
         every_period=False,
-        every=run.controller.line_rate(EVERY_JOINT, prepared.move.moving).every,
+        every=run.controller.line_rate(moving=prepared.move.moving).every,
     )
     ending = approach.follow(prepared.move, lambda _index: None)
     if ending.kind == "finished":
@@ -157,7 +157,7 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
     with writer, run.control.frozen_on_error():
         for change in changes:
             follower.tell("gains", change.message)
-        if rate.every > 1:
+        if rate.every > run.controller.link.scale.every:
             follower.tell("note", f"{SLOW_LINE}{rate.in_words}")
         ending = follower.follow(prepared.motion, _progress(run.listener, prepared.motion))
         if ending.kind == "finished":

@@ -10,7 +10,7 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind
-from daq.driver import BoardSnapshot, Controller, ControllerRestartedError, NoSampleError
+from daq.driver import BoardSnapshot, Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
 from daq.runner.arm_control import ArmControl, stop_line
 from daq.runner.lag import Lag
@@ -101,6 +101,8 @@ class Follower:
             return self._halted(Event.LINK_LOST, "link_lost", "lost", str(error))
         except ControllerRestartedError as error:
             return self._halted(Event.TRIP, "restart", "fault", str(error))
+        except HardwareFaultError as error:
+            return self._halted(Event.TRIP, "fault", "fault", str(error))
         told_late = ", ".join(f"joint {joint} is {counts:.0f} ADC counts away" for joint, counts in late.items())
         return self._halted(Event.TRIP, "fault", "fault", f"{told_late} from its set point and does not come nearer")
 
@@ -115,6 +117,8 @@ class Follower:
                     break
         except ControllerRestartedError as error:
             self.tell("restart", str(error))
+        except HardwareFaultError as error:
+            self.tell("fault", str(error))
         except (LinkError, NoSampleError) as error:
             self.tell("link_lost", str(error))
 
@@ -131,6 +135,8 @@ class Follower:
             return self._halted(Event.LINK_LOST, "link_lost", "lost", str(error))
         except ControllerRestartedError as error:
             return self._halted(Event.TRIP, "restart", "fault", str(error))
+        except HardwareFaultError as error:
+            return self._halted(Event.TRIP, "fault", "fault", str(error))
 
     def tell(self, kind: EventKind, message: str) -> None:
         """An event at the last row's time; at the beginning, when there is none."""

@@ -12,7 +12,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.driver import EVERY_JOINT, Controller, LineRate
+from daq.driver import Controller, LineRate
 from daq.runner.rows import RowMaker
 from daq.safety import Violation, check_move_to_start, check_plan
 from daq.traces.room import require_room
@@ -67,6 +67,7 @@ def prepare(
     """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
     consent.require(controller)
+    _require_fitting(controller, machine)
     _require_period(controller, machine)
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
@@ -86,16 +87,40 @@ def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, 
     """Joints to record: as the experiment says, else all that the line has room for."""
     if spec.record is not None:
         return spec.record
+    if controller.link.scale.turn_bytes is not None:
+        return controller.joints  # every turn is one of all joints
     per_joint = 2 + 7
-    both_ways = 4 * FRAME_OVERHEAD + STAMP_BYTES + 1 + 5 + 5 + 6 + per_joint * len(EVERY_JOINT)
+    both_ways = 4 * FRAME_OVERHEAD + STAMP_BYTES + 1 + 5 + 5 + 6 + per_joint * len(controller.joints)
     room = controller.link.bytes_per_second * controller.period_s * LINE_SHARE
-    return EVERY_JOINT if both_ways <= room else spec.joints
+    return controller.joints if both_ways <= room else spec.joints
 
 
 def require_not_stopped(controller: Controller) -> None:
-    """Raises SafetyError for an arm that a stop has frozen."""
-    if StatusFlag.FROZEN in controller.status().flags:
+    """Raises SafetyError for an arm that a stop has frozen, or whose drives are off."""
+    flags = controller.status().flags
+    if StatusFlag.NO_TORQUE in flags:
+        raise SafetyError("a drive is switched off and holds nothing: support the arm, then `daq reset` switches it on")
+    if StatusFlag.FROZEN in flags:
         raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
+
+
+def _require_fitting(controller: Controller, machine: Machine) -> None:
+    """Raises SafetyError where the machine file is of another machine than the one behind the line: set points in
+    other steps would be set points for other postures."""
+    scale, joints = controller.link.scale, len(machine.joints)
+    if joints != scale.joints:
+        raise SafetyError(
+            f"{controller.link.url} has {scale.joints} joints, the machine file {machine.name} describes {joints}"
+        )
+    for joint in controller.joints:
+        own = machine.calibration(joint)
+        if own.posture_units != scale.set_point_units:
+            right = own.range_rad / scale.set_point_units
+            raise SafetyError(
+                f"{controller.link.url} takes set points in {scale.set_point_units} steps over the range of joint "
+                f"{joint}, the machine file {machine.name} has {own.posture_units}: positions would be wrong; its "
+                f"controller.set_point_resolution must be {right:.9g}"
+            )
 
 
 def _require_period(controller: Controller, machine: Machine) -> None:
@@ -119,7 +144,7 @@ def _require_driven(controller: Controller, spec: ExperimentSpec, machine: Machi
 
 def _look(controller: Controller, machine: Machine) -> SampleRow:
     """The next control period of all joints; sends nothing."""
-    return RowMaker(machine, EVERY_JOINT, controller.period_s).row(controller.next_snapshot())
+    return RowMaker(machine, controller.joints, controller.period_s).row(controller.next_snapshot())
 
 
 def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:

@@ -19,7 +19,7 @@ class RowMaker:
         self.joints = tuple(joints)
         self._period = period
         self._calibrations = [machine.calibration(joint) for joint in joints]
-        scales = [machine.joint(joint).dc_motor.scale for joint in joints]
+        scales = [machine.drive_scale(joint) for joint in joints]
         self._drives = [(machine.drive_sign(joint), scale) for joint, scale in zip(joints, scales, strict=True)]
         self._first: int | None = None
 

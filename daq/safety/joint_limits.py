@@ -10,7 +10,6 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.safety.violation import TOLERANCE, Violation
 from daq.trajectories import Plan
-from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 
 STATIC_ERROR_MARGIN = 12
 """ADC counts kept free between a step and the following-error limit for the arm's static error: an assumption. At the
@@ -21,7 +20,7 @@ def joint_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Viola
     """Violations of each joint's limits."""
     found: list[Violation] = []
     for joint in range(1, plan.angles.shape[1] + 1):
-        found += _posture_violations(plan, joint)
+        found += _posture_violations(plan, machine, joint)
         found += _range_violations(plan, machine, limits, joint)
         found += _speed_violations(plan, limits, joint)
         found += _step_violations(plan, machine, limits, joint)
@@ -33,7 +32,8 @@ def largest_step(machine: Machine, limits: Limits, joint: int) -> float | None:
     if limits.following_error_counts is None:
         return None
     counts = max(limits.following_error_counts - STATIC_ERROR_MARGIN, 1)
-    return counts * machine.calibration(joint).range_rad / ADC_COUNTS
+    own = machine.calibration(joint)
+    return counts * own.range_rad / own.counts
 
 
 def rounding_slack(machine: Machine, joint: int) -> float:
@@ -42,13 +42,13 @@ def rounding_slack(machine: Machine, joint: int) -> float:
     return abs(machine.calibration(joint).rad_per_posture_unit) / 2
 
 
-def _posture_violations(plan: Plan, joint: int) -> list[Violation]:
-    postures = plan.postures[:, joint - 1]
+def _posture_violations(plan: Plan, machine: Machine, joint: int) -> list[Violation]:
+    postures, highest = plan.postures[:, joint - 1], machine.calibration(joint).posture_units - 1
     found = []
-    for limit, sign, worst in ((0, -1, int(postures.argmin())), (POSTURE_UNITS - 1, 1, int(postures.argmax()))):
+    for limit, sign, worst in ((0, -1, int(postures.argmin())), (highest, 1, int(postures.argmax()))):
         value, time = int(postures[worst]), worst * plan.period
         if sign * (value - limit) > 0:
-            line = f"joint {joint}: posture {value} at {time:.2f} s: allowed are 0 to {POSTURE_UNITS - 1}"
+            line = f"joint {joint}: posture {value} at {time:.2f} s: allowed are 0 to {highest}"
             found.append(Violation("posture", joint, time, value, limit, line))
     return found
 

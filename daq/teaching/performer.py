@@ -9,7 +9,7 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind
-from daq.driver import EVERY_JOINT, Controller
+from daq.driver import Controller
 from daq.runner import ArmControl, StoppedError
 from daq.runner.follower import Follower
 from daq.safety import Event, RunningGuards
@@ -53,11 +53,11 @@ class FollowingPerformer:
             control,
             machine,
             limits,
-            EVERY_JOINT,
+            controller.joints,
             _AlarmReporter(tell),
             ended,
             every_period=False,
-            every=controller.line_rate(EVERY_JOINT, EVERY_JOINT).every,
+            every=controller.line_rate(moving=controller.joints).every,
         )
         self._ended = ended
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Floats, Integers
-from firmware_protocol.units import POSTURE_UNITS
 
 Booleans = NDArray[np.bool_]
 MarkKind = Literal["start", "ramp_start", "ramp_end", "reversal", "note", "end"]
@@ -155,8 +154,8 @@ def postures_of(machine: Machine, joint: int, angles: Floats) -> Integers:
 def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
     """The angles (rad) of the postures nearest to `angles`, one per joint: what set points can represent.
 
-    A reading in the last fraction of the range counts as posture 999, as on the wire. Raises SpecError for a wrong
-    number of joints, an angle that is not finite or one outside the sensor's range.
+    A reading in the last fraction of the range counts as the highest posture, as on the wire. Raises SpecError for a
+    wrong number of joints, an angle that is not finite or one outside the sensor's range.
     """
     if len(angles) != len(machine.joints):
         raise SpecError(f"start: {len(angles)} angles, {machine.name} has {len(machine.joints)} joints")
@@ -166,10 +165,11 @@ def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
         if not math.isfinite(angle):
             raise SpecError(f"joint {column + 1}: start of {angle} rad: must be finite")
         posture = int(postures_of(machine, column + 1, np.array([angle]))[0])
-        if posture == POSTURE_UNITS:
+        if posture == calibration.posture_units:
             posture -= 1
-        if not 0 <= posture < POSTURE_UNITS:
-            low, high = sorted((calibration.posture_to_rad(0), calibration.posture_to_rad(POSTURE_UNITS - 1)))
+        if not 0 <= posture < calibration.posture_units:
+            highest = calibration.posture_units - 1
+            low, high = sorted((calibration.posture_to_rad(0), calibration.posture_to_rad(highest)))
             raise SpecError(
                 f"joint {column + 1}: start of {math.degrees(angle):.2f}° is outside its range of "
                 f"{math.degrees(low):.2f}° to {math.degrees(high):.2f}°"

@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass, field
 from typing import IO
 
-from daq.transport.url import MockPort, TransportError
+from daq.transport.url import SERVOS, MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
 """Longest time for a mock to start: the first import of the physics engine from a cold disk takes seconds."""
@@ -53,7 +53,8 @@ class MockProcess:
 def start_mock(port: MockPort) -> MockProcess:
     """Starts a mock and waits until it listens. Raises TransportError with the mock's own words when it does not."""
     where = ("--pty",) if port.through_pty else ("--tcp", "127.0.0.1:0")
-    command = [sys.executable, "-m", "mock_controller", *where, "--owned", *port.arguments]
+    module = "mock_controller.servos" if port.dialect == SERVOS else "mock_controller"
+    command = [sys.executable, "-m", module, *where, "--owned", *port.arguments]
     with tempfile.TemporaryFile() as complaints:
         process = subprocess.Popen(
             command,

@@ -1,8 +1,10 @@
 """Port URLs: what the user writes to say where the controller is. Parsing is pure; each mistake gets one line.
 
 serial:///dev/ttyUSB0?baud=115200
+serial:///dev/ttyUSB0?baud=1000000&dialect=dynamixel&ids=1,2
 tcp://192.168.1.20:4000
 mock://?lock_step=1&seed=3&fault=flip:rate=0.01
+mock://?dialect=dynamixel&ids=1,2
 """
 
 from __future__ import annotations
@@ -19,7 +21,12 @@ DEFAULT_BAUD = 115200
 BAUD_RATES = (
     *(1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400),
     *(250000, 460800, 500000, 921600, 1000000),  # of these, a clock of 16 MHz gives 250000, 500000, 1000000 exactly
+    *(2000000, 3000000, 4000000),
 )
+FRAMED = "framed"
+"""The dialect of PROTOCOL.md, where the URL names none."""
+SERVOS = "dynamixel"
+"""The dialect for which a mock of its own ships."""
 
 
 class TransportError(DaqError):
@@ -44,6 +51,9 @@ class SerialPort:
 
     device: str
     baud: int = DEFAULT_BAUD
+    dialect: str = FRAMED
+    ids: tuple[int, ...] = ()
+    """Numbers on the bus of joints 1, 2, …, for dialects that need them."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +64,8 @@ class TcpPort:
     port: int
     baud: int = DEFAULT_BAUD
     lock_step: bool = False
+    dialect: str = FRAMED
+    ids: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,12 +80,15 @@ class MockPort:
     baud: int = DEFAULT_BAUD
     lock_step: bool = False
     through_pty: bool = False
+    dialect: str = FRAMED
+    ids: tuple[int, ...] = ()
 
 
 PortUrl = SerialPort | TcpPort | MockPort
 
-_SERIAL_OPTIONS = ("baud",)
-_TCP_OPTIONS = ("baud", "lock_step")
+_DIALECT_OPTIONS = ("dialect", "ids")
+_SERIAL_OPTIONS = ("baud", *_DIALECT_OPTIONS)
+_TCP_OPTIONS = ("baud", "lock_step", *_DIALECT_OPTIONS)
 MOCK_FLAGS = ("lock_step", "no_sample", "no_compact", "pty")
 """Options of mock:// that are on (1) or off (0)."""
 MOCK_VALUES = (
@@ -93,6 +108,8 @@ MOCK_VALUES = (
 )
 """Options of mock:// that are handed to the mock with their value."""
 REPEATABLE = ("modify", "fault")
+SERVO_VALUES = ("ids", "supply", "load", "coulomb")
+"""Options of mock://?dialect=dynamixel that are handed to the mock of servos with their value."""
 
 
 def parse_port_url(text: str) -> PortUrl:
@@ -112,7 +129,7 @@ def parse_port_url(text: str) -> PortUrl:
     if parts.scheme == "mock":
         if parts.netloc or parts.path not in ("", "/"):
             raise PortUrlError(f"port {text!r}: mock:// takes no address, only options after '?'")
-        return _mock(text, options)
+        return _mock_servos(text, options) if ("dialect", SERVOS) in options else _mock(text, options)
     raise PortUrlError(f"port {text!r}: scheme {parts.scheme!r} is unknown: serial, tcp or mock")
 
 
@@ -134,7 +151,7 @@ def _check_known(text: str, name: str, known: tuple[str, ...]) -> None:
 def _serial(text: str, device: str, options: Mapping[str, str]) -> SerialPort:
     if not device.startswith("/") or device == "/":
         raise PortUrlError(f"port {text!r}: needs a device with its path, as in serial:///dev/ttyUSB0")
-    return SerialPort(device, _baud(text, options))
+    return SerialPort(device, _baud(text, options), *_dialect(text, options))
 
 
 def _tcp(text: str, address: str, path: str, options: Mapping[str, str]) -> TcpPort:
@@ -143,9 +160,8 @@ def _tcp(text: str, address: str, path: str, options: Mapping[str, str]) -> TcpP
         raise PortUrlError(f"port {text!r}: needs a host and a port number, as in tcp://127.0.0.1:4000")
     if not (port.isdecimal() and len(port) <= 5 and 1 <= int(port) <= 65535):
         raise PortUrlError(f"port {text!r}: port number {port!r}: allowed are 1 to 65535")
-    return TcpPort(
-        host.strip("[]"), int(port), _baud(text, options), _flag(text, "lock_step", options.get("lock_step"))
-    )
+    lock_step = _flag(text, "lock_step", options.get("lock_step"))
+    return TcpPort(host.strip("[]"), int(port), _baud(text, options), lock_step, *_dialect(text, options))
 
 
 def _mock(text: str, options: list[tuple[str, str]]) -> MockPort:
@@ -162,6 +178,26 @@ def _mock(text: str, options: list[tuple[str, str]]) -> MockPort:
                 raise PortUrlError(f"port {text!r}: option {name!r} needs a value")
             arguments += [f"--{name.replace('_', '-')}", value]
     return MockPort(tuple(arguments), _baud(text, once), flags["lock_step"], flags["pty"])
+
+
+def _mock_servos(text: str, options: list[tuple[str, str]]) -> MockPort:
+    given = _single(text, options, ("dialect", "baud", "pty", *SERVO_VALUES))
+    dialect, ids = _dialect(text, given)
+    arguments = [f"--{name}={given[name]}" for name in SERVO_VALUES if name in given]
+    arguments.append("--torque")  # nobody could switch it on: this mock ends with its first connection
+    through_pty = _flag(text, "pty", given.get("pty"))
+    return MockPort(tuple(arguments), _baud(text, given), through_pty=through_pty, dialect=dialect, ids=ids)
+
+
+def _dialect(text: str, options: Mapping[str, str]) -> tuple[str, tuple[int, ...]]:
+    """The dialect, and the joints' numbers on its bus."""
+    dialect, ids = options.get("dialect", FRAMED), options.get("ids", "")
+    numbers = ids.split(",") if ids else []
+    if not all(number.isdecimal() and len(number) <= 5 for number in numbers):
+        raise PortUrlError(f"port {text!r}: ids {ids!r}: write whole numbers in the order of the joints, as in ids=1,2")
+    if dialect == SERVOS and not numbers:
+        raise PortUrlError(f"port {text!r}: needs the servos' IDs in the order of the joints, as in ids=1,2")
+    return dialect, tuple(map(int, numbers))
 
 
 def _baud(text: str, options: Mapping[str, str]) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from daq.contracts import exit_codes
+from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, invocation, print_json
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
 
     call = invocation(context)
     with Controller.connect(call.port, load_memory_map(call.settings.robot.memory_map)) as controller:
+        if controller.link.scale.turn_bytes is not None:
+            raise SpecError("robot check: checks the promises of PROTOCOL.md, and this port speaks another dialect")
         found = [one for part in CHECKS for one in part(controller)]
     if json:
         print_json([asdict(one) for one in found])

@@ -266,7 +266,7 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
         protocol=identity.version,
         period=identity.period_s,
         boots=identity.boots,
-        samples=Capability.SAMPLE in identity.capabilities,
+        samples=identity.keeps_samples,
         compact=Capability.COMPACT in identity.capabilities,
     )
     return StatusReport(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq.contracts.machine import BoardPid, Machine
-from firmware_protocol.units import POSTURE_UNITS
 from model.arrays import Floats
 
 FOLLOWING_SHARE = 0.6
@@ -50,9 +49,10 @@ def scale_of(machine: Machine, joints: tuple[int, ...]) -> Scale:
 
 
 def effective_postures(machine: Machine, joint: int) -> Floats:
-    """(1000,) what each posture unit is for the controller, in posture units: the board rounds set points to counts of
+    """(units,) what each posture unit is for the controller, in posture units: the board rounds set points to counts of
     its sensor."""
-    own, postures = machine.calibration(joint), np.arange(float(POSTURE_UNITS))
+    own = machine.calibration(joint)
+    postures = np.arange(float(own.posture_units))
     if isinstance(machine.controller, BoardPid):
         per_count = own.rad_per_count / own.rad_per_posture_unit
         return np.asarray(per_count * np.floor(postures / per_count + 0.5))
@@ -63,7 +63,7 @@ def allowed_postures(machine: Machine, joint: int, period: float) -> Allowed:
     """What the machine's limits leave of a joint's set points."""
     own, limits = machine.calibration(joint), machine.limits
     joint_limits, unit = limits.joint(joint), own.rad_per_posture_unit
-    low, high = 0.0, float(POSTURE_UNITS - 1)
+    low, high = 0.0, float(own.posture_units - 1)
     ends = [None if a is None else (a - own.angle_at_zero_rad) / unit for a in (joint_limits.low, joint_limits.high)]
     lower, upper = ends if unit > 0 else ends[::-1]
     low = low if lower is None else max(low, float(np.ceil(lower)))

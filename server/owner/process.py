@@ -69,7 +69,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
                 protocol=identity.version,
                 period=identity.period_s,
                 boots=identity.boots,
-                samples=Capability.SAMPLE in identity.capabilities,
+                samples=identity.keeps_samples,
                 compact=Capability.COMPACT in identity.capabilities,
             )
         )

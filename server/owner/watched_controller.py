@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from daq.contracts.machine import Machine
-from daq.driver import EVERY_JOINT, BoardSnapshot, Controller
+from daq.driver import BoardSnapshot, Controller
 from daq.runner.rows import RowMaker
 from firmware_protocol.commands import StatusFlag
 from server.owner.messages import LiveSample
@@ -19,7 +19,7 @@ class WatchedController(Controller):
     def next_snapshot(
         self,
         after: int | None = None,
-        joints: Sequence[int] = EVERY_JOINT,
+        joints: Sequence[int] | None = None,
         set_points: Mapping[int, int] | None = None,
     ) -> BoardSnapshot:
         """Reads the next snapshot as `Controller.next_snapshot` does, and passes it on."""

@@ -1,0 +1,89 @@
+"""Samples of a bus that answers with what is measured when it is asked: nothing keeps earlier samples.
+
+The host's clock says when to ask, the controller's when the sample was taken. Set points are written as soon as they
+are given, right after the sample before, so that they are in force from there to the next sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from daq.driver.errors import HardwareFaultError, NoSampleError
+from daq.driver.sampling import ASKED_AFTER, Deliveries
+from daq.driver.snapshot import BoardSnapshot
+from daq.driver.tick_time import TickTime
+from firmware_protocol.commands import AFTER_NEWEST, Sample, SetPointsTaken, Snapshot, StatusFlag, mask_of
+
+NEARLY = 1
+"""Ticks by which a sample may come beside the one that was wanted and still be called that one. At 1 ms a tick and the
+speeds of an arm this is less than a count of its sensors, while a grid without holes lets a gap mean something."""
+
+MOST_TRIES = 5
+"""Questions, a tick or more apart, after which a clock that has not moved counts as one that stands still."""
+
+
+class PolledSampling:
+    """One question a sample. A controller whose clock stands still is not believed."""
+
+    def __init__(self, deliveries: Deliveries) -> None:
+        self._deliveries = deliveries
+        self._time = TickTime(deliveries.period_s)
+        self._newest: int | None = None
+        self._measured: int | None = None
+
+    def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
+        """Set points; the confirmation has read them back."""
+        deliveries = self._deliveries
+        batch, request = deliveries.send(postures)
+        (reply,) = deliveries.link.exchange(request)
+        confirmation = deliveries.taken(batch, request, reply, None)
+        self._check(confirmation.status)
+        return confirmation
+
+    def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
+        """Writes the set points, waits until tick `after` is over, and asks; None is a usual pause after the sample
+        before."""
+        deliveries = self._deliveries
+        if postures:
+            self.write(postures)
+        wanted = self._due(after)
+        if wanted is not None:
+            deliveries.clock.sleep_until(self._time.time_of(wanted - 1) + ASKED_AFTER * deliveries.period_s)
+        reply, now = self._newer(Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints))))
+        tick_time = self._time.arrived(reply.tick, now)
+        tick = reply.tick
+        if wanted is not None and abs(tick - wanted) <= NEARLY:
+            tick = wanted
+        if self._newest is not None and tick <= self._newest:
+            tick = self._newest + 1
+        every = 1 if after is None or self._newest is None else max(1, after - self._newest + 1)
+        self._newest = tick
+        flags = StatusFlag(reply.status)
+        return deliveries.deliver(tick, after, (now, tick_time), reply.joints, flags, "sample", every)
+
+    def _newer(self, question: Sample) -> tuple[Snapshot, float]:
+        """A sample measured after the last one, and when it came (s). A question may come a little too early."""
+        deliveries = self._deliveries
+        for _ in range(MOST_TRIES):
+            reply, now = deliveries.link.request(question, Snapshot), deliveries.clock.now()
+            deliveries.check_restart(reply.status)
+            self._check(reply.status)
+            if self._measured is None or reply.tick > self._measured:
+                self._measured = reply.tick
+                return reply, now
+            deliveries.clock.sleep_until(now + deliveries.period_s)
+        raise NoSampleError(
+            f"the same sample comes again and again: the controller's clock stands still at {reply.tick}"
+        )
+
+    def _due(self, after: int | None) -> int | None:
+        """The tick to ask for; None where it may be any."""
+        if self._newest is None:
+            return None
+        return self._newest + self._deliveries.link.scale.every if after is None else max(after, self._newest) + 1
+
+    def _check(self, status: int) -> None:
+        """Raises HardwareFaultError for a drive that is damaged."""
+        if status & StatusFlag.HARDWARE_ERROR.value:
+            why = self._deliveries.link.complaint or "a drive reports a hardware error"
+            raise HardwareFaultError(f"{why}: its joint may be without torque; support it, and look for the cause")

@@ -1,0 +1,339 @@
+"""Servos as the driver's controller: each request of the driver becomes reads and writes of control tables.
+
+Protocol 2.0 numbers nothing, so a reply is recognised by its sender, its length and what it says: a command counts as
+obeyed when the servos, read back, hold what was written. What this dialect knows of time is the servos' own clock
+(Realtime Tick), which counts milliseconds: one tick is one control period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from firmware_protocol.codes import PROTOCOL_VERSION, Capability, Refusal, StatusFlag
+from firmware_protocol.dynamixel.control_table import COUNTS_A_TURN, TICKS, Table
+from firmware_protocol.dynamixel.instructions import sync_read, sync_write
+from firmware_protocol.dynamixel.packets import LARGEST_ID, OVERHEAD, STATUS, Packet, PacketDecoder, encode
+from firmware_protocol.dynamixel.readings import (
+    BLOCK,
+    GAINS,
+    STOP_MARK,
+    WHOLE,
+    Servo,
+    ServoGains,
+    ServoSettings,
+    ServosStopped,
+    faults,
+)
+from firmware_protocol.errors import ProtocolError
+from firmware_protocol.joints import joints_of
+from firmware_protocol.memory_map import JOINTS
+from firmware_protocol.message import Reply, Request
+from firmware_protocol.replies import (
+    ExplainedRefusal,
+    HelloReply,
+    Released,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+)
+from firmware_protocol.requests import Hello, ReadStatus, Release, ReportGains, Sample, Stop, WriteSetPoints
+from firmware_protocol.scale import LineScale
+
+PERIOD_US = 1000
+"""Period of the servos' position control: an assumption, that of their clock. The manual gives none."""
+EVERY = 20
+"""Periods from one sample to the next, where the line is quick enough: 50 samples a second."""
+WATCHDOG = 25
+"""Bus Watchdog (20 ms each) from the first set point to the end of the connection: servos whose host has gone stop by
+themselves after half a second."""
+MOST_WRITES = 8
+"""How often a step is written again because the servos, read back, do not hold it; then the link asks anew."""
+
+Servos = dict[int, Servo]
+
+
+@dataclass
+class _Job:
+    """A request under way. `heard` are the status packets of its present step, by servo."""
+
+    sequence: int
+    request: Request
+    length: int
+    heard: dict[int, Packet] = field(default_factory=dict)
+    goals: dict[int, int] | None = None
+    """Goals by servo that the step before has written; None in the first step of several."""
+    writes: int = 0
+
+
+class DynamixelDialect:
+    """Servos of these IDs on one bus; the first is joint 1. Set points, positions and errors are counts of 1/4096 turn.
+
+    - Stop: each servo's goal becomes its measured position, and the bench is marked as stopped (STOP_MARK).
+    - Release: the same goals, the mark is taken away, and the torque switched on. Nothing else switches it on.
+    - Set points: refused beyond a servo's own position limits, or while the bench is stopped or a torque is off.
+    """
+
+    def __init__(self, ids: Sequence[int]) -> None:
+        if not 1 <= len(ids) <= JOINTS or len(set(ids)) != len(ids) or not all(0 <= one <= LARGEST_ID for one in ids):
+            raise ProtocolError(
+                f"ids {', '.join(map(str, ids)) or 'none'}: write the servos' IDs in the order of the joints, "
+                f"as in ids=1,2: 1 to {JOINTS} different ones from 0 to {LARGEST_ID}"
+            )
+        self._ids = tuple(ids)
+        count = len(self._ids)
+        asked, told = OVERHEAD + 4 + count, count * (OVERHEAD + 1 + BLOCK[1])
+        self.scale = LineScale(
+            joints=count,
+            set_point_units=COUNTS_A_TURN,
+            every=EVERY,
+            turn_bytes=2 * (asked + told) + OVERHEAD + 4 + 5 * count,
+            half_duplex=True,
+        )
+        self._decoder = PacketDecoder()
+        self._jobs: list[_Job] = []
+        self._next = b""
+        self._settings: dict[int, ServoSettings] = {}
+        self._armed = self._stopped = False
+        self._faults = ""
+        self._clock: int | None = None
+        self._tick = 0
+
+    @property
+    def damaged(self) -> int:
+        """Pieces that were no packet."""
+        return self._decoder.damaged
+
+    @property
+    def complaint(self) -> str:
+        """Hardware errors that servos have reported, or which servos are silent."""
+        if self._faults:
+            return self._faults
+        silent = [one for one in self._ids if self._jobs and one not in self._jobs[-1].heard]
+        if not self._jobs or not silent or len(silent) == len(self._ids):
+            return ""
+        names = ", ".join(f"{one} (joint {self._ids.index(one) + 1})" for one in silent)
+        return f"servo {names} does not answer, the others do: has it dropped off the bus?"
+
+    def reset(self) -> None:
+        """Forgets an unfinished packet and what was under way."""
+        self._decoder.reset()
+        self._jobs.clear()
+        self._next, self._armed = b"", False
+
+    def encode(self, sequence: int, request: Request) -> bytes:
+        """The instructions of a request's first step. Raises ProtocolError for what servos do not have, and for a set
+        point outside a servo's limits."""
+        area, first = BLOCK, b""
+        match request:
+            case Hello():
+                area, self._armed = WHOLE, False
+            case ReportGains():
+                area = GAINS
+            case WriteSetPoints():
+                first = b"" if self._stopped else self._goals(request)
+            case Stop():
+                self._stopped = True
+            case Sample() | ReadStatus() | Release():
+                pass
+            case _:
+                name = type(request).__name__
+                raise ProtocolError(f"{name}: Dynamixel servos are only read, moved, stopped and released from here")
+        self._jobs = [job for job in self._jobs if job.sequence != sequence][-_MOST_JOBS:]
+        self._jobs.append(_Job(sequence, request, area[1]))
+        return first + encode(sync_read(self._ids, *area))
+
+    def feed(self, data: bytes) -> list[tuple[int, Reply]]:
+        """The replies that the status packets in `data` complete."""
+        replies: list[tuple[int, Reply]] = []
+        for packet in self._decoder.feed(data):
+            for job in self._jobs_of(packet):
+                again = packet.device in job.heard
+                job.heard[packet.device] = packet
+                if len(job.heard) == len(self._ids) or (again and isinstance(job.request, Stop)):
+                    reply = self._advance(job)
+                    if reply is not None:
+                        self._jobs.remove(job)
+                        replies.append((job.sequence, reply))
+        return replies
+
+    def again(self, request: Request, frame: bytes) -> bytes:
+        """Of set points, after a stop, nothing but the question: until the bus has been silent for a moment the servos
+        would take them."""
+        return encode(sync_read(self._ids, *BLOCK)) if self._stopped and isinstance(request, WriteSetPoints) else frame
+
+    def answer(self) -> bytes:
+        """The instructions of the next step of what is under way."""
+        written, self._next = self._next, b""
+        return written
+
+    def farewell(self) -> bytes:
+        """Ends the watch for a silent bus, which was begun with the first set point, unless the bench is stopped."""
+        return (
+            self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0)) if self._armed and not self._stopped else b""
+        )
+
+    def _jobs_of(self, packet: Packet) -> list[_Job]:
+        """The requests under way that this status packet says something about: all that ask for as many bytes. Whose
+        question it answers cannot be known, and need not be: it says when it was measured, or what was written."""
+        if packet.instruction != STATUS or packet.device not in self._ids:
+            return []  # our own instruction, where an adapter returns it, or somebody else's servo
+        return [job for job in self._jobs if job.length == len(packet.data)]
+
+    def _advance(self, job: _Job) -> Reply | None:
+        """What all servos' answers come to: the reply, or None and perhaps a next step."""
+        request, blocks = job.request, {device: job.heard[device].data for device in self._ids if device in job.heard}
+        if isinstance(request, Hello):
+            return self._greeted(request, blocks)
+        if isinstance(request, ReportGains):
+            return ServoGains(tuple(map(_gains, blocks.values())))
+        servos = {device: Servo.of(block) for device, block in blocks.items()}
+        return self._known(job, servos)
+
+    def _known(self, job: _Job, servos: Servos) -> Reply | None:
+        """The same of the requests that need the servos' present state."""
+        tick, flags = self._time(servos), self._flags(servos)
+        match job.request:
+            case Sample(_, mask):
+                readings = [(joint, servos[self._ids[joint - 1]].reading) for joint in joints_of(mask)]
+                return Snapshot(tick, flags, tuple(readings))
+            case ReadStatus():
+                return Status(tick, flags, 0, 0, int(any(one.stopped for one in servos.values())))
+            case WriteSetPoints() as request:
+                return self._taken(job, request, servos, tick, flags)
+            case Release():
+                return self._released(job, servos)
+        return self._frozen(job, servos, tick)
+
+    # --- what each request comes to
+
+    def _greeted(self, request: Hello, whole: Mapping[int, bytes]) -> Reply:
+        self._settings = {device: ServoSettings.of(block) for device, block in whole.items()}
+        for device, settings in self._settings.items():
+            if why := settings.unfit():
+                return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, f"servo {device} {why}")
+        servos = {device: Servo.of(block[BLOCK[0] :]) for device, block in whole.items()}
+        self._time(servos)
+        self._stopped = any(one.stopped for one in servos.values())
+        capabilities = Capability.SAMPLE | Capability.POLLED
+        if all(settings.simulated for settings in self._settings.values()):
+            capabilities |= Capability.SIMULATED
+        return HelloReply(PROTOCOL_VERSION, capabilities, PERIOD_US, 1, 0, request.nonce, 1)
+
+    def _goals(self, request: WriteSetPoints) -> bytes:
+        """Goals, and with the first ones the watch for a silent bus."""
+        goals = {self._ids[joint - 1]: posture for joint, posture in request.postures if joint <= len(self._ids)}
+        if len(goals) != len(request.postures):
+            raise ProtocolError(f"joint {request.postures[-1][0]}: this bench has joints 1 to {len(self._ids)}")
+        for device, goal in goals.items():
+            own = self._settings.get(device)
+            if own is not None and not own.low <= goal <= own.high:
+                raise ProtocolError(
+                    f"joint {self._ids.index(device) + 1}: set point of {goal} counts: servo {device} itself allows "
+                    f"{own.low} to {own.high} (its position limits)"
+                )
+        watch = b"" if self._armed else self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, WATCHDOG))
+        self._armed = True
+        return watch + self._write(Table.GOAL_POSITION, goals)
+
+    def _taken(self, job: _Job, request: WriteSetPoints, servos: Servos, tick: int, flags: int) -> Reply | None:
+        """The set points are taken when the goals read back are those that were sent."""
+        if flags & (StatusFlag.RESTARTED | StatusFlag.HARDWARE_ERROR):
+            return SetPointsTaken(tick, flags)
+        if flags & StatusFlag.FROZEN or self._stopped:
+            return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, _why_frozen(servos))
+        if all(servos[self._ids[joint - 1]].goal == posture for joint, posture in request.postures):
+            return SetPointsTaken(tick, flags)
+        job.heard.clear()  # an answer to an earlier question, or the goals were lost: the link asks again
+        return None
+
+    def _frozen(self, job: _Job, servos: Servos, tick: int) -> Reply | None:
+        """A stop: goals become the measured positions, and the bench is marked; then both are read back.
+
+        Where a servo is silent the others are stopped when they answer for the second time; confirmed is nothing.
+        """
+        if job.goals is not None and len(servos) == len(self._ids):
+            held = (one.goal == job.goals.get(device) for device, one in servos.items())
+            if all(one.stopped for one in servos.values()) and all(held):
+                return ServosStopped(tick, tuple(one.goal for one in servos.values()))
+        if self._may_write(job):
+            locked = {device: one.goal for device, one in servos.items() if one.watchdog < 0}
+            job.goals = {device: one.position for device, one in servos.items()} | locked
+            self._then(self._write(Table.GOAL_POSITION, job.goals), {Table.BUS_WATCHDOG: STOP_MARK}, set(locked))
+        return None
+
+    def _released(self, job: _Job, servos: Servos) -> Reply | None:
+        """A release: each servo holds the position that it has, with its torque on."""
+        if why := faults(servos):
+            line = f"{why}; when its cause is gone, switch the bench's supply off and on"
+            return ExplainedRefusal(job.request.OPCODE, Refusal.UNFIT, line)
+        if job.goals is not None:
+            ready = (s.torque and not s.stopped and s.goal == job.goals[device] for device, s in servos.items())
+            if all(ready):
+                self._stopped, self._armed = False, False
+                return Released()
+        if self._may_write(job):
+            job.goals = {device: one.position for device, one in servos.items()}
+            free = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0))
+            self._then(free + self._write(Table.GOAL_POSITION, job.goals), {Table.TORQUE_ENABLE: 1}, set())
+        return None
+
+    def _may_write(self, job: _Job) -> bool:
+        job.heard.clear()
+        job.writes += 1
+        return job.writes <= MOST_WRITES
+
+    def _then(self, first: bytes, everywhere: Mapping[Table, int], but: set[int]) -> None:
+        """Next step: writes `first` and then one value to all servos `but` these; reads everything back."""
+        rest = [one for one in self._ids if one not in but]
+        second = b"".join(self._write(item, dict.fromkeys(rest, value)) for item, value in everywhere.items() if rest)
+        self._next += first + second + encode(sync_read(self._ids, *BLOCK))
+
+    @staticmethod
+    def _write(item: Table, values: Mapping[int, int]) -> bytes:
+        return encode(sync_write({device: item.pack(value) for device, value in values.items()}, item.address))
+
+    # --- what servos say of time and state
+
+    def _time(self, servos: Servos) -> int:
+        """Milliseconds of the first servo's clock since this connection began, without its turns."""
+        first = servos.get(self._ids[0])
+        if first is not None:
+            if self._clock is not None:
+                passed = (first.clock - self._clock) % TICKS
+                self._tick += passed if passed < TICKS // 2 else 0  # a late answer is of an earlier time
+            self._clock = first.clock
+        return self._tick
+
+    def _flags(self, servos: Servos) -> int:
+        flags = StatusFlag(0)
+        self._faults = faults(servos)
+        if self._faults:
+            flags |= StatusFlag.HARDWARE_ERROR
+        if any(one.stopped or not one.torque for one in servos.values()):
+            flags |= StatusFlag.FROZEN
+        if any(not one.torque for one in servos.values()):
+            flags |= StatusFlag.NO_TORQUE
+        if self._armed and any(one.watchdog == 0 and not one.torque for one in servos.values()):
+            flags |= StatusFlag.RESTARTED  # its supply has failed: the watch that was begun is gone
+        return int(flags)
+
+
+_MOST_JOBS = 16
+"""Requests that are remembered while their replies are awaited; what the link has given up stays among them."""
+
+
+def _gains(block: bytes) -> tuple[int, int, int]:
+    p, i, d = (
+        item.of(block, GAINS[0]) for item in (Table.POSITION_P_GAIN, Table.POSITION_I_GAIN, Table.POSITION_D_GAIN)
+    )
+    return p, i, d
+
+
+def _why_frozen(servos: Servos) -> str:
+    limp = [str(device) for device, one in servos.items() if not one.torque]
+    if limp:
+        return f"the torque of servo {', '.join(limp)} is off"
+    if any(one.watchdog < 0 for one in servos.values()):
+        return "the bus was silent for too long, and the servos have stopped by themselves"
+    return "the bench has been stopped and holds its posture until it is released"

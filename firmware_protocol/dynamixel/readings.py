@@ -1,0 +1,138 @@
+"""What a bench of servos says: a servo's registers, and replies with the range that servos need.
+
+The replies have no frame: they go from the dialect to the driver, and the driver's own are their base classes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from firmware_protocol.dynamixel.control_table import POSITION_MODE, WATCHDOG_ERROR, Table, in_words
+from firmware_protocol.joints import JointReading
+from firmware_protocol.message import check_range
+from firmware_protocol.replies import Gains, Stopped
+
+FIRST, LAST = Table.TORQUE_ENABLE, Table.PRESENT_POSITION
+BLOCK = (FIRST.address, LAST.address + LAST.size - FIRST.address)
+"""Address and number of bytes of what is read of a servo at a time."""
+WHOLE = (0, LAST.address + LAST.size)
+"""The same with the settings that are kept without a supply, read once a connection."""
+GAINS = (Table.POSITION_D_GAIN.address, 6)
+"""Gains D, I and P."""
+STOP_MARK = 1
+"""Bus Watchdog (20 ms) that a stop writes: the servos refuse goals as soon as the bus is silent for so long, until
+somebody writes 0. No run uses this value, so it tells every host that the bench has been stopped."""
+
+
+@dataclass(frozen=True)
+class ServoReading(JointReading):
+    """Goal, position and error in counts of 1/4096 turn (a set point's unit is the same), power in steps of the PWM."""
+
+    def __post_init__(self) -> None:
+        for name in ("set_point", "position", "error"):
+            check_range(name, getattr(self, name), -0x80000000, 0x7FFFFFFF)
+        check_range("power", self.power, -0x8000, 0x7FFF)
+
+
+@dataclass(frozen=True)
+class ServosStopped(Stopped):
+    """Goals of the servos, in counts; a servo that was moved by hand beyond its turn may be outside 0–4095."""
+
+    def __post_init__(self) -> None:
+        check_range("tick", self.tick, 0, 0xFFFFFFFF)
+
+
+@dataclass(frozen=True)
+class ServoGains(Gains):
+    """(P, I, D) of each servo as its control table has them: 0–16383."""
+
+    def __post_init__(self) -> None:
+        for gains in self.gains:
+            for name, value in zip("PID", gains, strict=True):
+                check_range(f"gain {name}", value, 0, 0xFFFF)
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Registers of one servo at one moment."""
+
+    torque: bool
+    error: int
+    watchdog: int
+    goal: int
+    clock: int
+    """Realtime Tick, ms."""
+    pwm: int
+    position: int
+
+    @classmethod
+    def of(cls, block: bytes) -> Servo:
+        """From the bytes of BLOCK."""
+        value = {item: item.of(block, BLOCK[0]) for item in _READ}
+        return cls(
+            torque=value[Table.TORQUE_ENABLE] == 1,
+            error=value[Table.HARDWARE_ERROR_STATUS],
+            watchdog=value[Table.BUS_WATCHDOG],
+            goal=value[Table.GOAL_POSITION],
+            clock=value[Table.REALTIME_TICK],
+            pwm=value[Table.PRESENT_PWM],
+            position=value[Table.PRESENT_POSITION],
+        )
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a stop, or the silence of the bus, holds it."""
+        return self.watchdog in (STOP_MARK, WATCHDOG_ERROR)
+
+    @property
+    def reading(self) -> ServoReading:
+        """For the driver."""
+        return ServoReading(self.goal, self.position, self.goal - self.position, self.pwm)
+
+
+_READ = (
+    Table.TORQUE_ENABLE,
+    Table.HARDWARE_ERROR_STATUS,
+    Table.BUS_WATCHDOG,
+    Table.GOAL_POSITION,
+    Table.REALTIME_TICK,
+    Table.PRESENT_PWM,
+    Table.PRESENT_POSITION,
+)
+
+
+@dataclass(frozen=True)
+class ServoSettings:
+    """What a servo keeps without a supply, as far as it decides whether it can be driven."""
+
+    simulated: bool
+    mode: int
+    low: int
+    high: int
+
+    @classmethod
+    def of(cls, whole: bytes) -> ServoSettings:
+        """From the bytes of WHOLE."""
+        information = whole[Table.MODEL_INFORMATION.address :][: Table.MODEL_INFORMATION.size]
+        return cls(
+            simulated=information == SIMULATED,
+            mode=Table.OPERATING_MODE.of(whole),
+            low=Table.MIN_POSITION_LIMIT.of(whole),
+            high=Table.MAX_POSITION_LIMIT.of(whole),
+        )
+
+    def unfit(self) -> str:
+        """Why it cannot be driven; empty where it can."""
+        if self.mode != POSITION_MODE:
+            return f"is in operating mode {self.mode}, position control ({POSITION_MODE}) is needed"
+        return ""
+
+
+SIMULATED = b"MOCK"
+"""Model Information of a servo that has no motor behind it."""
+
+
+def faults(servos: dict[int, Servo]) -> str:
+    """The servos that report a hardware error, in words; empty where none does."""
+    bad = [f"servo {device} reports {in_words(one.error)}" for device, one in servos.items() if one.error]
+    return "; ".join(bad)

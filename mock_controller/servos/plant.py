@@ -1,0 +1,91 @@
+"""A pan-tilt head: a turntable with a bar on it that tilts, a motor with gear and friction at each.
+
+q1 turns the head about the vertical, q2 lifts the bar (0: horizontal). With the bar's inertia J about the tilt axis and
+its moment of weight w (N·m when it is horizontal), Lagrange's equations are
+
+    (I1 + J cos² q2) q1'' = 2 J sin q2 cos q2 q1' q2' + τ1
+                  J q2''  = −J sin q2 cos q2 q1'²  − w cos q2 + τ2
+
+Each motor's torque at the joint is k N (V − k_e N q') / R, less friction; its rotor adds N² times its inertia.
+Written for this mock alone, and with no thought of how a model describes the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+GRAVITY = 9.81
+STEP_US = 250
+"""Step of integration, µs: with a time constant of the motors of some 10 ms its error is far below a count."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """Masses (kg) and lengths (m) of the head. `load` is a mass at the bar's end."""
+
+    turntable: float = 0.15
+    radius: float = 0.04
+    bar: float = 0.12
+    length: float = 0.16
+    load: float = 0.0
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A servo's motor. The stall torque of 4.1 N·m and current of 2.3 A at 12 V, and the gear, are those of an
+    XM430-W350 (the maker's e-manual); rotor and friction are assumptions."""
+
+    resistance: float = 12.0 / 2.3
+    torque_constant: float = 4.1 / 2.3 / 353.5
+    back_emf: float = 0.0062
+    gear: float = 353.5
+    rotor: float = 4e-8
+    viscous: float = 0.06
+    """N·m·s/rad at the joint."""
+    coulomb: float = 0.10
+    """N·m at the joint."""
+
+    def torque(self, volts: float, speed: float) -> float:
+        """Torque at the joint (N·m) without Coulomb friction."""
+        current = (volts - self.back_emf * self.gear * speed) / self.resistance
+        return self.torque_constant * self.gear * current - self.viscous * speed
+
+
+class PanTilt:
+    """Positions (rad) and speeds (rad/s) of both joints, advanced in steps."""
+
+    def __init__(self, head: Head, motor: Motor, positions: tuple[float, float] = (0.0, 0.0)) -> None:
+        self.position = list(positions)
+        self.speed = [0.0, 0.0]
+        self.volts: list[float | None] = [None, None]
+        """At each motor; None: the bridge is open, and no current flows."""
+        self._motor = motor
+        rotor = motor.gear**2 * motor.rotor
+        self._pan = 0.5 * head.turntable * head.radius**2 + rotor
+        self._bar = (head.bar / 3.0 + head.load) * head.length**2
+        self._rotor = rotor
+        self._weight = GRAVITY * head.length * (head.bar / 2.0 + head.load)
+
+    def step(self) -> None:
+        """One step: the speed first, then the position with the new speed."""
+        pan, tilt = self.speed
+        sine, cosine = math.sin(self.position[1]), math.cos(self.position[1])
+        torques = [self._driven(joint) for joint in (0, 1)]
+        coupling = self._bar * sine * cosine
+        self._accelerate(0, torques[0] + 2.0 * coupling * pan * tilt, self._pan + self._bar * cosine**2)
+        self._accelerate(1, torques[1] - coupling * pan**2 - self._weight * cosine, self._rotor + self._bar)
+
+    def _driven(self, joint: int) -> float:
+        volts = self.volts[joint]
+        return (
+            -self._motor.viscous * self.speed[joint] if volts is None else self._motor.torque(volts, self.speed[joint])
+        )
+
+    def _accelerate(self, joint: int, torque: float, inertia: float) -> None:
+        """Coulomb friction takes from the speed what it can within the step, but never turns it round."""
+        seconds = STEP_US * 1e-6
+        free = self.speed[joint] + seconds * torque / inertia
+        lost = seconds * self._motor.coulomb / inertia
+        self.speed[joint] = math.copysign(max(0.0, abs(free) - lost), free)
+        self.position[joint] += seconds * self.speed[joint]

@@ -1,0 +1,250 @@
+"""Servos behind the driver: what each request does to them, and one clear line for each thing that goes wrong."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
+from daq.link import LinkTimeoutError, RequestRefusedError
+from firmware_protocol.commands import Capability, FineSetPoints, StatusFlag, Stop
+from firmware_protocol.dynamixel import instructions as ask
+from firmware_protocol.dynamixel.control_table import HardwareError, Table
+from firmware_protocol.dynamixel.dialect import DynamixelDialect
+from firmware_protocol.dynamixel.packets import encode
+from firmware_protocol.errors import ProtocolError
+from mock_controller.servos.bench import Options
+from tests.daq.servo_bench import VirtualBench
+
+
+@pytest.fixture
+def bench() -> VirtualBench:
+    return VirtualBench()
+
+
+@pytest.fixture
+def controller(bench: VirtualBench) -> Controller:
+    return bench.controller()
+
+
+def goals(bench: VirtualBench) -> list[int]:
+    return [servo[Table.GOAL_POSITION] for servo in bench.bench.servos]
+
+
+def positions(bench: VirtualBench) -> list[int]:
+    return [servo[Table.PRESENT_POSITION] for servo in bench.bench.servos]
+
+
+def test_a_bench_says_what_it_is(controller: Controller) -> None:
+    assert controller.identity.simulated
+    assert Capability.POLLED in controller.identity.capabilities
+    assert controller.period_s == 0.001
+    assert controller.joints == (1, 2)
+    assert controller.gains() == {1: (800, 0, 0), 2: (800, 0, 0)}
+
+
+def test_connecting_and_looking_write_nothing(bench: VirtualBench) -> None:
+    written: list[bytes] = []
+    bench.hearing = lambda data: written.append(data) or data  # type: ignore[func-returns-value]
+    with bench.controller() as controller:
+        controller.status()
+        controller.next_snapshot()
+    assert all(packet[7] == ask.Instruction.SYNC_READ for packet in written)
+
+
+def test_set_points_are_goals_and_are_read_back(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 2100, 2: 1600})
+    assert goals(bench) == [2100, 1600]
+    snapshot = controller.next_snapshot()
+    assert snapshot.set_points == {1: 2100, 2: 1600}
+    assert not snapshot.set_points_missed
+    reading = snapshot[1]
+    assert reading.error == 2100 - reading.position
+
+
+def test_samples_come_every_twentieth_tick_of_the_servos_own_clock(controller: Controller) -> None:
+    ticks = [controller.next_snapshot().tick]
+    for _ in range(10):
+        ticks.append(controller.next_snapshot(ticks[-1] + 19).tick)
+    assert [later - earlier for earlier, later in pairwise(ticks)] == [20] * 10
+
+
+def test_a_sample_that_is_far_too_late_is_told_as_what_it_is(controller: Controller, bench: VirtualBench) -> None:
+    first = controller.next_snapshot()
+    second = controller.next_snapshot(first.tick + 19)
+    bench.sleep_until(bench.now() + 0.05)
+    third = controller.next_snapshot(second.tick + 19)
+    assert 50 <= third.tick - second.tick <= 52
+    assert third.missing_before == 2
+
+
+def test_a_stop_holds_where_the_servos_are_and_they_refuse_goals(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 2600})
+    bench.sleep_until(bench.now() + 0.15)
+    stopped = controller.stop()
+    assert stopped.acknowledged
+    assert list(stopped.frozen.values()) == goals(bench)
+    assert all(abs(goal - position) < 40 for goal, position in zip(goals(bench), positions(bench), strict=True))
+    with pytest.raises(RequestRefusedError, match="the bench has been stopped and holds its posture"):
+        controller.set_points({1: 2600})
+    assert goals(bench) == list(stopped.frozen.values())
+
+
+def test_a_repeat_of_set_points_cannot_undo_a_stop(controller: Controller, bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    late = FineSetPoints(((1, 2600),), 4096)
+    frame = dialect.encode(7, late)
+    assert dialect.again(late, frame) == frame
+    dialect.encode(8, Stop())
+    bench.bench.receive(dialect.again(late, frame))
+    assert goals(bench)[0] != 2600
+
+
+def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) -> None:
+    with bench.controller() as first:
+        first.set_points({1: 2300})
+        assert first.stop().acknowledged
+    bench.sleep_until(bench.now() + 5.0)
+    with bench.controller() as second:
+        status = second.status()
+        assert StatusFlag.FROZEN in status.flags
+        assert status.stop == 1
+        second.release(status.stop)
+        assert StatusFlag.FROZEN not in second.status().flags
+        second.set_points({1: 2100})
+    assert goals(bench)[0] == 2100
+
+
+def test_a_stop_needs_no_greeting(bench: VirtualBench) -> None:
+    with bench.controller() as controller:
+        link = controller.link
+        link._connection._dialect.reset()
+        assert len(link.stop().postures) == 2
+
+
+def test_torque_comes_on_by_a_release_alone_and_moves_nothing() -> None:
+    bench = VirtualBench(Options(torque=False, load=0.2))
+    far = bench.bench.servos[0]
+    far.write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))  # what another program has left
+    with bench.controller() as controller:
+        assert StatusFlag.NO_TORQUE in controller.status().flags
+        with pytest.raises(RequestRefusedError, match="the torque of servo 1, 2 is off"):
+            controller.set_points({1: 2048})
+        before = positions(bench)
+        controller.release()
+        bench.sleep_until(bench.now() + 0.5)
+        assert all(servo.torque for servo in bench.bench.servos)
+        assert all(abs(now - then) < 25 for now, then in zip(positions(bench), before, strict=True))
+
+
+def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 3000})
+    bench.sleep_until(bench.now() + 0.45)
+    bench.sleep_until(bench.now() + 0.3)
+    held = positions(bench)
+    bench.sleep_until(bench.now() + 1.0)
+    assert positions(bench) == held
+    assert StatusFlag.FROZEN in bench.controller().status().flags
+
+
+def test_a_connection_that_ends_in_good_order_ends_the_watch(bench: VirtualBench) -> None:
+    with bench.controller() as controller:
+        controller.set_points({1: 2100})
+    bench.sleep_until(bench.now() + 5.0)
+    assert StatusFlag.FROZEN not in bench.controller().status().flags
+
+
+def test_a_servo_that_drops_off_the_bus_is_named_and_the_other_is_stopped(
+    controller: Controller, bench: VirtualBench
+) -> None:
+    controller.set_points({1: 2800, 2: 1700})
+    bench.sleep_until(bench.now() + 0.1)
+    bench.bench.gone.add(2)
+    with pytest.raises(LinkTimeoutError, match=r"servo 2 \(joint 2\) does not answer, the others do"):
+        controller.next_snapshot()
+    stopped = controller.stop()
+    assert not stopped.acknowledged
+    assert "servo 2 (joint 2) does not answer" in (stopped.problem or "")
+    first = bench.bench.servos[0]
+    assert abs(first[Table.GOAL_POSITION] - first[Table.PRESENT_POSITION]) < 60
+    assert first[Table.GOAL_POSITION] != 2800
+
+
+def test_a_hardware_error_is_one_line_that_names_servo_and_error(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 2100})
+    bench.bench.fail(2, HardwareError.OVERHEATING)
+    with pytest.raises(HardwareFaultError, match="servo 2 reports overheating: its joint may be without torque"):
+        controller.next_snapshot()
+    with pytest.raises(RequestRefusedError, match="servo 2 reports overheating; when its cause is gone"):
+        controller.release()
+
+
+def test_a_servo_that_loses_its_supply_for_a_moment_counts_as_restarted(
+    controller: Controller, bench: VirtualBench
+) -> None:
+    controller.set_points({1: 2100})
+    bench.bench.reboot(1)
+    with pytest.raises(ControllerRestartedError, match="the controller has restarted"):
+        controller.next_snapshot()
+
+
+def test_every_tick_can_be_asked_for(controller: Controller) -> None:
+    tick = controller.next_snapshot().tick
+    for _ in range(5):
+        later = controller.next_snapshot(tick).tick
+        assert tick < later <= tick + 3
+        tick = later
+
+
+def test_a_clock_that_stands_still_is_not_believed(controller: Controller, bench: VirtualBench) -> None:
+    block = bench.bench.receive(encode(ask.sync_read((1, 2), 64, 72)))
+    bench.saying = lambda _data: block
+    first = controller.next_snapshot()
+    with pytest.raises(NoSampleError, match="the controller's clock stands still at"):
+        controller.next_snapshot(first.tick + 19)
+
+
+def test_a_set_point_beyond_a_servos_own_limits_is_refused_before_it_is_sent(bench: VirtualBench) -> None:
+    limited = VirtualBench(Options(torque=False))
+    limited.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (1000).to_bytes(4, "little"))
+    controller = limited.controller()
+    controller.release()
+    with pytest.raises(ProtocolError, match="joint 2: set point of 900 counts: servo 2 itself allows 1000 to 4095"):
+        controller.set_points({2: 900})
+    assert controller.next_snapshot()[2].set_point > 1000
+
+
+def test_a_servo_in_another_mode_is_not_driven() -> None:
+    bench = VirtualBench(Options(torque=False))
+    bench.bench.servos[1].write(Table.OPERATING_MODE.address, b"\1")
+    with pytest.raises(RequestRefusedError, match=r"servo 2 is in operating mode 1, position control \(3\) is needed"):
+        bench.controller()
+
+
+def test_what_servos_do_not_have_is_refused_in_one_line(controller: Controller) -> None:
+    with pytest.raises(
+        ProtocolError, match="SetGripper: Dynamixel servos are only read, moved, stopped and released from here"
+    ):
+        controller.set_gripper(closed=True)
+
+
+def test_lost_and_damaged_packets_are_made_good_by_asking_again(controller: Controller, bench: VirtualBench) -> None:
+    turn = iter(range(10**6))
+    bench.hearing = lambda data: b"" if next(turn) % 7 == 3 else data
+    bench.saying = lambda data: data[:-3] if next(turn) % 9 == 4 else data
+    tick = controller.next_snapshot().tick
+    for step in range(40):
+        snapshot = controller.next_snapshot(tick + 19, set_points={1: 2060 + step})
+        tick = snapshot.tick
+        assert snapshot.set_points[1] == 2060 + step
+    assert controller.stop().acknowledged
+    assert controller.counters.retries > 0
+
+
+def test_an_adapter_that_returns_our_own_bytes_disturbs_nothing(controller: Controller, bench: VirtualBench) -> None:
+    own: list[bytes] = []
+    bench.hearing = lambda data: own.append(data) or data  # type: ignore[func-returns-value]
+    bench.saying = lambda data: own.pop() + data
+    controller.set_points({1: 2100})
+    assert controller.next_snapshot().set_points[1] == 2100

@@ -1,0 +1,46 @@
+"""What models make of the records of a bench of servos. The bench's plant shares no code with them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.experiment import ExperimentSpec, Multisine
+from daq.contracts.trace import Trace
+from mock_controller.servos.bench import Options
+from model.arrays import Floats
+from model.machine_model.model import Model, base_model
+from model.simulation.inputs import inputs_of
+from model.simulation.simulate import simulate
+from tests.daq.servo_bench import pan_tilt, recorded
+
+COUNT = math.tau / 4096
+
+
+def motion(seed: int, duration: float = 8.0, share: float = 1.0) -> ExperimentSpec:
+    amplitude: dict[int, float] = {1: 0.3 * share, 2: 0.2 * share}
+    trajectory = Multisine(amplitude=amplitude, duration=duration, lowest=0.2, highest=1.5, tones=8, seed=seed)
+    return ExperimentSpec(trajectory=trajectory, joints=(1, 2), settle=0.3, hold=0.3)
+
+
+def left(model: Model, trace: Trace) -> Floats:
+    """Rms distance (counts) of the simulated positions from the recorded ones, by joint."""
+    simulation = simulate(model, trace)
+    apart = (simulation.at_samples(simulation.position) - trace.position) / COUNT
+    return np.asarray(np.sqrt(np.mean(apart**2, axis=0)))
+
+
+def test_a_record_is_an_input_for_each_tick_of_the_servos_loop(tmp_path: Path) -> None:
+    trace = recorded(Options(torque=True), motion(1, 0.5, 0.1), tmp_path)
+    inputs = inputs_of(trace, pan_tilt())
+    assert inputs.period == 0.001
+    assert len(inputs) == 20 * (len(trace) - 1) + 1
+    assert not inputs.drive_of_every_period
+
+
+@pytest.mark.slow
+def test_the_model_with_the_numbers_of_the_data_sheet_comes_within_a_degree(tmp_path: Path) -> None:
+    assert left(base_model(pan_tilt()), recorded(Options(torque=True), motion(1), tmp_path)).max() < 10
