@@ -99,8 +99,11 @@ def import_bag(
     )
     numbers, record = _numbers(names, machine), trace.record
     spoken = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
+    signals = (trace.time, trace.position, trace.velocity, trace.drive)
     identity = trace_id_of(
-        found_topic.encode(), " ".join(names).encode(), trace.time.tobytes(), trace.position.tobytes(), *described
+        *(text.encode() for text in (found_topic, " ".join(names), record.created.isoformat())),
+        *(b"" if signal is None else signal.tobytes() for signal in signals),
+        *described,
     )
     notes = f"{record.notes} From topic {found_topic}, joints {spoken}.".strip()
     record = record.model_copy(update={"trace_id": identity, "notes": notes})

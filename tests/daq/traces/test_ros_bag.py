@@ -80,6 +80,13 @@ def test_joint_states_of_every_kind_of_bag_become_a_trace(tmp_path: Path, kind: 
     assert import_bag(tmp_path / name).record.trace_id == trace.record.trace_id
 
 
+def test_bags_that_differ_in_date_velocity_or_effort_alone_are_different_traces(tmp_path: Path) -> None:
+    later = {"stamp": START + 3600 * NS}
+    changes: list[dict[str, Any]] = [{}, later, {"effort": [1.0, 3.0]}, {"effort": []}, {"velocity": [0.0, 1.0]}]
+    traces = [import_bag(bag(tmp_path / str(number), [change])) for number, change in enumerate(changes)]
+    assert len({trace.record.trace_id for trace in traces}) == len(changes)
+
+
 def test_a_file_of_a_bag_is_read_without_its_folder(tmp_path: Path) -> None:
     for kind, suffix in (("mcap", ".mcap"), ("sqlite3", ".db3")):
         (file,) = bag(tmp_path / kind, [{}] * 3, kind).glob(f"*{suffix}")
