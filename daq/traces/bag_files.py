@@ -18,6 +18,8 @@ from daq.traces.scan import HEAD, UNREADABLE, require
 METADATA = "metadata.yaml"
 STORAGES = (".mcap", ".db3", ".bag")
 COMPRESSED = ".zstd"
+_FRAMES = (0xFD2FB528, *range(0x184D2A50, 0x184D2A60))
+"""First four bytes, little-endian, of what zstd uncompresses: a frame of data, or one that it skips (RFC 8878)."""
 _PIECE = 1 << 20
 
 
@@ -34,8 +36,8 @@ def check_files(path: Path, limits: TraceLimits) -> None:
     try:
         files = sorted(path.iterdir()) if path.is_dir() else [path]
         total = 0
-        for file in files:
-            if file.name == METADATA or file.suffix in (*STORAGES, COMPRESSED):
+        for file in files:  # of any name: metadata.yaml chooses which are read
+            if not file.is_dir():
                 total += _check_file(file, limits)
                 if total > limits.file_bytes:
                     raise TraceError(f"{path}: has more than {limits.file_bytes} bytes (traces.limits.file_bytes)")
@@ -52,7 +54,9 @@ def _check_file(file: Path, limits: TraceLimits) -> int:
             raise TraceError(f"{file}: {line}")
         if size > limits.file_bytes:
             raise TraceError(f"{file}: has {size} bytes; up to {limits.file_bytes} are read (traces.limits.file_bytes)")
-        if file.suffix == COMPRESSED:
+        first = int.from_bytes(stream.read(4), "little")
+        stream.seek(0)
+        if file.suffix == COMPRESSED or first in _FRAMES:
             return _size_uncompressed(file, limits)
         if file.suffix == ".mcap":
             if is_trace(file, limits):
@@ -63,8 +67,12 @@ def _check_file(file: Path, limits: TraceLimits) -> int:
 
 def _size_uncompressed(file: Path, limits: TraceLimits) -> int:
     count = 0
+    decompressor = zstandard.ZstdDecompressor()
     try:
-        with disk.open_regular(file) as stream, zstandard.ZstdDecompressor().stream_reader(stream) as plain:
+        with (
+            disk.open_regular(file) as stream,
+            decompressor.stream_reader(stream, read_across_frames=True) as plain,
+        ):
             while piece := plain.read(_PIECE):
                 count += len(piece)
                 if count > limits.file_bytes:

@@ -1,10 +1,12 @@
 """Bags that rosbags writes are imported; what is wrong with one is told in one line."""
 
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -143,6 +145,19 @@ def test_what_is_wrong_in_a_bag_is_told_in_one_line(
     with pytest.raises(TraceError, match=complaint) as told:
         import_bag(path, **choice)
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["x.bin", "x.db3", "x.zstd"])
+def test_files_of_any_name_are_uncompressed_within_the_limit(tmp_path: Path, name: str) -> None:
+    path = bag(tmp_path / "a", [{}])
+    for frame in (b"", (0x184D2A50).to_bytes(4, "little") + bytes(4)):
+        (path / name).write_bytes(frame + zstandard.compress(b"small") + zstandard.compress(bytes(1 << 20)))
+        with pytest.raises(TraceError, match=f"{name}: has more than 1000000 bytes uncompressed"):
+            import_bag(path, TraceLimits(file_bytes=1_000_000))
+    (path / name).unlink()
+    os.mkfifo(path / name)
+    with pytest.raises(TraceError, match="cannot be read: it is no file"):
+        import_bag(path)
 
 
 def test_files_that_are_no_bag_are_told_in_one_line(tmp_path: Path) -> None:
