@@ -82,6 +82,7 @@ def import_bag(
         joints: names of the joints to take, in the order of the trace's joints; messages without them are left out.
         times: `received` takes the times at which messages were received, in place of those in the messages.
 
+    Nothing here limits the memory that rosbags takes: `daq.traces.bag_process` does, for the bags of strangers.
     Raises TraceError with one line for anything that is no bag, holds no joint states, or contradicts itself, and
     MissingExtraError where rosbags is not installed.
     """
@@ -119,7 +120,7 @@ def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, li
             reader, ros_1 = _opened(path, stack)
             connections = _connections(path, reader, topic)
             return connections[0].topic, list(_decoded(path, reader, connections, limits, ros_1))
-    except TraceError:
+    except (TraceError, MemoryError):
         raise
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {error.strerror or error}") from error
@@ -169,6 +170,8 @@ def _decoded(
             raise TraceError(f"{origin}: has {len(raw)} bytes; joint states have up to {LARGEST_MESSAGE}")
         try:
             message: Any = decode(raw, JOINT_STATE)
+        except MemoryError:
+            raise
         except Exception as error:
             raise TraceError(f"{origin}: is no {JOINT_STATE}") from error
         state = _State(

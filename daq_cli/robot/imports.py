@@ -16,12 +16,13 @@ from daq_cli.robot.answers import BagChoice
 def foreign_trace(file: Path, limits: TraceLimits, choice: BagChoice) -> Trace:
     """The trace in a CSV file or a bag. Raises SpecError, TraceError, MissingExtraError."""
     from daq.traces.bag_files import is_bag
+    from daq.traces.bag_process import import_bag_apart
     from daq.traces.csv_table import import_csv
-    from daq.traces.ros_bag import Times, import_bag
+    from daq.traces.ros_bag import Times
 
     if is_bag(file):
         times: Times | None = "received" if choice.received else None
-        return import_bag(file, limits, topic=choice.topic, joints=choice.joints, times=times)
+        return import_bag_apart(file, limits, topic=choice.topic, joints=choice.joints, times=times)
     if choice != BagChoice():
         raise SpecError(f"{file}: --topic, --joints and --received are for bags; this is none")
     return import_csv(file, limits)

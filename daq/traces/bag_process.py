@@ -1,0 +1,120 @@
+"""Imports a bag in a process of its own with limited memory, because rosbags uncompresses whatever a bag asks it to."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import resource
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from daq.contracts.errors import DaqError, TraceError
+from daq.contracts.extras import require_extra
+from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.traces.ros_bag import Times, import_bag
+
+SPARE = 64 << 20
+"""Memory (bytes) beside that for files and messages: rosbags takes it for its definitions of types."""
+REFUSED = 2
+EXHAUSTED = 3
+_SIGNALS = ("time", "position", "velocity", "drive")
+_UNLIMITED = 1 << 62
+
+
+def import_bag_apart(
+    path: Path,
+    limits: TraceLimits = DEFAULT_TRACE_LIMITS,
+    *,
+    topic: str | None = None,
+    joints: tuple[str, ...] | None = None,
+    times: Times | None = None,
+) -> Trace:
+    """What `import_bag` returns, made in another process, which may use no more memory than `memory_of` says.
+
+    Each file that it writes is limited too, and lies in a folder of its own that is removed in any case.
+    Raises TraceError, also where the memory does not suffice, and MissingExtraError.
+    """
+    require_extra("ros", f"{path}: reading a bag", "rosbags")
+    order = {"path": str(path), "limits": limits.model_dump(), "topic": topic, "joints": joints, "times": times}
+    with TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", "daq.traces.bag_process"],
+            input=json.dumps(order).encode(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | {"TMPDIR": folder},
+            check=False,
+        )
+    if done.returncode == REFUSED:
+        raise TraceError(done.stdout.decode("utf-8", "surrogateescape"))
+    if done.returncode == EXHAUSTED:
+        line = f"needs more than {memory_of(limits) >> 20} MiB of memory"
+        raise TraceError(f"{path}: {line} (traces.limits.file_bytes and total_bytes)")
+    if done.returncode:
+        raise TraceError(f"{path}: cannot be read as a bag (its process ended with code {done.returncode})")
+    return _unpacked(done.stdout)
+
+
+def memory_of(limits: TraceLimits) -> int:
+    """Memory (bytes) for a bag: a file as a whole, and as much for what it holds as all chunks of a file may have."""
+    return SPARE + limits.file_bytes + limits.total_bytes
+
+
+def main() -> int:
+    """Reads one order, and writes the trace or one line of error."""
+    order = json.loads(sys.stdin.buffer.read())
+    limits = TraceLimits(**order["limits"])
+    from rosbags import rosbag1, rosbag2  # noqa: F401 - what loading takes is not the bag's memory
+
+    _limit(resource.RLIMIT_DATA, _own_memory() + memory_of(limits))
+    _limit(resource.RLIMIT_FSIZE, limits.file_bytes)
+    _limit(resource.RLIMIT_CORE, 0)
+    joints = None if order["joints"] is None else tuple(order["joints"])
+    try:
+        trace = import_bag(Path(order["path"]), limits, topic=order["topic"], joints=joints, times=order["times"])
+        sys.stdout.buffer.write(_packed(trace))
+    except DaqError as error:
+        sys.stdout.buffer.write(str(error).encode("utf-8", "surrogateescape"))
+        return REFUSED
+    except MemoryError:
+        return EXHAUSTED
+    return 0
+
+
+def _limit(kind: int, most: int) -> None:
+    _, hard = resource.getrlimit(kind)
+    most = min(most, _UNLIMITED if hard == resource.RLIM_INFINITY else hard)
+    resource.setrlimit(kind, (most, most))
+
+
+def _own_memory() -> int:
+    """The bytes of this process that RLIMIT_DATA counts; 0 where the system does not say."""
+    with suppress(OSError, ValueError, IndexError):
+        return int(Path("/proc/self/statm").read_text("ascii").split()[5]) * resource.getpagesize()
+    return 0
+
+
+def _packed(trace: Trace) -> bytes:
+    signals = {name: getattr(trace, name) for name in _SIGNALS if getattr(trace, name) is not None}
+    record = np.frombuffer(trace.record.model_dump_json().encode(), np.uint8)
+    file = io.BytesIO()
+    np.savez(file, record=record, joints=np.array(trace.joints), **signals)
+    return file.getvalue()
+
+
+def _unpacked(data: bytes) -> Trace:
+    with np.load(io.BytesIO(data), allow_pickle=False) as found:
+        record = TraceRecord.model_validate_json(found["record"].tobytes())
+        signals = {name: found[name] for name in _SIGNALS if name in found}
+        return Trace(record, tuple(found["joints"].tolist()), **signals)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
