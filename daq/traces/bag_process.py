@@ -18,12 +18,12 @@ from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.extras import require_extra
 from daq.contracts.trace import Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces.ros_bag import Times, import_bag
+from daq.traces.ros_bag import NO_MEMORY, Times, import_bag
 
 SPARE = 64 << 20
 """Memory (bytes) beside that for files and messages: rosbags takes it for its definitions of types."""
 REFUSED = 2
-EXHAUSTED = 3
+"""Exit code of a process that answers with an error instead of a trace."""
 _SIGNALS = ("time", "position", "velocity", "drive")
 _UNLIMITED = 1 << 62
 
@@ -54,9 +54,6 @@ def import_bag_apart(
         )
     if done.returncode == REFUSED:
         raise TraceError(done.stdout.decode("utf-8", "surrogateescape"))
-    if done.returncode == EXHAUSTED:
-        line = f"needs more than {memory_of(limits) >> 20} MiB of memory"
-        raise TraceError(f"{path}: {line} (traces.limits.file_bytes and total_bytes)")
     if done.returncode:
         raise TraceError(f"{path}: cannot be read as a bag (its process ended with code {done.returncode})")
     return _unpacked(done.stdout)
@@ -77,15 +74,16 @@ def main() -> int:
     _limit(resource.RLIMIT_FSIZE, limits.file_bytes)
     _limit(resource.RLIMIT_CORE, 0)
     joints = None if order["joints"] is None else tuple(order["joints"])
+    code = REFUSED
     try:
         trace = import_bag(Path(order["path"]), limits, topic=order["topic"], joints=joints, times=order["times"])
-        sys.stdout.buffer.write(_packed(trace))
+        answer, code = _packed(trace), 0
     except DaqError as error:
-        sys.stdout.buffer.write(str(error).encode("utf-8", "surrogateescape"))
-        return REFUSED
+        answer = str(error).encode("utf-8", "surrogateescape")
     except MemoryError:
-        return EXHAUSTED
-    return 0
+        answer = f"{order['path']}: {NO_MEMORY}".encode("utf-8", "surrogateescape")
+    sys.stdout.buffer.write(answer)
+    return code
 
 
 def _limit(kind: int, most: int) -> None:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 JOINT_STATE = "sensor_msgs/msg/JointState"
 LARGEST_MESSAGE = 1 << 20
 """Largest message (bytes) of joint states: that of some ten thousand joints."""
+NO_MEMORY = "is damaged, or needs more memory than it may use (traces.limits.file_bytes and total_bytes)"
 SHOWN = 8
 """Number of names that an error lists."""
 
@@ -120,8 +121,10 @@ def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, li
             reader, ros_1 = _opened(path, stack)
             connections = _connections(path, reader, topic)
             return connections[0].topic, list(_decoded(path, reader, connections, limits, ros_1))
-    except (TraceError, MemoryError):
+    except TraceError:
         raise
+    except MemoryError as error:
+        raise TraceError(f"{path}: {NO_MEMORY}") from error
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {error.strerror or error}") from error
     except Exception as error:  # a damaged bag makes rosbags and what it uses raise anything

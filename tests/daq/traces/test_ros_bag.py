@@ -169,7 +169,7 @@ def test_files_that_are_no_bag_are_told_in_one_line(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"nonsense")
     for path, complaint in [
         (trace, "is a trace already"),
-        (damaged, "cannot be read as a bag"),
+        (damaged, "is damaged, or needs more memory"),  # "nonsense" is the length of a record
         (tmp_path / "x.db3", "cannot be read as a bag"),
         (tmp_path / "x.bag", "cannot be read as a bag"),
         (tmp_path / "absent.db3", "cannot be read"),
