@@ -13,10 +13,11 @@ from daq.contracts.consent import require_word
 from daq.contracts.documents import read_text
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Progress as ToldProgress
 from daq.contracts.progress import silent
-from daq.contracts.trace import Outcome, Trace
+from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
 from daq.trajectories.presets import preset
 from daq.transport import parse_port_url

@@ -9,9 +9,10 @@ from pydantic import Field, StrictBool, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.frozen import FrozenRecord
+from daq.contracts.labels import Outcome
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Outcome, TraceEvent
+from daq.contracts.trace import TraceEvent
 
 
 class Job(FrozenRecord):

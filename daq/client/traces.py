@@ -9,9 +9,9 @@ from pathlib import Path
 from daq.client.connection import PART, Connection, Request
 from daq.client.errors import ServiceError
 from daq.contracts.errors import TraceError
+from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.teaching import MeasuredGain
-from daq.contracts.service.traces import CatalogueEntry, Source, TraceChange, TraceDetails, TraceSignals
-from daq.contracts.trace import Outcome
+from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 
 LAST = "last"
 """Name of the newest trace, in place of its number."""

@@ -14,6 +14,7 @@ from daq.contracts import tables
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, ReportedGain
 from daq.contracts.frozen import FrozenRecord
+from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine
 from daq.contracts.sketch import html_of
 
@@ -28,7 +29,6 @@ TRACE_FORMAT = 2
 """Version of the trace's metadata and topics; a reader refuses newer ones. Format 1 had events and joint states in
 JSON."""
 
-Outcome = Literal["complete", "stopped", "fault", "interrupted"]
 EventKind = Literal[
     "start",
     "ramp_start",

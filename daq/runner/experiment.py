@@ -12,9 +12,10 @@ from pathlib import Path
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.labels import Outcome
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.trace import SLOW_LINE, Outcome, TraceRecord
+from daq.contracts.trace import SLOW_LINE, TraceRecord
 from daq.driver import Controller, GainsNotTakenError
 from daq.link import LinkError
 from daq.runner.arm_control import ArmControl, StoppedError

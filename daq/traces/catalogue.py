@@ -9,7 +9,8 @@ from typing import Literal
 
 from daq.contracts.errors import TraceError
 from daq.contracts.frozen import FrozenRecord
-from daq.contracts.trace import Outcome, TraceRecord
+from daq.contracts.labels import Outcome
+from daq.contracts.trace import TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.ends import Texts, first_metadata, indexed_metadata

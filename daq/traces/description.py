@@ -12,8 +12,9 @@ from pydantic import Field, ValidationError
 from daq.contracts.documents import parse_toml, shown
 from daq.contracts.errors import DaqError, SpecError, TraceError
 from daq.contracts.frozen import FrozenRecord
+from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine, shipped_machines
-from daq.contracts.trace import Moment, Outcome, TraceRecord
+from daq.contracts.trace import Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
 from daq.traces.recording import software

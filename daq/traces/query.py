@@ -8,7 +8,7 @@ from typing import get_args
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
-from daq.contracts.trace import Outcome
+from daq.contracts.labels import Outcome
 from daq.traces.catalogue import TraceSummary
 
 TERMS = ("kind", "source", "outcome", "robot", "since", "until")

@@ -9,9 +9,10 @@ from typing import IO
 from mcap.writer import CompressionType, Writer
 
 from daq.contracts.errors import TraceError
+from daq.contracts.labels import Outcome
 from daq.contracts.machine import joint_names
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import TRACE_FORMAT, Outcome, TraceEvent, TraceRecord
+from daq.contracts.trace import TRACE_FORMAT, TraceEvent, TraceRecord
 from daq.traces import cdr, layout, set_points_taken
 from daq.traces.cdr import JointStates
 from daq.traces.scan import Scan

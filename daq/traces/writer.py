@@ -13,8 +13,9 @@ from types import TracebackType
 from typing import Self
 
 from daq.contracts.errors import TraceError
+from daq.contracts.labels import Outcome
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
+from daq.contracts.trace import TraceEvent, TraceRecord
 from daq.traces import disk
 from daq.traces.layout import RECORDED_SIGNALS, SLOW_LINE_SIGNALS
 from daq.traces.naming import part_path

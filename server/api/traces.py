@@ -10,15 +10,9 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
+from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Moment, Page
-from daq.contracts.service.traces import (
-    CatalogueEntry,
-    Source,
-    TraceChange,
-    TraceDetails,
-    TraceSignals,
-)
-from daq.contracts.trace import Outcome
+from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
 from daq.traces.summary import joint_figures

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from daq.contracts import exit_codes
-from daq.contracts.trace import Outcome
+from daq.contracts.labels import Outcome
 from server.experiments.states import Event
 from server.owner.messages import Answer
 

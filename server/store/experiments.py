@@ -11,9 +11,9 @@ from sqlalchemy import func, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
-from daq.contracts.trace import Outcome
 from daq.traces.naming import new_trace_id
 from server.experiments.order import Waiting
 from server.experiments.states import Event, IllegalEventError, advance, after_restart

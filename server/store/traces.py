@@ -9,9 +9,9 @@ from datetime import datetime
 from sqlalchemy import delete, select, text, tuple_, update
 from sqlalchemy.orm import Session
 
+from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Page
-from daq.contracts.service.traces import CatalogueEntry, Source, TraceChange
-from daq.contracts.trace import Outcome
+from daq.contracts.service.traces import CatalogueEntry, TraceChange
 from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label

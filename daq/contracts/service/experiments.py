@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 from pydantic import AwareDatetime, Field, StrictBool
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Moment, Wire
-from daq.contracts.trace import EventKind, Outcome
+from daq.contracts.trace import EventKind
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
 """`done`: the plan was carried out completely. `failed`: refused, or ended by a safety check. `cancelled`: by somebody,

@@ -7,9 +7,8 @@ from typing import Annotated, Literal, Self
 from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool, model_validator
 
 from daq.contracts.experiment import JointNumber
+from daq.contracts.labels import Outcome, Source, Tag
 from daq.contracts.service.base import Moment, Wire
-from daq.contracts.service.traces import Source, Tag
-from daq.contracts.trace import Outcome
 
 JobKind = Literal["fit", "validate", "compare", "diagnose", "batch"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import AwareDatetime, Field
 
 from daq.contracts.figures import JointFigureSet
+from daq.contracts.labels import Outcome, Source, Tag
 from daq.contracts.service.base import Wire
-from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
-
-Tag = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.:-]{0,39}$")]
-Source = Literal["mock", "real", "imported"]
+from daq.contracts.trace import TraceEvent, TraceRecord
 
 
 class CatalogueEntry(Wire):

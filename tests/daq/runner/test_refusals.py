@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
@@ -16,6 +16,7 @@ from daq.contracts.machine import Machine
 from daq.driver import Controller
 from daq.runner import Consent, MissingConsentError
 from daq.runner.preparation import recorded_joints
+from firmware_protocol.scale import LineScale
 from tests.daq.runner.rig import SHORT, Rig
 
 OTHER_GAINS = SHORT.model_copy(update={"gains": {1: (9, 9, 9)}})
@@ -103,6 +104,8 @@ class Line:
 
     bytes_per_second: float
     period_s: float = 0.02
+    scale: LineScale = field(default_factory=LineScale)
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
 
     @property
     def link(self) -> Line:

@@ -9,7 +9,8 @@ import pytest
 from mcap.writer import Writer
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace import Outcome, TraceEvent
+from daq.contracts.labels import Outcome
+from daq.contracts.trace import TraceEvent
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage
 from daq.traces.store import write_trace

@@ -13,10 +13,10 @@ from typing import Any
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.labels import Outcome
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
 from daq.contracts.service.robot import RobotIdentity
-from daq.contracts.trace import Outcome
 from server.owner.messages import Answer, ArmReport, Finished
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
