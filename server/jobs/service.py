@@ -19,11 +19,12 @@ from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, F
 from daq.executors import Workers, open_workers
 from daq.executors.address import LOCAL
 from daq.executors.local import LocalWorkers
+from server.batches.folder import ASKED
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
 from server.jobs.lanes import BATCH_LANE_WORKERS, LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
-from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
+from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.work import Ended, Task, carry_out
 from server.jobs.yielding import begin_worker
@@ -320,13 +321,21 @@ class JobService:
         raise ProblemError(422, "batch-size", f"filter: finds {said}", f"a batch has 1 to {MOST_OF_A_BATCH} traces")
 
     def _folder_to_continue(self, request: JobRequest) -> Path | None:
-        """Returns the folder of the batch that another one continues. Raises a 404, and a 409 if it has not ended."""
+        """Returns the folder of the batch that another one continues; of one that never began, the folder of the batch
+        that it continued itself, or None. Raises a 404, and a 409 if it has not ended."""
         if not isinstance(request, BatchRequest) or request.continues is None:
             return None
         before = self._context.jobs.get(self._context.robot, request.continues)
         if before.state in ("queued", "running"):
             line = f"{job_label(before.request.kind, before.submitted)} is {before.state}"
             raise conflict("job-state", line, "continue it when it has ended")
+        while isinstance(before.request, BatchRequest) and not (self._folder(before.id) / BATCH / ASKED).is_file():
+            if before.request.continues is None:
+                return None
+            try:
+                before = self._context.jobs.get(self._context.robot, before.request.continues)
+            except ProblemError:  # it has been deleted
+                return None
         return self._folder(before.id)
 
     def _keep_model(self, identity: str) -> str:

@@ -421,8 +421,33 @@ def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench)
         bench.service.submit(further, "anna", None)
     assert (refused.value.status, refused.value.kind) == (409, "job-state")
     bench.service.cancel(first.id, "anna")
+    begun = bench.folder / first.id / "batch" / "batch.json"
+    begun.parent.mkdir()
+    begun.touch()
     second, _new = bench.service.submit(further, "anna", None)
-    assert Mailbox(bench.folder / second.id).read("request.json")["continues"] == str(bench.folder / first.id)
+    assert _continues(bench, second) == str(bench.folder / first.id)
+
+
+def _continues(bench: Bench, job: Job) -> str | None:
+    found: str | None = Mailbox(bench.folder / job.id).read("request.json")["continues"]
+    return found
+
+
+def test_a_batch_that_never_began_is_continued_where_the_one_before_it_ended(bench: Bench) -> None:
+    def cancelled(before: Job | None) -> Job:
+        request = BatchRequest(study=SimulateStudy(), traces=(TRACE,), continues=before and before.id)
+        job, _new = bench.service.submit(request, "anna", None)
+        return bench.service.cancel(job.id, "anna")
+
+    first = cancelled(None)
+    second = cancelled(first)
+    assert _continues(bench, second) is None
+    (bench.folder / first.id / "batch").mkdir()
+    (bench.folder / first.id / "batch" / "batch.json").touch()
+    third = cancelled(second)
+    assert _continues(bench, third) == str(bench.folder / first.id)
+    bench.service.remove(first.id)
+    assert _continues(bench, cancelled(third)) is None
 
 
 def test_an_executor_that_is_not_reached_is_the_reason_of_a_job(bench: Bench) -> None:
