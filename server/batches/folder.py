@@ -176,20 +176,30 @@ _WORDS = {
 
 def _read_rows(file: Path) -> dict[str, Row]:
     """The rows of the file. A line that a crash cut short is taken out: its trace is studied again."""
-    if not file.exists():
-        return {}
     found: dict[str, Row] = {}
-    text = read_text(file, str(file))
-    whole, _, cut = text.rpartition("\n")
-    if cut:
-        os.truncate(file, len(text.encode()) - len(cut.encode()))
-    for line in whole.splitlines():
+    for line in _whole_lines(file):
         try:
-            row = Row.model_validate_json(line)
+            row = Row.model_validate_json(line.decode("utf-8"))
+        except UnicodeDecodeError as error:
+            raise SpecError(f"{file}: a line is not UTF-8 text") from error
         except ValidationError as error:
             raise SpecError(f"{file}: a line is no row of a batch: {first_invalid(error).message}") from error
         found[row.key] = row
     return found
+
+
+def _whole_lines(file: Path) -> list[bytes]:
+    try:
+        content = file.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            os.truncate(file, whole)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from error
+    # A row may hold other characters at which text is split into lines, such as U+2028.
+    return content[:whole].split(b"\n")[:-1]
 
 
 def take_over(former: Path, path: Path, keys: Collection[str]) -> None:

@@ -23,7 +23,7 @@ from model.simulation.simulate import simulate
 from server.batches.choice import chosen_traces
 from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
 from server.batches.run import Chosen, Standing, run_batch
-from server.batches.study import Common
+from server.batches.study import Answer, Common
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.server.batches.traces import MACHINE, folder_of_traces, number
 
@@ -105,6 +105,21 @@ def test_a_line_that_a_crash_cut_short_is_studied_again(tmp_path: Path, traces: 
     rows = out / "rows.jsonl"
     rows.write_bytes(rows.read_bytes()[:-40])
     assert (run(out, traces).done, len(rows.read_text("utf-8").splitlines())) == (1, 3)
+
+
+def test_rows_are_read_whatever_characters_they_hold_and_wherever_a_crash_cut_them(tmp_path: Path) -> None:
+    strange = "run \u2028 \u2029 \u0085 \x0b 20 °C"
+    with opened(tmp_path, asked_of(COMMON)) as folder:
+        folder.add(Answer(key="first"), {"name": strange})
+    with (tmp_path / "rows.jsonl").open("ab") as rows:
+        rows.write('{"key": "20 °'.encode()[:-1])
+    for _ in range(2):
+        with opened(tmp_path, asked_of(COMMON)) as folder:
+            assert [row.about for row in folder.rows] == [{"name": strange}]
+    with (tmp_path / "rows.jsonl").open("ab") as rows:
+        rows.write(b"\xff\n")
+    with pytest.raises(SpecError, match="a line is not UTF-8"), opened(tmp_path, asked_of(COMMON)):
+        pass
 
 
 def test_a_fault_of_the_program_fails_one_trace_and_no_other(tmp_path: Path, traces: Path) -> None:
