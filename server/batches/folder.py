@@ -5,7 +5,6 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from hashlib import sha256
@@ -20,6 +19,7 @@ from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.jobs import Study
 from daq.executors.program import program_here
+from daq.traces.disk import rename
 from firmware_protocol.invalid import first_invalid
 from server.batches.columns import Columns
 from server.batches.study import Answer, Common
@@ -80,7 +80,8 @@ class BatchFolder:
         return row is not None and not row.problem
 
     def add(self, answer: Answer, about: Columns) -> Row:
-        """Keeps the answer about a trace, and waits until it is on the disk. Raises SpecError."""
+        """Keeps the answer about a trace, and waits until it is on the disk: the whole answer before the row that says
+        that there is one. Raises SpecError."""
         row = Row(
             key=answer.key,
             problem=answer.problem,
@@ -91,10 +92,7 @@ class BatchFolder:
         )
         try:
             if answer.text:
-                file = self.answer_file(answer.key)
-                part = file.with_name(f".{file.name}.part")
-                part.write_text(answer.text + "\n", "utf-8")
-                part.replace(file)
+                _write(self.answer_file(answer.key), answer.text + "\n")
             with (self.path / ROWS).open("a", encoding="utf-8") as lines:
                 lines.write(row.model_dump_json() + "\n")
                 lines.flush()
@@ -135,6 +133,7 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
     """
     try:
         (path / ANSWERS).mkdir(parents=True, exist_ok=True)
+        (path / ROWS).touch()
         lock = (path / _HIDDEN_LOCK).open("ab")
     except OSError as error:
         raise _unwritable(path, error) from error
@@ -150,9 +149,7 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
 def _require_same(file: Path, asked: Asked) -> None:
     if not file.exists():
         try:
-            part = file.with_suffix(".part")
-            part.write_text(asked.model_dump_json(indent=1) + "\n", "utf-8")
-            part.replace(file)
+            _write(file, asked.model_dump_json(indent=1) + "\n")
         except OSError as error:
             raise _unwritable(file.parent, error) from error
         return
@@ -203,19 +200,32 @@ def _whole_lines(file: Path) -> list[bytes]:
 
 
 def take_over(former: Path, path: Path, keys: Collection[str]) -> None:
-    """Copies what another batch has about these traces into a new folder. Raises SpecError."""
+    """Copies what another batch has about these traces into a new folder, which is a batch's when all is there.
+
+    Raises SpecError.
+    """
     if not (former / ASKED).is_file():
         raise SpecError("continues: is no batch that has begun")
     try:
         (path / ANSWERS).mkdir(parents=True)
-        shutil.copyfile(former / ASKED, path / ASKED)
         rows = [row for row in _read_rows(former / ROWS).values() if row.key in keys]
-        (path / ROWS).write_text("".join(row.model_dump_json() + "\n" for row in rows), "utf-8")
         for row in rows:
             if (answer := former / ANSWERS / f"{row.key}.json").is_file():
-                shutil.copyfile(answer, path / ANSWERS / answer.name)
+                _write(path / ANSWERS / answer.name, answer.read_text("utf-8"))
+        _write(path / ROWS, "".join(row.model_dump_json() + "\n" for row in rows))
+        _write(path / ASKED, (former / ASKED).read_text("utf-8"))
     except OSError as error:
         raise _unwritable(path, error) from error
+
+
+def _write(file: Path, text: str) -> None:
+    """Writes a file, completely or not at all, and waits until it and its name are on the disk."""
+    part = file.with_name(f".{file.name}.part")
+    with part.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    rename(part, file)
 
 
 def _digest(text: str) -> str:

@@ -21,7 +21,7 @@ from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.batches.choice import chosen_traces
-from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
+from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened, take_over
 from server.batches.run import Chosen, Standing, run_batch
 from server.batches.study import Answer, Common
 from tests.daq.executors.by_hand import WorkersByHand
@@ -105,6 +105,20 @@ def test_a_line_that_a_crash_cut_short_is_studied_again(tmp_path: Path, traces: 
     rows = out / "rows.jsonl"
     rows.write_bytes(rows.read_bytes()[:-40])
     assert (run(out, traces).done, len(rows.read_text("utf-8").splitlines())) == (1, 3)
+
+
+def test_what_another_batch_has_is_taken_over_for_the_traces_that_are_asked_for(tmp_path: Path) -> None:
+    former, new = tmp_path / "former", tmp_path / "new"
+    with opened(former, asked_of(COMMON)) as folder:
+        for key in ("first", "second"):
+            folder.add(Answer(key=key, text="{}"), {"name": key})
+    take_over(former, new, {"second", "third"})
+    with opened(new, asked_of(COMMON)) as folder:
+        assert [row.key for row in folder.rows] == ["second"]
+        assert folder.answer_file("second").read_text() == "{}\n"
+        assert not folder.answer_file("first").exists()
+    with pytest.raises(SpecError, match="is no batch that has begun"):
+        take_over(tmp_path, tmp_path / "other", {"first"})
 
 
 def test_rows_are_read_whatever_characters_they_hold_and_wherever_a_crash_cut_them(tmp_path: Path) -> None:
