@@ -36,12 +36,14 @@ class BatchInUseError(DaqError):
 
 
 class Asked(FrozenRecord):
-    """What all rows of the table share, and what a batch must ask again to go on. `model` and `effects` are hashes."""
+    """What all rows of the table share, and what a batch must ask again to go on. `model`, `machine` and `effects` are
+    hashes; `machine` is that of traces that name none, and None where a model has its own."""
 
     format: int = 1
     software: str
     study: Study
     model: str | None
+    machine: str | None = None
     effects: tuple[str, ...]
 
 
@@ -121,6 +123,7 @@ def asked_of(common: Common) -> Asked:
         software=str(program_here()),
         study=common.study,
         model=None if common.model is None else _digest(common.model),
+        machine=_digest(common.machine.model_dump_json()) if common.model is None else None,
         effects=tuple(_digest(read_text(file, f"effect file {file}")) for file in common.effect_files),
     )
 
@@ -167,6 +170,7 @@ _WORDS = {
     "software": "version of this program",
     "study": "study, or other options",
     "model": "model",
+    "machine": "machine for traces that name none",
     "effects": "effect file",
 }
 

@@ -160,6 +160,9 @@ def test_another_batch_does_not_go_on_in_the_folder(tmp_path: Path, traces: Path
     named = COMMON.model_copy(update={"model": base_model(MACHINE).model_dump_json()})
     with pytest.raises(SpecError, match="another model"):
         run(out, traces, common=named)
+    elsewhere = COMMON.model_copy(update={"machine": MACHINE.model_copy(update={"name": "another"})})
+    with pytest.raises(SpecError, match="another machine for traces that name none"):
+        run(out, traces, common=elsewhere)
     with opened(out, asked_of(COMMON)), pytest.raises(BatchInUseError, match="another batch computes into it"):
         run(out, traces)
 
