@@ -77,11 +77,12 @@ def run_at_service(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     if asked.executor != LOCAL:
         raise SpecError("--executor and --server: a service has an executor of its own; leave one of them out")
     load_effects(asked.effect_files, robot)
+    wanted = _filter(asked.traces)
     asked.out.mkdir(parents=True, exist_ok=True)
     before = asked.out / JOB
     request = BatchRequest(
         study=study,
-        filter=_filter(asked.traces),
+        filter=wanted,
         continues=before.read_text("ascii").strip() if before.is_file() else None,
     )
     model = None if asked.model is None else read_model(asked.model)
@@ -109,8 +110,10 @@ def _filter(text: str) -> TraceFilter:
         raise SpecError(f"{text}: is a folder of this computer; a service studies its own traces: write a query")
     if query.robot is not None:
         raise SpecError("query: robot: a service has the traces of its own robot; leave it out")
+    if len(query.words) > 1:
+        raise SpecError(f"query: {' '.join(query.words)}: a service looks for one word; leave the others out")
     known = query.model_dump(exclude={"words", "robot"}, exclude_none=True)
-    return TraceFilter.model_validate({"text": " ".join(query.words) or None, **known})
+    return TraceFilter.model_validate({"text": next(iter(query.words), None), **known})
 
 
 def _common(robot: RobotAccess, asked: Asked, study: Study) -> Common:

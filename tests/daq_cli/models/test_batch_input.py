@@ -31,6 +31,12 @@ def test_wrong_input_is_told_in_one_line_and_nothing_is_begun(daq: CommandLine, 
     assert not Path("o").exists()
 
 
+def test_a_service_looks_for_one_word(daq: CommandLine) -> None:
+    words = ("--server", "http://127.0.0.1:9", "batch", "simulate", "ramp slow", "--out", "o")
+    daq(*words).complains(2, "query: ramp slow: a service looks for one word")
+    assert not Path("o").exists()
+
+
 def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
     Path("traces").mkdir()
     Path("traces", "broken.mcap").write_text("no trace")
