@@ -37,6 +37,15 @@ def test_a_service_looks_for_one_word(daq: CommandLine) -> None:
     assert not Path("o").exists()
 
 
+def test_a_batch_goes_on_only_where_it_began(daq: CommandLine) -> None:
+    service = ("--server", "http://127.0.0.1:9")
+    for folder, file in (("here", "batch.json"), ("there", "job")):
+        Path(folder).mkdir()
+        Path(folder, file).touch()
+    daq(*service, "batch", "simulate", "ramp", "--out", "here").complains(2, "a batch that this computer computed")
+    daq("batch", "simulate", "here", "--out", "there").complains(2, "there: holds a batch of a service")
+
+
 def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
     Path("traces").mkdir()
     Path("traces", "broken.mcap").write_text("no trace")
