@@ -19,6 +19,8 @@ from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, F
 from daq.executors import Workers, open_workers
 from daq.executors.address import LOCAL
 from daq.executors.local import LocalWorkers
+from daq.executors.program import OtherVersionError
+from daq.executors.workers import BlamedError
 from server.batches.folder import ASKED
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
@@ -80,6 +82,7 @@ class JobService:
         self._closing = False
         self._executors: dict[Lane, Workers] = {}
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
+        self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
@@ -252,13 +255,22 @@ class JobService:
                 if executor is None:
                     url = self._context.executor if lane == "long" else LOCAL
                     executor = self._executors[lane] = self._context.make_executor(url, workers)
+                self._given_to[identity] = executor
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
-                del self._executors[lane]
+                self._give_up(identity, lane)
             except Exception as error:
                 log.exception("job %s: no worker takes it", identity)
                 return _failed(error)
         return _failed(BrokenExecutor())
+
+    def _give_up(self, identity: str, lane: Lane) -> None:
+        """Ends the executor that a job was lost with, unless another has taken its place already."""
+        executor = self._executors.get(lane)
+        if executor is not None and executor is self._given_to.get(identity):
+            del self._executors[lane]
+            # A scheduler that is gone is not waited for.
+            threading.Thread(target=executor.abandon, name="executor-end", daemon=True).start()
 
     def _collect(self) -> bool:
         """Records the end of finished jobs. A job whose end cannot be written delays no other. Returns whether any has
@@ -276,6 +288,7 @@ class JobService:
             except Exception:
                 log.exception("job %s: its end cannot be written", identity)
             del self._running[identity]
+            self._given_to.pop(identity, None)
             has_ended = True
         return has_ended
 
@@ -284,11 +297,13 @@ class JobService:
         event, reason, model, headline = Event.COMPLETED, "", None, ""
         try:
             ended = future.result()
-        except BrokenExecutor:
-            self._executors.pop(lane, None)
+        except BrokenExecutor as error:
+            if not isinstance(error, BlamedError):
+                self._give_up(identity, lane)
             event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
         except DaqError as error:  # of the executor: a job returns its own errors
-            self._executors.pop(lane, None)
+            if not isinstance(error, OtherVersionError):  # of one worker, beside which others work
+                self._give_up(identity, lane)
             event, reason = Event.LOST, str(error)
         except Exception as error:
             log.exception("job %s", identity)

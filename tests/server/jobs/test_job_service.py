@@ -26,6 +26,8 @@ from daq.contracts.service.jobs import (
 )
 from daq.contracts.trace_limits import TraceLimits
 from daq.executors import Workers
+from daq.executors.program import OtherVersionError
+from daq.executors.workers import BlamedError
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
@@ -370,6 +372,32 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
     assert next_short.id in made[2].futures
     assert bench.state_of(diagnosis) == "running"
     assert not made[0].futures[diagnosis.id].done()
+
+
+@pytest.mark.parametrize(
+    ("error", "given_up"),
+    [
+        (BrokenExecutor("killed"), True),
+        (ReachError("the scheduler is gone"), True),
+        (BlamedError("killed four workers"), False),
+        (OtherVersionError("worker a: has 0.0.9"), False),
+    ],
+)
+def test_an_executor_is_ended_when_it_is_lost_and_not_for_the_fault_of_one_job(
+    bench: Bench, error: Exception, given_up: bool
+) -> None:
+    held, ended = HeldExecutor(), threading.Event()
+    held.abandon = ended.set  # type: ignore[method-assign]
+    executors: list[Workers] = [held, bench.executor]
+    bench.make_executor = lambda _url, _count: executors.pop(0)
+    job = _submitted(bench)
+    bench.service.start()
+    _until(bench, lambda: job.id in held.futures)
+    held.futures[job.id].set_exception(error)
+    assert bench.end_of(job).failure == "lost"
+    assert ended.wait(5 if given_up else 0) is given_up
+    following = _submitted(bench)
+    _until(bench, lambda: following.id in (bench.executor.given if given_up else held.futures))
 
 
 @pytest.mark.parametrize(("models", "lane"), [(10, "short"), (11, "long")])
