@@ -329,6 +329,8 @@ class JobService:
         """Returns the traces that a batch's filter finds; None where there is none. Raises a 422."""
         if not isinstance(request, BatchRequest) or request.filter is None:
             return None
+        if request.traces:
+            raise ProblemError(422, "not-valid", "traces and filter: are both given", "leave one of them out")
         found = self._context.catalogue.find(request.filter, MOST_OF_A_BATCH + 1)
         if found and len(found) <= MOST_OF_A_BATCH:
             return found

@@ -439,6 +439,8 @@ def test_a_batch_has_the_traces_that_its_filter_finds_when_it_is_submitted(bench
         with pytest.raises(ProblemError) as refused:
             bench.service.submit(request.model_copy(update={"filter": nothing}), "anna", None)
         assert (refused.value.status, refused.value.kind) == (422, "batch-size")
+    with pytest.raises(ProblemError, match="traces and filter: are both given"):
+        bench.service.submit(request.model_copy(update={"traces": (TRACE,)}), "anna", None)
 
 
 def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench) -> None:
