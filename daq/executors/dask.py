@@ -101,7 +101,11 @@ def dask_workers(address: Address) -> DaskWorkers:
         scheme = "tls" if address.kind == "dask+tls" else "tcp"
         return connected(address.url, f"{scheme}://{address.place}")
     cluster = LocalCluster(
-        n_workers=address.workers or cores(), threads_per_worker=1, dashboard_address=None, processes=True
+        n_workers=address.workers or cores(),
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=None,
+        processes=True,
     )
     return connected(address.url, cluster.scheduler_address, cluster)
 
