@@ -36,6 +36,8 @@ from server.store.labels import job_label
 
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
+SCHEDULER_PATIENCE = 5.0
+"""Time (s) within which a scheduler must answer, and have a worker; no other job is begun or ended meanwhile."""
 MOST_OF_A_BATCH = 2000
 """Largest number of traces of a batch."""
 MOST_TOLD = 50
@@ -46,7 +48,7 @@ log = logging.getLogger("server.jobs")
 def job_workers(url: str, count: int) -> Workers:
     """Opens an executor for jobs; `count` is the number of processes where it is this computer. Raises SpecError,
     ReachError, OtherVersionError."""
-    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker)
+    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker, SCHEDULER_PATIENCE)
 
 
 def worker_processes(count: int) -> LocalWorkers:
