@@ -21,7 +21,7 @@ from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
-from daq.executors.address import parse_address
+from daq.executors.address import parse_service_address
 from daq.trajectories import control_period
 from server.access.lanes import Lanes
 from server.access.tickets import Tickets
@@ -102,7 +102,7 @@ class Services:
     def __init__(self, settings: Settings, clock: Clock | None = None) -> None:
         self.settings = settings
         self.clock = clock or SystemClock()
-        parse_address(settings.server.executor)
+        parse_service_address(settings.server.executor)
         self.store = Store(settings.server.database_url)
         self.store.migrate()
         self.store.require_sound()

@@ -82,6 +82,16 @@ def parse_address(url: str) -> Address:
     return found
 
 
+def parse_service_address(url: str) -> Address:
+    """Parses the URL of what computes for a service, which starts no scheduler: whoever reached its port could run any
+    program as the service, and waiting for Slurm would hold up other jobs. Raises SpecError as `parse_address` does."""
+    found = parse_address(url)
+    if found.kind == "slurm" or (found.kind == "dask" and not found.place):
+        line = f"executor {shown(url)}: a service starts no cluster; write local://, or a scheduler: dask://host:8786"
+        raise SpecError(line)
+    return found
+
+
 def _place(kind: Kind, written: str, head: str) -> str:
     if kind == "local":
         if written and not re.fullmatch(r"\d+", written, re.ASCII):

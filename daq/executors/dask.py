@@ -95,13 +95,17 @@ def _pass_on(future: Future[Any], given: Future[Any]) -> None:
         future.set_result(given.result())
 
 
-def dask_workers(address: Address) -> DaskWorkers:
+def dask_workers(address: Address, patience: float = PATIENCE) -> DaskWorkers:
     """Connects to a scheduler, or starts a cluster on this computer. Raises ReachError, OtherVersionError."""
     if address.place:
         scheme = "tls" if address.kind == "dask+tls" else "tcp"
-        return connected(address.url, f"{scheme}://{address.place}")
+        return connected(address.url, f"{scheme}://{address.place}", patience=patience)
     cluster = LocalCluster(
-        n_workers=address.workers or cores(), threads_per_worker=1, dashboard_address=None, processes=True
+        n_workers=address.workers or cores(),
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=None,
+        processes=True,
     )
     return connected(address.url, cluster.scheduler_address, cluster)
 

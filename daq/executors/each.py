@@ -74,7 +74,7 @@ class _Rounds:
             error = future.exception()
             if isinstance(error, OtherVersionError | ReachError):
                 raise error
-            blamed = isinstance(error, BlamedError) or alone == MOST_ALONE
+            blamed = alone == MOST_ALONE or (alone > 0 and isinstance(error, BlamedError))
             if isinstance(error, BrokenExecutor) and not blamed:
                 self._lost.append((task, alone))
             else:

@@ -14,12 +14,13 @@ NEEDED = {"dask": "distributed", "dask+tls": "distributed", "slurm": "dask_jobqu
 """The module without which an executor cannot be opened."""
 
 
-def open_workers(url: str, initializer: Callable[[], None] | None = None) -> Workers:
+def open_workers(url: str, initializer: Callable[[], None] | None = None, patience: float | None = None) -> Workers:
     """Opens the executor of a URL (docs/batches.md).
 
     Args:
         initializer: what a process of this computer does first, in place of `begin_worker`; other workers are set up
             by whoever starts them.
+        patience: time (s) within which a running scheduler must answer, and have a worker; None for the usual one.
 
     Raises SpecError for a URL of no executor or a missing package; ReachError for a scheduler that does not answer;
     OtherVersionError.
@@ -34,7 +35,7 @@ def open_workers(url: str, initializer: Callable[[], None] | None = None) -> Wor
         return slurm_workers(address)
     from daq.executors.dask import dask_workers
 
-    return dask_workers(address)
+    return dask_workers(address) if patience is None else dask_workers(address, patience)
 
 
 def require_installed(address: Address) -> None:

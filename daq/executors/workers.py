@@ -9,7 +9,7 @@ from concurrent.futures import BrokenExecutor, Executor
 
 
 class BlamedError(BrokenExecutor):
-    """Every worker that computed this job has died, and nothing else was lost with them: the job is to blame."""
+    """Several workers that had this job have died. It is to blame if nothing else was computed beside it."""
 
 
 class Workers(Executor):

@@ -65,7 +65,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     """Check the configuration, the machine file, the memory map and the port; an error is one line."""
     from daq.config import load_settings
     from daq.config.robot_files import load_memory_map
-    from daq.executors.address import parse_address as parse_executor
+    from daq.executors.address import parse_service_address
     from daq.safety import unchecked
     from daq.transport import parse_port_url
     from server.store.address import parse_address
@@ -77,7 +77,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     memory_map = load_memory_map(settings.robot.memory_map)
     parse_port_url(port or settings.port)
     parse_address(settings.server.database_url)
-    parse_executor(settings.server.executor)
+    parse_service_address(settings.server.executor)
     unset = unchecked(machine, machine.limits)
     if json:
         found = {"machine": machine.name, "joints": len(machine.joints), "memory_map": memory_map.name}

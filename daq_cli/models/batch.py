@@ -48,6 +48,7 @@ def run_here(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     from server.batches.run import run_batch
 
     parse_address(asked.executor)
+    _require_none(asked.out, JOB, "of a service")
     common, chosen = _common(robot, asked, study), _chosen(robot, asked.traces)
     with opened(asked.out, asked_of(common)) as folder:
         if all(folder.is_done(one.job.key) for one in chosen):
@@ -72,16 +73,18 @@ def run_at_service(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     from daq.contracts.errors import SpecError
     from daq.contracts.service.jobs import BatchRequest
     from daq_cli.models.service_jobs import ServiceJobs
-    from server.batches.folder import CSV, PARQUET
+    from server.batches.folder import ASKED, CSV, PARQUET
 
     if asked.executor != LOCAL:
         raise SpecError("--executor and --server: a service has an executor of its own; leave one of them out")
     load_effects(asked.effect_files, robot)
+    wanted = _filter(asked.traces)
+    _require_none(asked.out, ASKED, "that this computer computed")
     asked.out.mkdir(parents=True, exist_ok=True)
     before = asked.out / JOB
     request = BatchRequest(
         study=study,
-        filter=_filter(asked.traces),
+        filter=wanted,
         continues=before.read_text("ascii").strip() if before.is_file() else None,
     )
     model = None if asked.model is None else read_model(asked.model)
@@ -91,12 +94,21 @@ def run_at_service(robot: RobotAccess, asked: Asked, study: Study) -> bool:
         try:
             service.jobs.download_table(found.id, asked.out / PARQUET)
         except ServiceError as error:
+            (asked.out / PARQUET).unlink(missing_ok=True)  # of an earlier run
             console().print(f"no Parquet: {error}")
     for one in found.data.traces:
         if one.problem:
             console().print(printable(f"{one.trace}: {one.problem}"))
     _print_end(asked, found.data.done, found.data.failed, sum(one.seconds for one in found.data.traces))
     return not found.data.failed
+
+
+def _require_none(out: Path, file: str, whose: str) -> None:
+    """Raises SpecError where the folder holds a batch that was computed elsewhere, which leaves this file."""
+    from daq.contracts.errors import SpecError
+
+    if (out / file).exists():
+        raise SpecError(f"{out}: holds a batch {whose}; take another folder")
 
 
 def _filter(text: str) -> TraceFilter:
@@ -109,8 +121,10 @@ def _filter(text: str) -> TraceFilter:
         raise SpecError(f"{text}: is a folder of this computer; a service studies its own traces: write a query")
     if query.robot is not None:
         raise SpecError("query: robot: a service has the traces of its own robot; leave it out")
+    if len(query.words) > 1:
+        raise SpecError(f"query: {' '.join(query.words)}: a service looks for one word; leave the others out")
     known = query.model_dump(exclude={"words", "robot"}, exclude_none=True)
-    return TraceFilter.model_validate({"text": " ".join(query.words) or None, **known})
+    return TraceFilter.model_validate({"text": next(iter(query.words), None), **known})
 
 
 def _common(robot: RobotAccess, asked: Asked, study: Study) -> Common:

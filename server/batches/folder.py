@@ -5,7 +5,6 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from hashlib import sha256
@@ -20,6 +19,7 @@ from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.jobs import Study
 from daq.executors.program import program_here
+from daq.traces.disk import rename
 from firmware_protocol.invalid import first_invalid
 from server.batches.columns import Columns
 from server.batches.study import Answer, Common
@@ -36,12 +36,14 @@ class BatchInUseError(DaqError):
 
 
 class Asked(FrozenRecord):
-    """What all rows of the table share, and what a batch must ask again to go on. `model` and `effects` are hashes."""
+    """What all rows of the table share, and what a batch must ask again to go on. `model`, `machine` and `effects` are
+    hashes; `machine` is that of traces that name none, and None where a model has its own."""
 
     format: int = 1
     software: str
     study: Study
     model: str | None
+    machine: str | None = None
     effects: tuple[str, ...]
 
 
@@ -80,7 +82,8 @@ class BatchFolder:
         return row is not None and not row.problem
 
     def add(self, answer: Answer, about: Columns) -> Row:
-        """Keeps the answer about a trace, and waits until it is on the disk. Raises SpecError."""
+        """Keeps the answer about a trace, and waits until it is on the disk: the whole answer before the row that says
+        that there is one. Raises SpecError."""
         row = Row(
             key=answer.key,
             problem=answer.problem,
@@ -91,10 +94,7 @@ class BatchFolder:
         )
         try:
             if answer.text:
-                file = self.answer_file(answer.key)
-                part = file.with_name(f".{file.name}.part")
-                part.write_text(answer.text + "\n", "utf-8")
-                part.replace(file)
+                _write(self.answer_file(answer.key), answer.text + "\n")
             with (self.path / ROWS).open("a", encoding="utf-8") as lines:
                 lines.write(row.model_dump_json() + "\n")
                 lines.flush()
@@ -123,6 +123,7 @@ def asked_of(common: Common) -> Asked:
         software=str(program_here()),
         study=common.study,
         model=None if common.model is None else _digest(common.model),
+        machine=_digest(common.machine.model_dump_json()) if common.model is None else None,
         effects=tuple(_digest(read_text(file, f"effect file {file}")) for file in common.effect_files),
     )
 
@@ -135,6 +136,7 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
     """
     try:
         (path / ANSWERS).mkdir(parents=True, exist_ok=True)
+        (path / ROWS).touch()
         lock = (path / _HIDDEN_LOCK).open("ab")
     except OSError as error:
         raise _unwritable(path, error) from error
@@ -150,9 +152,7 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
 def _require_same(file: Path, asked: Asked) -> None:
     if not file.exists():
         try:
-            part = file.with_suffix(".part")
-            part.write_text(asked.model_dump_json(indent=1) + "\n", "utf-8")
-            part.replace(file)
+            _write(file, asked.model_dump_json(indent=1) + "\n")
         except OSError as error:
             raise _unwritable(file.parent, error) from error
         return
@@ -170,42 +170,66 @@ _WORDS = {
     "software": "version of this program",
     "study": "study, or other options",
     "model": "model",
+    "machine": "machine for traces that name none",
     "effects": "effect file",
 }
 
 
 def _read_rows(file: Path) -> dict[str, Row]:
     """The rows of the file. A line that a crash cut short is taken out: its trace is studied again."""
-    if not file.exists():
-        return {}
     found: dict[str, Row] = {}
-    text = read_text(file, str(file))
-    whole, _, cut = text.rpartition("\n")
-    if cut:
-        os.truncate(file, len(text.encode()) - len(cut.encode()))
-    for line in whole.splitlines():
+    for line in _whole_lines(file):
         try:
-            row = Row.model_validate_json(line)
+            row = Row.model_validate_json(line.decode("utf-8"))
+        except UnicodeDecodeError as error:
+            raise SpecError(f"{file}: a line is not UTF-8 text") from error
         except ValidationError as error:
             raise SpecError(f"{file}: a line is no row of a batch: {first_invalid(error).message}") from error
         found[row.key] = row
     return found
 
 
+def _whole_lines(file: Path) -> list[bytes]:
+    try:
+        content = file.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            os.truncate(file, whole)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from error
+    # A row may hold other characters at which text is split into lines, such as U+2028.
+    return content[:whole].split(b"\n")[:-1]
+
+
 def take_over(former: Path, path: Path, keys: Collection[str]) -> None:
-    """Copies what another batch has about these traces into a new folder. Raises SpecError."""
+    """Copies what another batch has about these traces into a new folder, which is a batch's when all is there.
+
+    Raises SpecError.
+    """
     if not (former / ASKED).is_file():
         raise SpecError("continues: is no batch that has begun")
     try:
         (path / ANSWERS).mkdir(parents=True)
-        shutil.copyfile(former / ASKED, path / ASKED)
         rows = [row for row in _read_rows(former / ROWS).values() if row.key in keys]
-        (path / ROWS).write_text("".join(row.model_dump_json() + "\n" for row in rows), "utf-8")
         for row in rows:
             if (answer := former / ANSWERS / f"{row.key}.json").is_file():
-                shutil.copyfile(answer, path / ANSWERS / answer.name)
+                _write(path / ANSWERS / answer.name, answer.read_text("utf-8"))
+        _write(path / ROWS, "".join(row.model_dump_json() + "\n" for row in rows))
+        _write(path / ASKED, (former / ASKED).read_text("utf-8"))
     except OSError as error:
         raise _unwritable(path, error) from error
+
+
+def _write(file: Path, text: str) -> None:
+    """Writes a file, completely or not at all, and waits until it and its name are on the disk."""
+    part = file.with_name(f".{file.name}.part")
+    with part.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    rename(part, file)
 
 
 def _digest(text: str) -> str:

@@ -22,8 +22,9 @@ def write_csv(rows: Sequence[Columns], path: Path) -> Path:
 
 
 def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
-    """Writes Parquet; returns None where `pyarrow` is not installed (extra `tables`)."""
+    """Writes Parquet. Returns None where `pyarrow` is not installed (extra `tables`), and removes an older table."""
     if find_spec("pyarrow") is None:
+        path.unlink(missing_ok=True)
         return None
     import pyarrow
     from pyarrow import parquet

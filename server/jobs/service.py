@@ -19,11 +19,14 @@ from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, F
 from daq.executors import Workers, open_workers
 from daq.executors.address import LOCAL
 from daq.executors.local import LocalWorkers
+from daq.executors.program import OtherVersionError
+from daq.executors.workers import BlamedError
+from server.batches.folder import ASKED
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
 from server.jobs.lanes import BATCH_LANE_WORKERS, LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
-from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
+from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.work import Ended, Task, carry_out
 from server.jobs.yielding import begin_worker
@@ -33,6 +36,8 @@ from server.store.labels import job_label
 
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
+SCHEDULER_PATIENCE = 5.0
+"""Time (s) within which a scheduler must answer, and have a worker; no other job is begun or ended meanwhile."""
 MOST_OF_A_BATCH = 2000
 """Largest number of traces of a batch."""
 MOST_TOLD = 50
@@ -43,7 +48,7 @@ log = logging.getLogger("server.jobs")
 def job_workers(url: str, count: int) -> Workers:
     """Opens an executor for jobs; `count` is the number of processes where it is this computer. Raises SpecError,
     ReachError, OtherVersionError."""
-    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker)
+    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker, SCHEDULER_PATIENCE)
 
 
 def worker_processes(count: int) -> LocalWorkers:
@@ -79,6 +84,7 @@ class JobService:
         self._closing = False
         self._executors: dict[Lane, Workers] = {}
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
+        self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
@@ -251,13 +257,22 @@ class JobService:
                 if executor is None:
                     url = self._context.executor if lane == "long" else LOCAL
                     executor = self._executors[lane] = self._context.make_executor(url, workers)
+                self._given_to[identity] = executor
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
-                del self._executors[lane]
+                self._give_up(identity, lane)
             except Exception as error:
                 log.exception("job %s: no worker takes it", identity)
                 return _failed(error)
         return _failed(BrokenExecutor())
+
+    def _give_up(self, identity: str, lane: Lane) -> None:
+        """Ends the executor that a job was lost with, unless another has taken its place already."""
+        executor = self._executors.get(lane)
+        if executor is not None and executor is self._given_to.get(identity):
+            del self._executors[lane]
+            # A scheduler that is gone is not waited for.
+            threading.Thread(target=executor.abandon, name="executor-end", daemon=True).start()
 
     def _collect(self) -> bool:
         """Records the end of finished jobs. A job whose end cannot be written delays no other. Returns whether any has
@@ -275,6 +290,7 @@ class JobService:
             except Exception:
                 log.exception("job %s: its end cannot be written", identity)
             del self._running[identity]
+            self._given_to.pop(identity, None)
             has_ended = True
         return has_ended
 
@@ -283,11 +299,13 @@ class JobService:
         event, reason, model, headline = Event.COMPLETED, "", None, ""
         try:
             ended = future.result()
-        except BrokenExecutor:
-            self._executors.pop(lane, None)
+        except BrokenExecutor as error:
+            if not isinstance(error, BlamedError):
+                self._give_up(identity, lane)
             event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
         except DaqError as error:  # of the executor: a job returns its own errors
-            self._executors.pop(lane, None)
+            if not isinstance(error, OtherVersionError):  # of one worker, beside which others work
+                self._give_up(identity, lane)
             event, reason = Event.LOST, str(error)
         except Exception as error:
             log.exception("job %s", identity)
@@ -313,6 +331,8 @@ class JobService:
         """Returns the traces that a batch's filter finds; None where there is none. Raises a 422."""
         if not isinstance(request, BatchRequest) or request.filter is None:
             return None
+        if request.traces:
+            raise ProblemError(422, "not-valid", "traces and filter: are both given", "leave one of them out")
         found = self._context.catalogue.find(request.filter, MOST_OF_A_BATCH + 1)
         if found and len(found) <= MOST_OF_A_BATCH:
             return found
@@ -320,13 +340,21 @@ class JobService:
         raise ProblemError(422, "batch-size", f"filter: finds {said}", f"a batch has 1 to {MOST_OF_A_BATCH} traces")
 
     def _folder_to_continue(self, request: JobRequest) -> Path | None:
-        """Returns the folder of the batch that another one continues. Raises a 404, and a 409 if it has not ended."""
+        """Returns the folder of the batch that another one continues; of one that never began, the folder of the batch
+        that it continued itself, or None. Raises a 404, and a 409 if it has not ended."""
         if not isinstance(request, BatchRequest) or request.continues is None:
             return None
         before = self._context.jobs.get(self._context.robot, request.continues)
         if before.state in ("queued", "running"):
             line = f"{job_label(before.request.kind, before.submitted)} is {before.state}"
             raise conflict("job-state", line, "continue it when it has ended")
+        while isinstance(before.request, BatchRequest) and not (self._folder(before.id) / BATCH / ASKED).is_file():
+            if before.request.continues is None:
+                return None
+            try:
+                before = self._context.jobs.get(self._context.robot, before.request.continues)
+            except ProblemError:  # it has been deleted
+                return None
         return self._folder(before.id)
 
     def _keep_model(self, identity: str) -> str:

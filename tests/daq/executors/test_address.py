@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from daq.contracts.errors import SpecError
-from daq.executors.address import parse_address
+from daq.executors.address import parse_address, parse_service_address
 
 
 @pytest.mark.parametrize(
@@ -56,3 +56,11 @@ def test_what_is_refused(url: str, says: str) -> None:
         parse_address(url)
     assert says in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("url", ["slurm://compute", "slurm://", "dask://", "dask://?workers=4"])
+def test_a_service_starts_no_cluster(url: str) -> None:
+    with pytest.raises(SpecError, match="a service starts no cluster; write local://, or a scheduler"):
+        parse_service_address(url)
+    assert parse_service_address("dask://host").place == "host:8786"
+    assert parse_service_address("local://2").workers == 2

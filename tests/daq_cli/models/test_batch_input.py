@@ -31,6 +31,21 @@ def test_wrong_input_is_told_in_one_line_and_nothing_is_begun(daq: CommandLine, 
     assert not Path("o").exists()
 
 
+def test_a_service_looks_for_one_word(daq: CommandLine) -> None:
+    words = ("--server", "http://127.0.0.1:9", "batch", "simulate", "ramp slow", "--out", "o")
+    daq(*words).complains(2, "query: ramp slow: a service looks for one word")
+    assert not Path("o").exists()
+
+
+def test_a_batch_goes_on_only_where_it_began(daq: CommandLine) -> None:
+    service = ("--server", "http://127.0.0.1:9")
+    for folder, file in (("here", "batch.json"), ("there", "job")):
+        Path(folder).mkdir()
+        Path(folder, file).touch()
+    daq(*service, "batch", "simulate", "ramp", "--out", "here").complains(2, "a batch that this computer computed")
+    daq("batch", "simulate", "here", "--out", "there").complains(2, "there: holds a batch of a service")
+
+
 def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
     Path("traces").mkdir()
     Path("traces", "broken.mcap").write_text("no trace")
@@ -42,3 +57,5 @@ def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
 def test_the_executor_of_a_service_is_checked_with_its_configuration(daq: CommandLine) -> None:
     Path("daq.toml").write_text('[server]\nexecutor = "dask:/host"\n')
     daq("config", "check").complains(2, "executor 'dask:/host': is none")
+    Path("daq.toml").write_text('[server]\nexecutor = "slurm://compute"\n')
+    daq("config", "check").complains(2, "a service starts no cluster")

@@ -21,9 +21,9 @@ from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.batches.choice import chosen_traces
-from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
+from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened, take_over
 from server.batches.run import Chosen, Standing, run_batch
-from server.batches.study import Common
+from server.batches.study import Answer, Common
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.server.batches.traces import MACHINE, folder_of_traces, number
 
@@ -107,6 +107,35 @@ def test_a_line_that_a_crash_cut_short_is_studied_again(tmp_path: Path, traces: 
     assert (run(out, traces).done, len(rows.read_text("utf-8").splitlines())) == (1, 3)
 
 
+def test_what_another_batch_has_is_taken_over_for_the_traces_that_are_asked_for(tmp_path: Path) -> None:
+    former, new = tmp_path / "former", tmp_path / "new"
+    with opened(former, asked_of(COMMON)) as folder:
+        for key in ("first", "second"):
+            folder.add(Answer(key=key, text="{}"), {"name": key})
+    take_over(former, new, {"second", "third"})
+    with opened(new, asked_of(COMMON)) as folder:
+        assert [row.key for row in folder.rows] == ["second"]
+        assert folder.answer_file("second").read_text() == "{}\n"
+        assert not folder.answer_file("first").exists()
+    with pytest.raises(SpecError, match="is no batch that has begun"):
+        take_over(tmp_path, tmp_path / "other", {"first"})
+
+
+def test_rows_are_read_whatever_characters_they_hold_and_wherever_a_crash_cut_them(tmp_path: Path) -> None:
+    strange = "run \u2028 \u2029 \u0085 \x0b 20 °C"
+    with opened(tmp_path, asked_of(COMMON)) as folder:
+        folder.add(Answer(key="first"), {"name": strange})
+    with (tmp_path / "rows.jsonl").open("ab") as rows:
+        rows.write('{"key": "20 °'.encode()[:-1])
+    for _ in range(2):
+        with opened(tmp_path, asked_of(COMMON)) as folder:
+            assert [row.about for row in folder.rows] == [{"name": strange}]
+    with (tmp_path / "rows.jsonl").open("ab") as rows:
+        rows.write(b"\xff\n")
+    with pytest.raises(SpecError, match="a line is not UTF-8"), opened(tmp_path, asked_of(COMMON)):
+        pass
+
+
 def test_a_fault_of_the_program_fails_one_trace_and_no_other(tmp_path: Path, traces: Path) -> None:
     def tell(standing: Standing, _row: object) -> None:
         said.append(str(standing))
@@ -131,6 +160,9 @@ def test_another_batch_does_not_go_on_in_the_folder(tmp_path: Path, traces: Path
     named = COMMON.model_copy(update={"model": base_model(MACHINE).model_dump_json()})
     with pytest.raises(SpecError, match="another model"):
         run(out, traces, common=named)
+    elsewhere = COMMON.model_copy(update={"machine": MACHINE.model_copy(update={"name": "another"})})
+    with pytest.raises(SpecError, match="another machine for traces that name none"):
+        run(out, traces, common=elsewhere)
     with opened(out, asked_of(COMMON)), pytest.raises(BatchInUseError, match="another batch computes into it"):
         run(out, traces)
 

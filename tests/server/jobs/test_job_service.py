@@ -26,6 +26,8 @@ from daq.contracts.service.jobs import (
 )
 from daq.contracts.trace_limits import TraceLimits
 from daq.executors import Workers
+from daq.executors.program import OtherVersionError
+from daq.executors.workers import BlamedError
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
@@ -372,6 +374,32 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
     assert not made[0].futures[diagnosis.id].done()
 
 
+@pytest.mark.parametrize(
+    ("error", "given_up"),
+    [
+        (BrokenExecutor("killed"), True),
+        (ReachError("the scheduler is gone"), True),
+        (BlamedError("killed four workers"), False),
+        (OtherVersionError("worker a: has 0.0.9"), False),
+    ],
+)
+def test_an_executor_is_ended_when_it_is_lost_and_not_for_the_fault_of_one_job(
+    bench: Bench, error: Exception, given_up: bool
+) -> None:
+    held, ended = HeldExecutor(), threading.Event()
+    held.abandon = ended.set  # type: ignore[method-assign]
+    executors: list[Workers] = [held, bench.executor]
+    bench.make_executor = lambda _url, _count: executors.pop(0)
+    job = _submitted(bench)
+    bench.service.start()
+    _until(bench, lambda: job.id in held.futures)
+    held.futures[job.id].set_exception(error)
+    assert bench.end_of(job).failure == "lost"
+    assert ended.wait(5 if given_up else 0) is given_up
+    following = _submitted(bench)
+    _until(bench, lambda: following.id in (bench.executor.given if given_up else held.futures))
+
+
 @pytest.mark.parametrize(("models", "lane"), [(10, "short"), (11, "long")])
 def test_a_comparison_is_short_by_what_it_has_to_compute(models: int, lane: str) -> None:
     request = CompareRequest.model_construct(traces=(TRACE,) * 2, models=("machine",) * models)
@@ -411,6 +439,8 @@ def test_a_batch_has_the_traces_that_its_filter_finds_when_it_is_submitted(bench
         with pytest.raises(ProblemError) as refused:
             bench.service.submit(request.model_copy(update={"filter": nothing}), "anna", None)
         assert (refused.value.status, refused.value.kind) == (422, "batch-size")
+    with pytest.raises(ProblemError, match="traces and filter: are both given"):
+        bench.service.submit(request.model_copy(update={"traces": (TRACE,)}), "anna", None)
 
 
 def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench) -> None:
@@ -421,8 +451,33 @@ def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench)
         bench.service.submit(further, "anna", None)
     assert (refused.value.status, refused.value.kind) == (409, "job-state")
     bench.service.cancel(first.id, "anna")
+    begun = bench.folder / first.id / "batch" / "batch.json"
+    begun.parent.mkdir()
+    begun.touch()
     second, _new = bench.service.submit(further, "anna", None)
-    assert Mailbox(bench.folder / second.id).read("request.json")["continues"] == str(bench.folder / first.id)
+    assert _continues(bench, second) == str(bench.folder / first.id)
+
+
+def _continues(bench: Bench, job: Job) -> str | None:
+    found: str | None = Mailbox(bench.folder / job.id).read("request.json")["continues"]
+    return found
+
+
+def test_a_batch_that_never_began_is_continued_where_the_one_before_it_ended(bench: Bench) -> None:
+    def cancelled(before: Job | None) -> Job:
+        request = BatchRequest(study=SimulateStudy(), traces=(TRACE,), continues=before and before.id)
+        job, _new = bench.service.submit(request, "anna", None)
+        return bench.service.cancel(job.id, "anna")
+
+    first = cancelled(None)
+    second = cancelled(first)
+    assert _continues(bench, second) is None
+    (bench.folder / first.id / "batch").mkdir()
+    (bench.folder / first.id / "batch" / "batch.json").touch()
+    third = cancelled(second)
+    assert _continues(bench, third) == str(bench.folder / first.id)
+    bench.service.remove(first.id)
+    assert _continues(bench, cancelled(third)) is None
 
 
 def test_an_executor_that_is_not_reached_is_the_reason_of_a_job(bench: Bench) -> None:
