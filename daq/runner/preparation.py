@@ -67,7 +67,7 @@ def prepare(
     """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
     consent.require(controller)
-    _require_fitting(controller, machine)
+    require_fitting(controller, machine)
     _require_period(controller, machine)
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
@@ -104,9 +104,9 @@ def require_not_stopped(controller: Controller) -> None:
         raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
 
 
-def _require_fitting(controller: Controller, machine: Machine) -> None:
+def require_fitting(controller: Controller, machine: Machine) -> None:
     """Raises SafetyError where the machine file is of another machine than the one behind the line: set points in
-    other steps would be set points for other postures."""
+    other steps would be set points for other postures, and positions in other counts would be other angles."""
     scale, joints = controller.link.scale, len(machine.joints)
     if joints != scale.joints:
         raise SafetyError(
@@ -120,6 +120,12 @@ def _require_fitting(controller: Controller, machine: Machine) -> None:
                 f"{controller.link.url} takes set points in {scale.set_point_units} steps over the range of joint "
                 f"{joint}, the machine file {machine.name} has {own.posture_units}: positions would be wrong; its "
                 f"controller.set_point_resolution must be {right:.9g}"
+            )
+        if own.counts != scale.position_counts:
+            raise SafetyError(
+                f"{controller.link.url} reports positions in {scale.position_counts} counts over the range of joint "
+                f"{joint}, the machine file {machine.name} has {own.counts}: positions would be wrong; correct the "
+                "sensor's bits there"
             )
 
 
