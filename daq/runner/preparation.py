@@ -72,12 +72,12 @@ def prepare(
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
     here = _look(controller, machine)
-    _require_still(here, machine, limits)
+    require_still(here, machine, limits)
     target = start_angles(spec, machine)
     move = plan_move(machine, here.set_point, target)
     motion = plan(spec, machine, target)
-    _require_allowed("move to start", check_move_to_start(move, machine, limits))
-    _require_allowed("experiment", check_plan(motion, machine, limits))
+    require_allowed("move to start", check_move_to_start(move, machine, limits))
+    require_allowed("experiment", check_plan(motion, machine, limits))
     joints = recorded_joints(controller, spec)
     require_room(folder, len(motion), len(joints))
     return Prepared(joints, controller.line_rate(joints, motion.moving), move, motion)
@@ -153,8 +153,8 @@ def _look(controller: Controller, machine: Machine) -> SampleRow:
     return RowMaker(machine, controller.joints, controller.period_s).row(controller.next_snapshot())
 
 
-def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
-    """The arm must be where its controller holds it, before it is asked for anything else."""
+def require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
+    """The arm must be where its controller holds it, before it is asked for anything else. Raises SafetyError."""
     allowed = limits.following_error_counts
     for index, error in enumerate(row.error):
         counts = error / machine.calibration(index + 1).rad_per_count
@@ -165,7 +165,8 @@ def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
             )
 
 
-def _require_allowed(what: str, violations: list[Violation]) -> None:
+def require_allowed(what: str, violations: list[Violation]) -> None:
+    """Raises SafetyError where a plan violates limits."""
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
         raise SafetyError(f"{what} refused: {violations[0]}{more}; nothing moved")
