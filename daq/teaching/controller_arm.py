@@ -9,7 +9,7 @@ from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.driver import Controller, ControllerRestartedError, NoSampleError
+from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
 from daq.runner import ArmControl, StoppedError, require_fitting
 from daq.runner.preparation import PERIOD_TOLERANCE
@@ -82,7 +82,7 @@ class ControllerArm:
             snapshot = self._controller.next_snapshot(after, self.joints)
         except (LinkError, NoSampleError) as error:
             raise halting.freeze_for_fault(self._control, str(error), Event.LINK_LOST) from error
-        except ControllerRestartedError as error:
+        except (ControllerRestartedError, HardwareFaultError) as error:
             raise self.freeze_for_fault(str(error)) from error
         self._last, self.lateness = snapshot.tick, snapshot.jitter
         return self._rows.row(snapshot)
