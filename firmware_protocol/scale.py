@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from firmware_protocol.memory_map import JOINTS
-from firmware_protocol.units import POSTURE_UNITS
+from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 
 
 @dataclass(frozen=True)
@@ -14,6 +14,7 @@ class LineScale:
 
     joints:          number of joints behind the line
     set_point_units: units of a set point over a joint's range, 0 the lowest
+    position_counts: counts of a position over a joint's range, 0 the lowest
     every:           control periods from one sample to the next on a line that is quick enough
     turn_bytes:      bytes that pass for one sample of all joints and their set points, both ways together; None where
                      they are those of PROTOCOL.md, which depend on the joints asked for
@@ -22,6 +23,7 @@ class LineScale:
 
     joints: int = JOINTS
     set_point_units: int = POSTURE_UNITS
+    position_counts: int = ADC_COUNTS
     every: int = 1
     turn_bytes: int | None = None
     half_duplex: bool = False

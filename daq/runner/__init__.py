@@ -2,7 +2,7 @@
 
 from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.experiment import RunFaultError, RunResult, RunSetup, StopRequests, run_experiment
-from daq.runner.preparation import Consent, MissingConsentError, require_not_stopped
+from daq.runner.preparation import Consent, MissingConsentError, require_fitting, require_not_stopped
 from daq.runner.recorder import RunListener
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "RunSetup",
     "StopRequests",
     "StoppedError",
+    "require_fitting",
     "require_not_stopped",
     "run_experiment",
 ]

@@ -67,17 +67,17 @@ def prepare(
     """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
     consent.require(controller)
-    _require_fitting(controller, machine)
+    require_fitting(controller, machine)
     _require_period(controller, machine)
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
     here = _look(controller, machine)
-    _require_still(here, machine, limits)
+    require_still(here, machine, limits)
     target = start_angles(spec, machine)
     move = plan_move(machine, here.set_point, target)
     motion = plan(spec, machine, target)
-    _require_allowed("move to start", check_move_to_start(move, machine, limits))
-    _require_allowed("experiment", check_plan(motion, machine, limits))
+    require_allowed("move to start", check_move_to_start(move, machine, limits))
+    require_allowed("experiment", check_plan(motion, machine, limits))
     joints = recorded_joints(controller, spec)
     require_room(folder, len(motion), len(joints))
     return Prepared(joints, controller.line_rate(joints, motion.moving), move, motion)
@@ -104,9 +104,9 @@ def require_not_stopped(controller: Controller) -> None:
         raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
 
 
-def _require_fitting(controller: Controller, machine: Machine) -> None:
+def require_fitting(controller: Controller, machine: Machine) -> None:
     """Raises SafetyError where the machine file is of another machine than the one behind the line: set points in
-    other steps would be set points for other postures."""
+    other steps would be set points for other postures, and positions in other counts would be other angles."""
     scale, joints = controller.link.scale, len(machine.joints)
     if joints != scale.joints:
         raise SafetyError(
@@ -120,6 +120,12 @@ def _require_fitting(controller: Controller, machine: Machine) -> None:
                 f"{controller.link.url} takes set points in {scale.set_point_units} steps over the range of joint "
                 f"{joint}, the machine file {machine.name} has {own.posture_units}: positions would be wrong; its "
                 f"controller.set_point_resolution must be {right:.9g}"
+            )
+        if own.counts != scale.position_counts:
+            raise SafetyError(
+                f"{controller.link.url} reports positions in {scale.position_counts} counts over the range of joint "
+                f"{joint}, the machine file {machine.name} has {own.counts}: positions would be wrong; correct the "
+                "sensor's bits there"
             )
 
 
@@ -147,8 +153,8 @@ def _look(controller: Controller, machine: Machine) -> SampleRow:
     return RowMaker(machine, controller.joints, controller.period_s).row(controller.next_snapshot())
 
 
-def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
-    """The arm must be where its controller holds it, before it is asked for anything else."""
+def require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
+    """The arm must be where its controller holds it, before it is asked for anything else. Raises SafetyError."""
     allowed = limits.following_error_counts
     for index, error in enumerate(row.error):
         counts = error / machine.calibration(index + 1).rad_per_count
@@ -159,7 +165,8 @@ def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
             )
 
 
-def _require_allowed(what: str, violations: list[Violation]) -> None:
+def require_allowed(what: str, violations: list[Violation]) -> None:
+    """Raises SafetyError where a plan violates limits."""
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
         raise SafetyError(f"{what} refused: {violations[0]}{more}; nothing moved")

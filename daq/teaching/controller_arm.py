@@ -9,9 +9,9 @@ from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.driver import Controller, ControllerRestartedError, NoSampleError
+from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
-from daq.runner import ArmControl, StoppedError
+from daq.runner import ArmControl, StoppedError, require_fitting
 from daq.runner.preparation import PERIOD_TOLERANCE
 from daq.runner.rows import RowMaker
 from daq.safety import Event
@@ -37,7 +37,7 @@ class ControllerArm:
     ended:        gives the reason of an external request to end; None while there is none
     every_period: True delivers each period once, in order; False the newest, which a slow line can do
 
-    Raises SafetyError for a controller of another period than the machine file's.
+    Raises SafetyError for a machine file of another machine, and for a controller of another period than its.
     """
 
     def __init__(
@@ -49,6 +49,7 @@ class ControllerArm:
         *,
         every_period: bool = True,
     ) -> None:
+        require_fitting(controller, machine)
         require_period(controller, machine)
         self.joints = tuple(range(1, len(machine.joints) + 1))
         self.lateness = 0.0
@@ -81,7 +82,7 @@ class ControllerArm:
             snapshot = self._controller.next_snapshot(after, self.joints)
         except (LinkError, NoSampleError) as error:
             raise halting.freeze_for_fault(self._control, str(error), Event.LINK_LOST) from error
-        except ControllerRestartedError as error:
+        except (ControllerRestartedError, HardwareFaultError) as error:
             raise self.freeze_for_fault(str(error)) from error
         self._last, self.lateness = snapshot.tick, snapshot.jitter
         return self._rows.row(snapshot)

@@ -249,13 +249,15 @@ def _process(controller: Controller) -> ProcessState:
 
 
 def _report(call: Invocation, machine: Machine, controller: Controller, limp: list[int]) -> StatusReport:
-    """The state of the board, in the form of a service's status."""
+    """The state of the board, in the form of a service's status. Raises SafetyError for another machine's file."""
     from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
     from daq.contracts.status import StatusReport
+    from daq.runner import require_fitting
     from daq.runner.line_status import with_rates
     from daq.runner.rows import RowMaker
     from firmware_protocol.commands import Capability, StatusFlag
 
+    require_fitting(controller, machine)
     snapshot, now = controller.next_snapshot(), datetime.now(UTC)
     joints = tuple(joint for joint, _ in snapshot.joints)
     row = RowMaker(machine, joints, controller.period_s).row(snapshot)

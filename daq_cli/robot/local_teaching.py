@@ -41,7 +41,7 @@ class LocalTeaching:
         """Drives until the pendant has ended."""
         from daq.teaching import jog as jog_arm
 
-        with open_keyboard() as keyboard, self._owned(self._arm) as (robot, arm):
+        with open_keyboard() as keyboard, self.owned(self._arm) as (robot, arm):
             line.tell(HELP)
 
             def commands(row: SampleRow) -> JogCommand | None:
@@ -72,7 +72,7 @@ class LocalTeaching:
                 raise SafetyError(f"program refused: {against[0]}; nothing moved")
             return planned
 
-        with self._owned(checked) as (robot, planned):
+        with self.owned(checked) as (robot, planned):
             tell = console().print
             performer = FollowingPerformer(
                 robot.controller, robot.control, machine, machine.limits, robot.end_cause, tell
@@ -85,7 +85,7 @@ class LocalTeaching:
         """Records until `seconds` are over, or Enter is pressed."""
         from daq.teaching import lead_by_nose
 
-        with self._owned(self._arm) as (robot, arm):
+        with self.owned(self._arm) as (robot, arm):
             begun = robot.controller.clock.now()
 
             def ended() -> bool:
@@ -97,7 +97,7 @@ class LocalTeaching:
             lead_by_nose(arm, self.machine, self.machine.limits, tuple(joints), ended, keep)
 
     @contextmanager
-    def _owned(self, prepare: Callable[[OwnedRobot], Made]) -> Iterator[tuple[OwnedRobot, Made]]:
+    def owned(self, prepare: Callable[[OwnedRobot], Made]) -> Iterator[tuple[OwnedRobot, Made]]:
         """The robot, whose port this process owns. If a real arm needs consent and a person can be asked, it asks.
 
         `prepare` makes checks before anything moves; if it refuses, set points and gains stay as they were.

@@ -86,6 +86,7 @@ class DynamixelDialect:
         self.scale = LineScale(
             joints=count,
             set_point_units=COUNTS_A_TURN,
+            position_counts=COUNTS_A_TURN,
             every=EVERY,
             turn_bytes=2 * (asked + told) + OVERHEAD + 4 + 5 * count,
             half_duplex=True,

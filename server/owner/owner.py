@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 from daq.acquisition.guardian import EndCause
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError
-from daq.driver import ControllerRestartedError, NoSampleError
+from daq.driver import ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, LinkState
 from daq.safety import Event, State
 from firmware_protocol.commands import StatusFlag
@@ -61,6 +62,9 @@ def serve(robot: OwnedRobot) -> None:
                 robot.control.handle(Event.TRIP, str(error))
                 robot.controller.hello()
                 last = None
+            except HardwareFaultError as error:
+                _trip_once(robot, str(error))
+                last = None
             except (LinkError, NoSampleError) as error:
                 _link_lost(robot, str(error))
             robot.tell_arm()
@@ -112,6 +116,12 @@ def _moved(robot: OwnedRobot, order: Long) -> Answer:
     return long_orders.perform(robot, order)
 
 
+def _trip_once(robot: OwnedRobot, why: str) -> None:
+    """A damaged drive is reported with every sample: the arm is frozen at the first."""
+    if robot.control.arm.state is not State.FAULT:
+        robot.control.handle(Event.TRIP, why)
+
+
 def _link_lost(robot: OwnedRobot, why: str) -> None:
     if robot.control.arm.connected:
         robot.control.handle(Event.LINK_LOST, why)
@@ -146,7 +156,8 @@ def _answers_again(robot: OwnedRobot) -> None:
     """Reads a sample of a robot that was silent, to check that it answers. Raises LinkError, NoSampleError."""
     if (cause := robot.control.halted) is not None:
         robot.control.stop(cause)
-    robot.controller.next_snapshot()
+    with suppress(HardwareFaultError):  # it answers; the next sample trips
+        robot.controller.next_snapshot()
 
 
 def _notice_a_stop_before_us(robot: OwnedRobot) -> None:

@@ -8,6 +8,7 @@ from daq.acquisition.session import port_session
 from daq.acquisition.speaker import Speaker
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
+from daq.runner import require_fitting
 from daq.transport import PortBusyError
 from firmware_protocol.commands import Capability
 from firmware_protocol.errors import ProtocolError
@@ -60,6 +61,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
         )
         if (cause := robot.end_cause()) is not None:
             control.stop(cause)
+        require_fitting(controller, opening.machine)
         robot.read_gains()
         identity = controller.identity
         keep_steady()

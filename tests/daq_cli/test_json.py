@@ -11,6 +11,7 @@ import typer
 from daq.contracts.service.robot import RobotStatus
 from daq.contracts.status import StatusReport, report_of
 from daq.trajectories.presets import PRESETS
+from tests.daq.servo_bench import PAN_TILT
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.test_documentation import COMMANDS
 
@@ -55,6 +56,13 @@ def test_a_local_status_has_the_fields_of_a_service(daq: CommandLine, port: str)
     assert found.identity is not None
     assert (found.connection, found.arm, found.sample.joints) == ("connected", "idle", (1, 2, 3, 4, 5, 6))
     assert "missed_set_points" in found.link.counters
+
+
+def test_a_local_status_with_another_machines_file_shows_no_angles(
+    daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_ROBOT__MACHINE", str(PAN_TILT))
+    daq("--port", port, "status").complains(4, "has 6 joints, the machine file pan_tilt describes 2")
 
 
 def test_a_status_report_has_every_field_of_a_services_status() -> None:

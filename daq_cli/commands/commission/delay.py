@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from daq.commissioning.computing_delay import ComputingDelay, Effect, computing_delay
+from daq.contracts.errors import SafetyError
 from daq.driver.clock import LockStepClock
-from daq_cli.commands.commission.bench import Bench, connected
+from daq_cli.commands.commission.bench import Bench
 from firmware_protocol.commands import Block, ReadBlock
 
 if TYPE_CHECKING:
+    from daq.acquisition.owned import OwnedRobot
+    from daq.contracts.machine import Machine
     from daq.driver import Controller
+    from daq.teaching.controller_arm import ControllerArm
 
 STEP = 2
 """Posture units by which the set point is moved: half a degree of a major axis, and 8 counts of its error."""
@@ -30,19 +34,25 @@ READINGS_A_PERIOD = 40
 
 
 def delay(bench: Bench) -> dict[str, Any]:
-    """The computing delay, by set points at all phases of the period; it goes into the machine file."""
-    from daq_cli.commands.commission.machine_text import with_controller
+    """The computing delay, by set points at all phases of the period; it goes into the machine file.
 
+    A stop, Ctrl-C and every fault freeze the arm where it is; it returns to its posture only after the last set point.
+    """
+    from daq_cli.commands.commission.machine_text import with_controller
+    from daq_cli.robot.local_teaching import LocalTeaching
+
+    bench.configure()
     joint, period = bench.joints[0], 1e-3 * float(bench.record.steps["period"]["period_ms"])
-    with connected(bench) as controller:
-        bench.consent.require(bench.call.port, controller.identity)
-        there = controller.next_snapshot(None, (joint,))[joint].set_point
-        away = there + (STEP if there < 500 else -STEP)
-        watch = _Watch(controller, bench.memory_map()["error"].low[joint - 1], joint, period)
-        try:
-            shown = [watch.effect(there if k % 2 else away, k * GOLDEN % 1.0) for k in range(TIMES)]
-        finally:
-            controller.set_points({joint: there})
+    call, shown = bench.configured, []
+    machine = call.settings.machine()
+    teaching = LocalTeaching(call, machine, bench.consent)
+    with teaching.owned(lambda robot: _checked(robot, machine, joint)) as (robot, (arm, there, away)):
+        watch = _Watch(robot.controller, arm, bench.memory_map()["error"].low[joint - 1], joint, period)
+        with arm.driven():
+            for k in range(TIMES):
+                _require_following(arm, machine)
+                shown.append(watch.effect(there if k % 2 else away, k * GOLDEN % 1.0))
+            arm.set_points({joint: there})
     found = computing_delay([one for one in shown if one is not None], period)
     bench.operator.show(str(found))
     bench.write_machine(with_controller(bench.machine_text(), {"delay": _line(found)}))
@@ -52,6 +62,43 @@ def delay(bench: Bench) -> dict[str, Any]:
         "lowest_ms": round(1e3 * found.low, 2),
         "highest_ms": round(1e3 * found.high, 2),
     }
+
+
+class _Way(NamedTuple):
+    """The arm, and the two postures (posture units) between which its joint is moved."""
+
+    arm: ControllerArm
+    there: int
+    away: int
+
+
+def _checked(robot: OwnedRobot, machine: Machine, joint: int) -> _Way:
+    """Checks before anything moves: the machine file, the following errors, the limits. Raises SafetyError."""
+    from daq.runner.preparation import require_allowed, require_still
+    from daq.safety import check_move_to_start
+    from daq.teaching.controller_arm import ControllerArm
+    from daq.trajectories import plan_move
+
+    arm = ControllerArm(robot.controller, robot.control, machine, robot.end_cause, every_period=False)
+    row, own = arm.next_sample(), machine.calibration(joint)
+    require_still(row, machine, machine.limits)
+    there = robot.controller.next_snapshot(None, (joint,))[joint].set_point
+    away = there + (STEP if there < 500 else -STEP)
+    target = list(row.set_point)
+    target[joint - 1] = own.posture_to_rad(away)
+    move = plan_move(machine, row.set_point, target)
+    require_allowed("computing delay", check_move_to_start(move, machine, machine.limits))
+    return _Way(arm, there, away)
+
+
+def _require_following(arm: ControllerArm, machine: Machine) -> None:
+    """Freezes an arm that does not follow, and raises TeachingError; StoppedError after a stop."""
+    from daq.runner.preparation import require_still
+
+    try:
+        require_still(arm.next_sample(), machine, machine.limits)
+    except SafetyError as error:
+        raise arm.freeze_for_fault(str(error)) from error
 
 
 def _line(found: ComputingDelay) -> str:
@@ -67,6 +114,7 @@ class _Watch:
     """The low byte of a joint's error, read again and again."""
 
     controller: Controller
+    arm: ControllerArm
     address: int
     joint: int
     period: float
@@ -82,7 +130,7 @@ class _Watch:
         clock.sleep_until(self._now() + (SETTLED_PERIODS + phase) * self.period)
         error, _ = self._read()
         begun = self._now()
-        self.controller.set_points({self.joint: posture})
+        self.arm.set_points({self.joint: posture})
         written = begun, self._now()
         after = begun
         while self._now() < written[1] + PATIENCE_PERIODS * self.period:

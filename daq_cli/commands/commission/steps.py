@@ -101,7 +101,7 @@ STEPS = (
         "The program's stop",
         "Stops the resting arm and releases it again.",
         "The arm stays where it is.",
-        KEY,
+        "the emergency stop",
         stop,
         ("bridge",),
     ),

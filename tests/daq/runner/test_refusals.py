@@ -177,3 +177,13 @@ def test_a_folder_that_can_take_no_trace_is_refused(
 def test_a_machine_without_a_rest_posture_is_refused_where_it_is_the_start(arm: Rig) -> None:
     arm.machine = arm.machine.model_copy(update={"rest_posture": None})
     refused(arm, SpecError, "has no rest_posture")
+
+
+@pytest.mark.parametrize("bits", [10, 14])
+def test_a_machine_file_whose_positions_have_other_counts_is_refused(arm: Rig, bits: int) -> None:
+    first = arm.machine.joints[0]
+    assert first.sensor is not None
+    other = first.model_copy(update={"sensor": first.sensor.model_copy(update={"bits": bits})})
+    machine = arm.machine.model_copy(update={"joints": (other, *arm.machine.joints[1:])})
+    with pytest.raises(SafetyError, match=f"in 4096 counts over the range of joint 1, .* has {2**bits}: .* bits"):
+        arm.run(machine=machine)

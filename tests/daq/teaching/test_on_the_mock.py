@@ -13,6 +13,7 @@ from daq.teaching import JogCommand, Program, RecordedPath, TeachingError, jog, 
 from daq.teaching.controller_arm import ControllerArm
 from daq.teaching.performer import FollowingPerformer
 from tests.control_port import told_by
+from tests.daq.servo_bench import pan_tilt
 from tests.daq.teaching.stand_in import MA2000
 
 
@@ -76,6 +77,11 @@ def test_a_controller_with_another_period_than_the_machine_file_says(controller:
     other = MA2000.model_copy(update={"controller": MA2000.controller.model_copy(update={"period": period})})
     with pytest.raises(SafetyError, match="control period of 20 ms, the machine file ma2000 says 30 ms"):
         ControllerArm(controller, ArmControl(controller), other, lambda: None)
+
+
+def test_a_machine_file_of_another_machine(controller: Controller) -> None:
+    with pytest.raises(SafetyError, match="has 6 joints, the machine file pan_tilt describes 2"):
+        ControllerArm(controller, ArmControl(controller), pan_tilt(), lambda: None)
 
 
 def carried_out(controller: Controller, ended: Callable[[], str | None], *instructions: dict[str, object]) -> None:

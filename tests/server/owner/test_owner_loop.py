@@ -11,7 +11,7 @@ from typing import Any, cast
 import pytest
 
 from daq.contracts.errors import ReachError
-from daq.driver import NoSampleError
+from daq.driver import HardwareFaultError, NoSampleError
 from daq.link import LinkState
 from daq.runner import ArmControl
 from firmware_protocol.commands import StatusFlag
@@ -46,12 +46,38 @@ class SilentForAWhile:
         return SimpleNamespace(flags=StatusFlag(0))
 
 
+class WithADamagedDrive(SilentForAWhile):
+    """A controller that reports a damaged drive in place of these samples."""
+
+    def __init__(self, *damaged: bool) -> None:
+        super().__init__()
+        self.silence = iter(())
+        self.damaged = iter(damaged)
+        self.greetings = self.stops = 0
+
+    def next_snapshot(self, _after: int | None = None) -> SimpleNamespace:
+        if next(self.damaged, False):
+            raise HardwareFaultError("servo 2 reports overload")
+        return super().next_snapshot()
+
+    def hello(self) -> None:
+        self.greetings += 1
+
+    def stop(self) -> SimpleNamespace:
+        self.stops += 1
+        return SimpleNamespace(acknowledged=True)
+
+
 def served(
-    orders: dict[int, Any], turns: int = 8, activities: list[str] | None = None, anew: list[int] | None = None
+    orders: dict[int, Any],
+    turns: int = 8,
+    activities: list[str] | None = None,
+    anew: list[int] | None = None,
+    controller: SilentForAWhile | None = None,
 ) -> tuple[list[str], list[Answer]]:
     """States of the arm as they are told, and answers; `orders` by the turn in which they come. `anew` gets how many
     answers there were whenever the state was told in any case."""
-    controller, closing = SilentForAWhile(), Event()
+    controller, closing = controller or SilentForAWhile(), Event()
     states: list[str] = []
     answers: list[Answer] = []
     control = ArmControl(cast(Any, controller))
@@ -86,6 +112,20 @@ def served(
 def test_a_robot_that_answers_again_is_connected_again() -> None:
     states, _ = served({})
     assert states[:5] == ["idle", "disconnected", "disconnected", "idle", "idle"]
+
+
+def test_a_damaged_drive_trips_once_and_the_robot_stays_connected() -> None:
+    controller = WithADamagedDrive(False, True, True, True)
+    states, _ = served({}, controller=controller)
+    assert states[:6] == ["idle", "fault", "fault", "fault", "fault", "fault"]
+    assert (controller.stops, controller.greetings) == (1, 0)
+
+
+def test_a_robot_that_answers_again_with_a_damaged_drive_is_connected_and_at_fault() -> None:
+    controller = WithADamagedDrive(False, True, True)
+    controller.silence = iter([True])
+    states, _ = served({}, controller=controller)
+    assert states[:4] == ["disconnected", "idle", "fault", "fault"]
 
 
 def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:

@@ -11,13 +11,14 @@ from typing import NoReturn
 
 import pytest
 
-from daq.contracts.errors import ReachError
+from daq.contracts.errors import DaqError, ReachError
 from daq.contracts.machine import load_machine
 from daq.transport import ReconnectDelay
 from server.owner.messages import Open, ReadGains, Report, TeachingText
 from server.robot.keeper import Keeper
 from server.robot.owner_process import OwnerGoneError, OwnerProcess
 from server.robot.robot import Robot, RobotPlace
+from tests.daq.servo_bench import pan_tilt
 from tests.server.clocks import HandClock
 
 HALF = '{"kind":"answer","num'
@@ -93,3 +94,13 @@ def test_whatever_keeps_it_from_connecting_is_tried_again(error: Exception) -> N
     keeper.start(connect=True)
     assert third.wait(60)
     keeper.close(60)
+
+
+def test_a_robot_with_another_machines_file_is_not_connected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its live angles would be wrong."""
+    monkeypatch.setenv("DAQ_RUNTIME_FOLDER", str(tmp_path))
+    robot = Robot(RobotPlace("ma2000", "mock://?lock_step=1", pan_tilt(), tmp_path), HandClock())
+    with pytest.raises(DaqError, match="has 6 joints, the machine file pan_tilt describes 2"):
+        robot.connect()
+    assert robot.identity is None
+    assert robot.disconnect(60.0)
