@@ -222,6 +222,17 @@ def test_a_servo_in_another_mode_is_not_driven() -> None:
         bench.controller()
 
 
+def test_a_servo_whose_torque_comes_on_with_every_goal_is_not_driven() -> None:
+    bench = VirtualBench(Options(torque=False))
+    servo = bench.bench.servos[1]
+    servo.write(Table.DRIVE_MODE.address, b"\x08")
+    with pytest.raises(RequestRefusedError, match="servo 2 has Torque On by Goal Update"):
+        bench.controller()
+    assert not servo.torque
+    servo.write(Table.GOAL_POSITION.address, (2000).to_bytes(4, "little"))
+    assert servo.torque
+
+
 def test_what_servos_do_not_have_is_refused_in_one_line(controller: Controller) -> None:
     with pytest.raises(
         ProtocolError, match="SetGripper: Dynamixel servos are only read, moved, stopped and released from here"
