@@ -49,6 +49,8 @@ WATCHDOG = 25
 themselves after half a second."""
 MOST_WRITES = 8
 """How often a step is written again because the servos, read back, do not hold it; then the link asks anew."""
+NEAR = 23
+"""Counts (2°) that a servo may be away from its goal when its torque is switched on."""
 
 Servos = dict[int, Servo]
 
@@ -70,7 +72,8 @@ class DynamixelDialect:
     """Servos of these IDs on one bus; the first is joint 1. Set points, positions and errors are counts of 1/4096 turn.
 
     - Stop: each servo's goal becomes its measured position, and the bench is marked as stopped (STOP_MARK).
-    - Release: the same goals, the mark is taken away, and the torque switched on. Nothing else switches it on.
+    - Release: the same goals, and the mark is taken away; when they have been read back the torque is switched on.
+      Nothing else switches it on.
     - Set points: refused beyond a servo's own position limits, or while the bench is stopped or a torque is off.
     """
 
@@ -208,10 +211,11 @@ class DynamixelDialect:
     # --- what each request comes to
 
     def _greeted(self, request: Hello, whole: Mapping[int, bytes]) -> Reply:
-        self._settings = {device: ServoSettings.of(block) for device, block in whole.items()}
-        for device, settings in self._settings.items():
+        found = {device: ServoSettings.of(block) for device, block in whole.items()}
+        for device, settings in found.items():
             if why := settings.unfit():
                 return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, f"servo {device} {why}")
+        self._settings = found
         servos = {device: Servo.of(block[BLOCK[0] :]) for device, block in whole.items()}
         self._time(servos)
         self._stopped = any(one.stopped for one in servos.values())
@@ -263,20 +267,46 @@ class DynamixelDialect:
         return None
 
     def _released(self, job: _Job, servos: Servos) -> Reply | None:
-        """A release: each servo holds the position that it has, with its torque on."""
+        """A release: goals become the measured positions; when they have been read back the torque is switched on."""
         if why := faults(servos):
             line = f"{why}; when its cause is gone, switch the bench's supply off and on"
             return ExplainedRefusal(job.request.OPCODE, Refusal.UNFIT, line)
-        if job.goals is not None:
-            ready = (s.torque and not s.stopped and s.goal == job.goals[device] for device, s in servos.items())
-            if all(ready):
+        if len(self._settings) < len(self._ids):
+            line = "the servos' settings have not been read on this connection"
+            return ExplainedRefusal(job.request.OPCODE, Refusal.BAD_SESSION, line)
+        if job.goals is not None and _holds(job.goals, servos):
+            limp = [device for device, one in servos.items() if not one.torque]
+            if not limp:
                 self._stopped, self._armed = False, False
                 return Released()
+            if self._may_write(job):
+                self._then(self._write(Table.TORQUE_ENABLE, dict.fromkeys(limp, 1)), {}, set())
+            return None
+        if why := self._beyond(servos):
+            return ExplainedRefusal(job.request.OPCODE, Refusal.UNFIT, why)
         if self._may_write(job):
-            job.goals = {device: one.position for device, one in servos.items()}
+            job.goals = self._here(servos)
             free = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0))
-            self._then(free + self._write(Table.GOAL_POSITION, job.goals), {Table.TORQUE_ENABLE: 1}, set())
+            self._then(free + self._write(Table.GOAL_POSITION, job.goals), {}, set())
         return None
+
+    def _here(self, servos: Servos) -> dict[int, int]:
+        """Goals at which the servos stay where they are: the measured positions, within the servos' own limits."""
+        goals = {device: one.position for device, one in servos.items()}
+        own = self._settings
+        return {i: max(own[i].low, min(own[i].high, goal)) if i in own else goal for i, goal in goals.items()}
+
+    def _beyond(self, servos: Servos) -> str:
+        """Why no goal would hold a servo where it is; empty where one would. A servo that has its torque may sag a
+        little beyond a limit."""
+        for device, goal in self._here(servos).items():
+            one, own = servos[device], self._settings[device]
+            if abs(one.position - goal) > (NEAR if one.torque else 0):
+                return (
+                    f"joint {self._ids.index(device) + 1}: servo {device} stands at {one.position} counts, outside its "
+                    f"position limits {own.low} to {own.high}: turn it back by hand, then release again"
+                )
+        return ""
 
     def _may_write(self, job: _Job) -> bool:
         job.heard.clear()
@@ -317,6 +347,14 @@ class DynamixelDialect:
         if self._armed and any(one.watchdog == 0 and not one.torque for one in servos.values()):
             flags |= StatusFlag.RESTARTED  # its supply has failed: the watch that was begun is gone
         return int(flags)
+
+
+def _holds(goals: Mapping[int, int], servos: Servos) -> bool:
+    """Whether each servo is free, has the goal that was written, and would not turn if its torque came on now."""
+    return all(
+        not one.stopped and one.goal == goals[device] and (one.torque or abs(one.goal - one.position) <= NEAR)
+        for device, one in servos.items()
+    )
 
 
 _MOST_JOBS = 16

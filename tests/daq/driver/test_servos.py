@@ -12,7 +12,7 @@ from firmware_protocol.commands import Capability, FineSetPoints, StatusFlag, St
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
-from firmware_protocol.dynamixel.packets import encode
+from firmware_protocol.dynamixel.packets import HEADER, encode
 from firmware_protocol.errors import ProtocolError
 from mock_controller.servos.bench import Options
 from tests.daq.servo_bench import VirtualBench
@@ -136,6 +136,54 @@ def test_torque_comes_on_by_a_release_alone_and_moves_nothing() -> None:
         bench.sleep_until(bench.now() + 0.5)
         assert all(servo.torque for servo in bench.bench.servos)
         assert all(abs(now - then) < 25 for now, then in zip(positions(bench), before, strict=True))
+
+
+def item_of(packet: bytes) -> tuple[int, int]:
+    """Instruction and address of one packet of the host's."""
+    return packet[7], int.from_bytes(packet[8:10], "little")
+
+
+def each_packet(data: bytes) -> list[bytes]:
+    return [HEADER + piece for piece in data.split(HEADER)[1:]]
+
+
+def without(data: bytes, item: Table) -> bytes:
+    """What is heard when the Sync Writes to this item are damaged on the bus."""
+    lost = (ask.Instruction.SYNC_WRITE, item.address)
+    return b"".join(packet for packet in each_packet(data) if item_of(packet) != lost)
+
+
+def test_no_torque_comes_on_while_a_goal_has_not_arrived() -> None:
+    bench = VirtualBench(Options(torque=False))
+    for servo in bench.bench.servos:
+        servo.write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        damage = iter(range(10**6))
+        bench.hearing = lambda data: without(data, Table.GOAL_POSITION) if next(damage) < 6 else data
+        torques: list[bool] = []
+        bench.saying = lambda data: torques.append(bench.bench.servos[0].torque and goals(bench)[0] == 100) or data  # type: ignore[func-returns-value]
+        before = positions(bench)
+        controller.release()
+        bench.sleep_until(bench.now() + 0.5)
+        assert not any(torques)
+        assert all(servo.torque for servo in bench.bench.servos)
+        assert all(abs(now - then) < 25 for now, then in zip(positions(bench), before, strict=True))
+        bench.bench.reboot(1)
+        bench.hearing = lambda data: without(data, Table.GOAL_POSITION)
+        bench.bench.servos[0].write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))
+        with pytest.raises(LinkTimeoutError):
+            controller.release()
+        assert not bench.bench.servos[0].torque
+
+
+def test_a_limp_servo_outside_its_own_limits_is_not_given_torque() -> None:
+    bench = VirtualBench(Options(torque=False))
+    servo = bench.bench.servos[1]
+    servo.write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        with pytest.raises(RequestRefusedError, match="joint 2: servo 2 stands at .* outside its position limits 3000"):
+            controller.release()
+        assert not servo.torque
 
 
 def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controller, bench: VirtualBench) -> None:
