@@ -160,7 +160,8 @@ class Connection:
             frames += frame * (1 if self._dialect.scale.half_duplex else copies_of(request))
             transaction.written += 1
             transaction.written_at = now
-            transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))
+            wait = self.timing.reply_timeout_s(request, len(frames))
+            transaction.deadline = now + wait + self.timing.shared_wire_s(request, self._dialect.scale)
         self._send(frames)
 
     def _send(self, data: bytes) -> None:

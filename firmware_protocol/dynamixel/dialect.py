@@ -71,7 +71,8 @@ class _Job:
 class DynamixelDialect:
     """Servos of these IDs on one bus; the first is joint 1. Set points, positions and errors are counts of 1/4096 turn.
 
-    - Stop: each servo's goal becomes its measured position, and the bench is marked as stopped (STOP_MARK).
+    - Stop: the bench is marked as stopped (STOP_MARK) before anything is read, and each servo's goal becomes its
+      measured position, within its limits.
     - Release: the same goals, and the mark is taken away; when they have been read back the torque is switched on.
       Nothing else switches it on.
     - Set points: refused beyond a servo's own position limits, or while the bench is stopped or a torque is off.
@@ -91,6 +92,7 @@ class DynamixelDialect:
             set_point_units=COUNTS_A_TURN,
             every=EVERY,
             turn_bytes=2 * (asked + told) + OVERHEAD + 4 + 5 * count,
+            greeting_bytes=count * (OVERHEAD + 1 + WHOLE[1]),
             half_duplex=True,
         )
         self._decoder = PacketDecoder()
@@ -137,6 +139,7 @@ class DynamixelDialect:
                 first = b"" if self._stopped else self._goals(request)
             case Stop():
                 self._stopped = True
+                first = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, STOP_MARK))
             case Sample() | ReadStatus() | Release():
                 pass
             case _:
@@ -162,7 +165,12 @@ class DynamixelDialect:
 
     def again(self, request: Request, frame: bytes) -> bytes:
         """Of set points, after a stop, nothing but the question: until the bus has been silent for a moment the servos
-        would take them."""
+        would take them. A stop's servos are remembered over its repeats: where one is silent the others stop."""
+        for job in self._jobs:
+            if job.request is request:
+                job.writes = 0
+                if not isinstance(request, Stop):
+                    job.heard.clear()
         return encode(sync_read(self._ids, *BLOCK)) if self._stopped and isinstance(request, WriteSetPoints) else frame
 
     def answer(self) -> bytes:
@@ -252,7 +260,7 @@ class DynamixelDialect:
         return None
 
     def _frozen(self, job: _Job, servos: Servos, tick: int) -> Reply | None:
-        """A stop: goals become the measured positions, and the bench is marked; then both are read back.
+        """A stop: the bench was marked with the question; goals become the measured positions; both are read back.
 
         Where a servo is silent the others are stopped when they answer for the second time; confirmed is nothing.
         """
@@ -262,7 +270,7 @@ class DynamixelDialect:
                 return ServosStopped(tick, tuple(one.goal for one in servos.values()))
         if self._may_write(job):
             locked = {device: one.goal for device, one in servos.items() if one.watchdog < 0}
-            job.goals = {device: one.position for device, one in servos.items()} | locked
+            job.goals = self._here(servos) | locked
             self._then(self._write(Table.GOAL_POSITION, job.goals), {Table.BUS_WATCHDOG: STOP_MARK}, set(locked))
         return None
 

@@ -8,7 +8,7 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import Capability, FineSetPoints, StatusFlag, Stop
+from firmware_protocol.commands import Capability, FineSetPoints, ReadStatus, StatusFlag, Stop
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
@@ -181,9 +181,48 @@ def test_a_limp_servo_outside_its_own_limits_is_not_given_torque() -> None:
     servo = bench.bench.servos[1]
     servo.write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
     with bench.controller() as controller:
-        with pytest.raises(RequestRefusedError, match="joint 2: servo 2 stands at .* outside its position limits 3000"):
+        with pytest.raises(RequestRefusedError, match=r"joint 2: servo 2 stands at .* outside its position limits"):
             controller.release()
         assert not servo.torque
+
+
+def test_a_stop_whose_answers_are_all_lost_still_stops(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 3000})
+    bench.sleep_until(bench.now() + 0.1)
+    bench.saying = lambda _data: b""
+    before = positions(bench)[0]
+    assert not controller.stop().acknowledged
+    assert positions(bench)[0] - before < 120
+    bench.saying = lambda data: data
+    assert StatusFlag.FROZEN in controller.status().flags
+
+
+def test_a_stop_of_a_limp_servo_outside_its_limits_is_confirmed_at_the_limit() -> None:
+    bench = VirtualBench(Options(torque=False))
+    bench.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        stopped = controller.stop()
+    assert stopped.acknowledged
+    assert stopped.frozen[2] == goals(bench)[1] == 3000
+
+
+def test_a_stop_that_gave_up_writing_writes_again_when_it_is_repeated(bench: VirtualBench) -> None:
+    with bench.controller() as controller:
+        controller.set_points({1: 2600})
+        damage = iter(range(10**6))
+        bench.hearing = lambda data: without(data, Table.GOAL_POSITION) if next(damage) < 30 else data
+        assert controller.stop().acknowledged
+
+
+def test_a_repeat_forgets_what_servos_answered_to_the_question_before(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    question = ReadStatus()
+    frame = dialect.encode(1, question)
+    first, second = each_packet(bench.bench.receive(frame))
+    assert dialect.feed(first) == []
+    assert dialect.again(question, frame) == frame
+    assert dialect.feed(second) == []
+    assert len(dialect.feed(first)) == 1
 
 
 def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controller, bench: VirtualBench) -> None:
