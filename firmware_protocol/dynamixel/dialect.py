@@ -49,6 +49,8 @@ WATCHDOG = 25
 themselves after half a second."""
 MOST_WRITES = 8
 """How often a step is written again because the servos, read back, do not hold it; then the link asks anew."""
+MOST_LATE = 3
+"""Readings in succession that seem to be late before the servos' clocks are believed."""
 NEAR = 23
 """Counts (2°) that a servo may be away from its goal when its torque is switched on."""
 
@@ -101,8 +103,8 @@ class DynamixelDialect:
         self._settings: dict[int, ServoSettings] = {}
         self._armed = self._stopped = False
         self._faults = ""
-        self._clock: int | None = None
-        self._tick = 0
+        self._clocks: dict[int, int] = {}
+        self._tick = self._late = 0
 
     @property
     def damaged(self) -> int:
@@ -226,6 +228,7 @@ class DynamixelDialect:
         self._settings = found
         servos = {device: Servo.of(block[BLOCK[0] :]) for device, block in whole.items()}
         self._time(servos)
+        self._clocks = {device: one.clock for device, one in servos.items()}
         self._stopped = any(one.stopped for one in servos.values())
         capabilities = Capability.SAMPLE | Capability.POLLED
         if all(settings.simulated for settings in self._settings.values()):
@@ -334,13 +337,22 @@ class DynamixelDialect:
     # --- what servos say of time and state
 
     def _time(self, servos: Servos) -> int:
-        """Milliseconds of the first servo's clock since this connection began, without its turns."""
-        first = servos.get(self._ids[0])
-        if first is not None:
-            if self._clock is not None:
-                passed = (first.clock - self._clock) % TICKS
-                self._tick += passed if passed < TICKS // 2 else 0  # a late answer is of an earlier time
-            self._clock = first.clock
+        """Milliseconds of the first servo's clock since this connection began, without its turns.
+
+        Time passes only when every servo's clock has gone on: a late answer is of an earlier time. Several of them in
+        succession are none: a servo has restarted, or nobody has asked for half a turn of the clocks.
+        """
+        clocks = {device: one.clock for device, one in servos.items()}
+        if len(clocks) < len(self._ids):
+            return self._tick
+        passed = {device: (clock - self._clocks.get(device, clock)) % TICKS for device, clock in clocks.items()}
+        late = any(time >= TICKS // 2 for time in passed.values())
+        self._late = self._late + 1 if late else 0
+        if all(passed.values()) and not late:
+            self._tick += passed[self._ids[0]]
+        elif self._clocks and self._late < MOST_LATE:
+            return self._tick
+        self._clocks, self._late = clocks, 0
         return self._tick
 
     def _flags(self, servos: Servos) -> int:

@@ -8,7 +8,7 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import Capability, FineSetPoints, ReadStatus, StatusFlag, Stop
+from firmware_protocol.commands import Capability, FineSetPoints, ReadStatus, Status, StatusFlag, Stop
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
@@ -290,6 +290,45 @@ def test_a_clock_that_stands_still_is_not_believed(controller: Controller, bench
     first = controller.next_snapshot()
     with pytest.raises(NoSampleError, match="the controller's clock stands still at"):
         controller.next_snapshot(first.tick + 19)
+
+
+def test_one_servo_whose_clock_stands_still_is_not_believed(controller: Controller, bench: VirtualBench) -> None:
+    first = controller.next_snapshot()
+    old: list[bytes] = []
+
+    def second_repeats_itself(data: bytes) -> bytes:
+        packets = each_packet(data)
+        old.extend(packets[1:2])
+        return b"".join([*packets[:1], *old[:1]])
+
+    bench.saying = second_repeats_itself
+    first = controller.next_snapshot(first.tick + 19)
+    with pytest.raises(NoSampleError, match="the controller's clock stands still at"):
+        controller.next_snapshot(first.tick + 19)
+
+
+def test_a_late_answer_takes_no_time_back_and_gives_none(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+
+    def told(at_s: float) -> bytes:
+        bench.sleep_until(at_s)
+        return bench.bench.receive(encode(ask.sync_read((1, 2), 64, 72)))
+
+    def tick(sequence: int, block: bytes) -> int:
+        dialect.encode(sequence, ReadStatus())
+        ((_, status),) = dialect.feed(block)
+        assert isinstance(status, Status)
+        return status.tick
+
+    early, later, last = told(1.0), told(1.1), told(1.2)
+    assert [tick(1, early), tick(2, later), tick(3, early), tick(4, last)] == [0, 100, 100, 200]
+
+
+def test_clocks_are_believed_again_after_a_long_pause(controller: Controller, bench: VirtualBench) -> None:
+    tick = controller.next_snapshot().tick
+    bench.sleep_until(bench.now() + 20.0)
+    ticks = [controller.next_snapshot(tick).tick for _ in range(2)]
+    assert tick < ticks[0]
 
 
 def test_a_set_point_beyond_a_servos_own_limits_is_refused_before_it_is_sent(bench: VirtualBench) -> None:
