@@ -96,20 +96,26 @@ class Connection:
             raise self.fail(str(error)) from error
         if data:
             with self._dialect_lock:
-                replies, answer = self._dialect.feed(data), self._dialect.answer()
+                replies = self._dialect.feed(data)
             now = self.now()
             with self.changed:
                 for sequence, reply in replies:
                     transaction = self._pending.match(sequence, reply, now)
                     if transaction is not None:
                         self._note_round_trip(transaction)
-            if answer:
-                with self._write_lock:
+            with self._write_lock:  # a stop may have been written meanwhile, and ends the steps of a release
+                with self._dialect_lock:
+                    answer = self._dialect.answer()
+                if answer:
                     self._send(answer)
         return data
 
     def forget(self, transactions: Sequence[Transaction]) -> None:
         """Ends the wait for those that are still without reply."""
+        with self._dialect_lock:
+            for transaction in transactions:
+                if transaction.reply is None:
+                    self._dialect.forget(transaction.sequence)
         with self.changed:
             for transaction in transactions:
                 self._pending.forget(transaction)

@@ -68,6 +68,8 @@ class _Job:
     goals: dict[int, int] | None = None
     """Goals by servo that the step before has written; None in the first step of several."""
     writes: int = 0
+    freed: bool = False
+    """Of a release: whether all servos have been read without a stop."""
 
 
 class DynamixelDialect:
@@ -102,6 +104,8 @@ class DynamixelDialect:
         self._next = b""
         self._settings: dict[int, ServoSettings] = {}
         self._armed = self._stopped = False
+        self._stops = 0
+        """Stops since this dialect was made, its own and those that it has seen."""
         self._faults = ""
         self._clocks: dict[int, int] = {}
         self._tick = self._late = 0
@@ -140,7 +144,7 @@ class DynamixelDialect:
             case WriteSetPoints():
                 first = b"" if self._stopped else self._goals(request)
             case Stop():
-                self._stopped = True
+                self._stopped, self._stops, self._next = True, self._stops + 1, b""
                 first = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, STOP_MARK))
             case Sample() | ReadStatus() | Release():
                 pass
@@ -175,6 +179,10 @@ class DynamixelDialect:
                     job.heard.clear()
         return encode(sync_read(self._ids, *BLOCK)) if self._stopped and isinstance(request, WriteSetPoints) else frame
 
+    def forget(self, sequence: int) -> None:
+        """A request that has been given up takes no further step."""
+        self._jobs = [job for job in self._jobs if job.sequence != sequence]
+
     def answer(self) -> bytes:
         """The instructions of the next step of what is under way."""
         written, self._next = self._next, b""
@@ -205,17 +213,19 @@ class DynamixelDialect:
 
     def _known(self, job: _Job, servos: Servos) -> Reply | None:
         """The same of the requests that need the servos' present state."""
+        if any(one.stopped for one in servos.values()) and (job.freed or not self._stopped):
+            self._stopped, self._stops = True, self._stops + 1
         tick, flags = self._time(servos), self._flags(servos)
         match job.request:
             case Sample(_, mask):
                 readings = [(joint, servos[self._ids[joint - 1]].reading) for joint in joints_of(mask)]
                 return Snapshot(tick, flags, tuple(readings))
             case ReadStatus():
-                return Status(tick, flags, 0, 0, int(any(one.stopped for one in servos.values())))
+                return Status(tick, flags, 0, 0, self._stops)
             case WriteSetPoints() as request:
                 return self._taken(job, request, servos, tick, flags)
-            case Release():
-                return self._released(job, servos)
+            case Release() as request:
+                return self._released(job, request, servos)
         return self._frozen(job, servos, tick)
 
     # --- what each request comes to
@@ -229,7 +239,9 @@ class DynamixelDialect:
         servos = {device: Servo.of(block[BLOCK[0] :]) for device, block in whole.items()}
         self._time(servos)
         self._clocks = {device: one.clock for device, one in servos.items()}
-        self._stopped = any(one.stopped for one in servos.values())
+        seen = any(one.stopped for one in servos.values())
+        self._stops += seen and not self._stopped
+        self._stopped = seen or (self._stopped and any(isinstance(job.request, Stop) for job in self._jobs))
         capabilities = Capability.SAMPLE | Capability.POLLED
         if all(settings.simulated for settings in self._settings.values()):
             capabilities |= Capability.SIMULATED
@@ -277,29 +289,40 @@ class DynamixelDialect:
             self._then(self._write(Table.GOAL_POSITION, job.goals), {Table.BUS_WATCHDOG: STOP_MARK}, set(locked))
         return None
 
-    def _released(self, job: _Job, servos: Servos) -> Reply | None:
+    def _released(self, job: _Job, request: Release, servos: Servos) -> Reply | None:
         """A release: goals become the measured positions; when they have been read back the torque is switched on."""
-        if why := faults(servos):
-            line = f"{why}; when its cause is gone, switch the bench's supply off and on"
-            return ExplainedRefusal(job.request.OPCODE, Refusal.UNFIT, line)
-        if len(self._settings) < len(self._ids):
-            line = "the servos' settings have not been read on this connection"
-            return ExplainedRefusal(job.request.OPCODE, Refusal.BAD_SESSION, line)
+        if refusal := self._not_releasable(request, servos):
+            return refusal
         if job.goals is not None and _holds(job.goals, servos):
+            job.freed = True
             limp = [device for device, one in servos.items() if not one.torque]
             if not limp:
                 self._stopped, self._armed = False, False
+                for other in self._jobs:
+                    other.heard.clear()  # what was read before
                 return Released()
             if self._may_write(job):
                 self._then(self._write(Table.TORQUE_ENABLE, dict.fromkeys(limp, 1)), {}, set())
             return None
-        if why := self._beyond(servos):
-            return ExplainedRefusal(job.request.OPCODE, Refusal.UNFIT, why)
         if self._may_write(job):
             job.goals = self._here(servos)
             free = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0))
             self._then(free + self._write(Table.GOAL_POSITION, job.goals), {}, set())
         return None
+
+    def _not_releasable(self, request: Release, servos: Servos) -> ExplainedRefusal | None:
+        """Why the bench is not released; None where it may be."""
+        if why := faults(servos):
+            why += "; when its cause is gone, switch the bench's supply off and on"
+            return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, why)
+        if request.stop != self._stops:
+            why = f"stop {self._stops} is newer than the one that was to end ({request.stop}), and it holds"
+            return ExplainedRefusal(request.OPCODE, Refusal.OTHER_STOP, why)
+        if len(self._settings) < len(self._ids):
+            why = "the servos' settings have not been read on this connection"
+            return ExplainedRefusal(request.OPCODE, Refusal.BAD_SESSION, why)
+        why = self._beyond(servos)
+        return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, why) if why else None
 
     def _here(self, servos: Servos) -> dict[int, int]:
         """Goals at which the servos stay where they are: the measured positions, within the servos' own limits."""
@@ -360,7 +383,7 @@ class DynamixelDialect:
         self._faults = faults(servos)
         if self._faults:
             flags |= StatusFlag.HARDWARE_ERROR
-        if any(one.stopped or not one.torque for one in servos.values()):
+        if self._stopped or any(not one.torque for one in servos.values()):
             flags |= StatusFlag.FROZEN
         if any(not one.torque for one in servos.values()):
             flags |= StatusFlag.NO_TORQUE
@@ -378,7 +401,7 @@ def _holds(goals: Mapping[int, int], servos: Servos) -> bool:
 
 
 _MOST_JOBS = 16
-"""Requests that are remembered while their replies are awaited; what the link has given up stays among them."""
+"""Requests that are remembered while their replies are awaited."""
 
 
 def _gains(block: bytes) -> tuple[int, int, int]:

@@ -8,12 +8,24 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import Capability, FineSetPoints, ReadStatus, Status, StatusFlag, Stop
+from firmware_protocol.commands import (
+    Capability,
+    FineSetPoints,
+    Hello,
+    ReadStatus,
+    Release,
+    Released,
+    Status,
+    StatusFlag,
+    Stop,
+    Stopped,
+)
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.dynamixel.packets import HEADER, encode
 from firmware_protocol.errors import ProtocolError
+from firmware_protocol.replies import ExplainedRefusal
 from mock_controller.servos.bench import Options
 from tests.daq.servo_bench import VirtualBench
 
@@ -114,6 +126,96 @@ def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) 
         assert StatusFlag.FROZEN not in second.status().flags
         second.set_points({1: 2100})
     assert goals(bench)[0] == 2100
+
+
+def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 2300})
+    with bench.controller() as other:
+        assert other.stop().acknowledged
+    assert StatusFlag.FROZEN in controller.status().flags
+    for servo in bench.bench.servos:
+        servo.write(Table.BUS_WATCHDOG.address, b"\0")
+    held = goals(bench)
+    with pytest.raises(RequestRefusedError, match="the bench has been stopped"):
+        controller.set_points({1: 2600})
+    assert goals(bench) == held
+    controller.release()
+    controller.set_points({1: 2600})
+
+
+def test_a_greeting_does_not_forget_a_stop_under_way(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    dialect.encode(1, Stop())
+    dialect.feed(bench.bench.receive(dialect.encode(2, Hello(2, 1))))
+    late = FineSetPoints(((1, 2600),), 4096)
+    bench.bench.receive(dialect.encode(3, late))
+    assert goals(bench)[0] != 2600
+
+
+def test_a_release_that_names_an_older_stop_is_refused(controller: Controller, bench: VirtualBench) -> None:
+    assert controller.stop().acknowledged
+    first = controller.status().stop
+    assert controller.stop().acknowledged
+    with pytest.raises(RequestRefusedError, match="stop 2 is newer than the one that was to end"):
+        controller.release(first)
+    assert StatusFlag.FROZEN in controller.status().flags
+    controller.release(first + 1)
+    assert StatusFlag.FROZEN not in controller.status().flags
+
+
+@pytest.mark.parametrize("steps", range(3))
+def test_a_stop_ends_the_steps_of_a_release_under_way(steps: int) -> None:
+    bench = VirtualBench(Options(torque=False))
+    dialect = DynamixelDialect((1, 2))
+    dialect.feed(bench.bench.receive(dialect.encode(1, Hello(2, 1))))
+    coming = bench.bench.receive(dialect.encode(2, Release(0)))
+    for _ in range(steps):
+        assert dialect.feed(coming) == []
+        bench.sleep_until(bench.now() + 0.002)
+        coming = bench.bench.receive(dialect.answer())
+    torque = bench.bench.servos[0].torque
+    dialect.feed(coming)
+    coming = bench.bench.receive(dialect.encode(3, Stop()))
+    replies = {}
+    for _ in range(4):
+        replies |= dict(dialect.feed(coming))
+        bench.sleep_until(bench.now() + 0.002)
+        coming = bench.bench.receive(dialect.answer())
+    assert isinstance(replies[3], Stopped)
+    if steps < 2:
+        assert isinstance(replies[2], ExplainedRefusal)
+        assert bench.bench.servos[0].torque == torque
+    assert all(servo[Table.BUS_WATCHDOG] == 1 for servo in bench.bench.servos)
+
+
+def test_a_stop_of_another_host_between_the_steps_of_a_release_holds() -> None:
+    bench = VirtualBench(Options(torque=False))
+    with bench.controller() as controller:
+
+        def stopped_before_the_torque(data: bytes) -> bytes:
+            written = (ask.Instruction.SYNC_WRITE, Table.TORQUE_ENABLE.address)
+            if written in map(item_of, each_packet(data)):
+                for servo in bench.bench.servos:
+                    servo.write(Table.BUS_WATCHDOG.address, b"\1")
+            return data
+
+        bench.hearing = stopped_before_the_torque
+        with pytest.raises(RequestRefusedError, match="stop 1 is newer"):
+            controller.release()
+        assert StatusFlag.FROZEN in controller.status().flags
+
+
+def test_a_release_that_was_given_up_takes_no_further_step() -> None:
+    bench = VirtualBench(Options(torque=False))
+    with bench.controller() as controller:
+        bench.bench.gone.add(2)
+        with pytest.raises(LinkTimeoutError):
+            controller.link.request(Release(0), Released)
+        bench.bench.gone.clear()
+        controller.status()
+        bench.sleep_until(bench.now() + 0.1)
+        controller.status()
+        assert not any(servo.torque for servo in bench.bench.servos)
 
 
 def test_a_stop_needs_no_greeting(bench: VirtualBench) -> None:
