@@ -97,25 +97,31 @@ class Connection:
         if data:
             with self._dialect_lock:
                 replies = self._dialect.feed(data)
+                answer = b"" if self._dialect.scale.half_duplex else self._dialect.answer()
             now = self.now()
             with self.changed:
                 for sequence, reply in replies:
                     transaction = self._pending.match(sequence, reply, now)
                     if transaction is not None:
                         self._note_round_trip(transaction)
-            with self._write_lock:  # a stop may have been written meanwhile, and ends the steps of a release
-                with self._dialect_lock:
-                    answer = self._dialect.answer()
-                if answer:
+            if self._dialect.scale.half_duplex:
+                with self._write_lock:  # a stop may have been written meanwhile, and ends the steps of a release
+                    with self._dialect_lock:
+                        answer = self._dialect.answer()
+                    if answer:
+                        self._send(answer)
+            elif answer:
+                with self._write_lock:
                     self._send(answer)
         return data
 
     def forget(self, transactions: Sequence[Transaction]) -> None:
         """Ends the wait for those that are still without reply."""
-        with self._dialect_lock:
-            for transaction in transactions:
-                if transaction.reply is None:
-                    self._dialect.forget(transaction.sequence)
+        given_up = [transaction.sequence for transaction in transactions if transaction.reply is None]
+        if given_up:
+            with self._dialect_lock:
+                for sequence in given_up:
+                    self._dialect.forget(sequence)
         with self.changed:
             for transaction in transactions:
                 self._pending.forget(transaction)
