@@ -269,6 +269,7 @@ class DynamixelDialect:
             return SetPointsTaken(tick, flags)
         if flags & StatusFlag.FROZEN or self._stopped:
             return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, _why_frozen(servos))
+        self._armed &= all(one.watchdog == WATCHDOG for one in servos.values())  # else it is begun again
         if all(servos[self._ids[joint - 1]].goal == posture for joint, posture in request.postures):
             return SetPointsTaken(tick, flags)
         job.heard.clear()  # an answer to an earlier question, or the goals were lost: the link asks again

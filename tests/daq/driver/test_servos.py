@@ -337,6 +337,16 @@ def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controlle
     assert StatusFlag.FROZEN in bench.controller().status().flags
 
 
+def test_a_watch_whose_packet_was_damaged_is_begun_with_the_next_set_points(
+    controller: Controller, bench: VirtualBench
+) -> None:
+    bench.hearing = lambda data: without(data, Table.BUS_WATCHDOG)
+    controller.set_points({1: 2100})
+    bench.hearing = lambda data: data
+    controller.set_points({1: 2105})
+    assert [servo[Table.BUS_WATCHDOG] for servo in bench.bench.servos] == [25, 25]
+
+
 def test_a_connection_that_ends_in_good_order_ends_the_watch(bench: VirtualBench) -> None:
     with bench.controller() as controller:
         controller.set_points({1: 2100})
