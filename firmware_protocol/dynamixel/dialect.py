@@ -64,6 +64,8 @@ class _Job:
     sequence: int
     request: Request
     length: int
+    stops: int
+    """Number of the newest stop when it was asked."""
     heard: dict[int, Packet] = field(default_factory=dict)
     goals: dict[int, int] | None = None
     """Goals by servo that the step before has written; None in the first step of several."""
@@ -152,7 +154,7 @@ class DynamixelDialect:
                 name = type(request).__name__
                 raise ProtocolError(f"{name}: Dynamixel servos are only read, moved, stopped and released from here")
         self._jobs = [job for job in self._jobs if job.sequence != sequence][-_MOST_JOBS:]
-        self._jobs.append(_Job(sequence, request, area[1]))
+        self._jobs.append(_Job(sequence, request, area[1], self._stops))
         return first + encode(sync_read(self._ids, *area))
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
@@ -170,14 +172,17 @@ class DynamixelDialect:
         return replies
 
     def again(self, request: Request, frame: bytes) -> bytes:
-        """Of set points, after a stop, nothing but the question: until the bus has been silent for a moment the servos
-        would take them. A stop's servos are remembered over its repeats: where one is silent the others stop."""
+        """Of set points from before a stop nothing but the question: until the bus has been silent for a moment, and
+        after a release, the servos would take them. A stop's servos are remembered over its repeats: where one is
+        silent the others stop."""
+        halted = True
         for job in self._jobs:
             if job.request is request:
+                halted = self._stopped or job.stops != self._stops
                 job.writes = 0
                 if not isinstance(request, Stop):
                     job.heard.clear()
-        return encode(sync_read(self._ids, *BLOCK)) if self._stopped and isinstance(request, WriteSetPoints) else frame
+        return encode(sync_read(self._ids, *BLOCK)) if halted and isinstance(request, WriteSetPoints) else frame
 
     def forget(self, sequence: int) -> None:
         """A request that has been given up takes no further step."""
@@ -267,7 +272,7 @@ class DynamixelDialect:
         """The set points are taken when the goals read back are those that were sent."""
         if flags & (StatusFlag.RESTARTED | StatusFlag.HARDWARE_ERROR):
             return SetPointsTaken(tick, flags)
-        if flags & StatusFlag.FROZEN or self._stopped:
+        if flags & StatusFlag.FROZEN or job.stops != self._stops:
             return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, _why_frozen(servos))
         self._armed &= all(one.watchdog == WATCHDOG for one in servos.values())  # else it is begun again
         if all(servos[self._ids[joint - 1]].goal == posture for joint, posture in request.postures):

@@ -113,6 +113,23 @@ def test_a_repeat_of_set_points_cannot_undo_a_stop(controller: Controller, bench
     assert goals(bench)[0] != 2600
 
 
+def test_set_points_from_before_a_stop_are_not_repeated_after_its_release(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    dialect.feed(bench.bench.receive(dialect.encode(1, Hello(2, 1))))
+    late = FineSetPoints(((1, 2600),), 4096)
+    lost = dialect.encode(2, late)
+    replies = {}
+    for request, sequence in ((Stop(), 3), (Release(1), 4)):
+        coming = bench.bench.receive(dialect.encode(sequence, request))
+        for _ in range(3):
+            bench.sleep_until(bench.now() + 0.002)
+            replies |= {number: reply for number, reply in dialect.feed(coming) if number != 2}
+            coming = bench.bench.receive(dialect.answer())
+    assert isinstance(replies[4], Released)
+    bench.bench.receive(dialect.again(late, lost))
+    assert goals(bench)[0] != 2600
+
+
 def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) -> None:
     with bench.controller() as first:
         first.set_points({1: 2300})
