@@ -52,6 +52,10 @@ class LinkDialect(Protocol):
         """The (sequence number, reply) pairs that `data` completes. Damage is counted, never raised."""
         ...
 
+    def forget(self, sequence: int) -> None:
+        """The host has given up this request, or has its reply: no further step of it may be written."""
+        ...
+
     def answer(self) -> bytes:
         """Bytes to be written because of what `feed` has taken in: the next step of a request that needs several."""
         ...
@@ -123,6 +127,9 @@ class FramedDialect:
         """The same bytes: the bridge refuses a command that is older than a stop."""
         del request
         return frame
+
+    def forget(self, sequence: int) -> None:
+        """Nothing: a request has one frame."""
 
     def answer(self) -> bytes:
         """Nothing: every request is one frame."""

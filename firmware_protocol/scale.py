@@ -18,6 +18,7 @@ class LineScale:
     every:           control periods from one sample to the next on a line that is quick enough
     turn_bytes:      bytes that pass for one sample of all joints and their set points, both ways together; None where
                      they are those of PROTOCOL.md, which depend on the joints asked for
+    greeting_bytes:  bytes of the answer to a greeting, where it is longer than a turn
     half_duplex:     both sides share one wire, so that a request must not be written while an answer may be coming
     """
 
@@ -26,4 +27,5 @@ class LineScale:
     position_counts: int = ADC_COUNTS
     every: int = 1
     turn_bytes: int | None = None
+    greeting_bytes: int = 0
     half_duplex: bool = False

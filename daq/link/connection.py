@@ -96,20 +96,32 @@ class Connection:
             raise self.fail(str(error)) from error
         if data:
             with self._dialect_lock:
-                replies, answer = self._dialect.feed(data), self._dialect.answer()
+                replies = self._dialect.feed(data)
+                answer = b"" if self._dialect.scale.half_duplex else self._dialect.answer()
             now = self.now()
             with self.changed:
                 for sequence, reply in replies:
                     transaction = self._pending.match(sequence, reply, now)
                     if transaction is not None:
                         self._note_round_trip(transaction)
-            if answer:
+            if self._dialect.scale.half_duplex:
+                with self._write_lock:  # a stop may have been written meanwhile, and ends the steps of a release
+                    with self._dialect_lock:
+                        answer = self._dialect.answer()
+                    if answer:
+                        self._send(answer)
+            elif answer:
                 with self._write_lock:
                     self._send(answer)
         return data
 
     def forget(self, transactions: Sequence[Transaction]) -> None:
         """Ends the wait for those that are still without reply."""
+        given_up = [transaction.sequence for transaction in transactions if transaction.reply is None]
+        if given_up:
+            with self._dialect_lock:
+                for sequence in given_up:
+                    self._dialect.forget(sequence)
         with self.changed:
             for transaction in transactions:
                 self._pending.forget(transaction)
@@ -160,7 +172,8 @@ class Connection:
             frames += frame * (1 if self._dialect.scale.half_duplex else copies_of(request))
             transaction.written += 1
             transaction.written_at = now
-            transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))
+            wait = self.timing.reply_timeout_s(request, len(frames))
+            transaction.deadline = now + wait + self.timing.shared_wire_s(request, self._dialect.scale)
         self._send(frames)
 
     def _send(self, data: bytes) -> None:

@@ -6,12 +6,16 @@ from dataclasses import dataclass
 
 from firmware_protocol.commands import REPLIES, Hello, MoveAndSample, Request, Sample, Stop
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
+from firmware_protocol.scale import LineScale
 
 REPLY_MARGIN_S = 0.025
 """Time allowed for a reply beyond its time on the line, for bridge, adapter (USB holds bytes for up to 16 ms) and
 host."""
 STOP_MARGIN_S = 0.010
 """The same for a stop, which is repeated sooner because a repetition costs nothing."""
+SHARED_STOP_MARGIN_S = REPLY_MARGIN_S
+"""The same for a stop where both sides share one wire: a repetition sooner would collide with an answer, and would keep
+servos that have heard the stop from the 20 ms of silence after which they stop by themselves."""
 RETRIES = 8
 """Repetitions of one request. With one frame in ten damaged, one transaction in 10^6 fails for good."""
 HELLO_RETRIES = 40
@@ -49,6 +53,14 @@ class LinkTiming:
             return line + STOP_MARGIN_S
         waiting = self.period_s if isinstance(request, Sample | MoveAndSample) else 0.0
         return line + REPLY_MARGIN_S + waiting
+
+    def shared_wire_s(self, request: Request, scale: LineScale) -> float:
+        """How much longer (s) it may take where both sides share one wire: a turn of that line, or its greeting."""
+        if not scale.half_duplex:
+            return 0.0
+        answer = max(scale.turn_bytes or 0, scale.greeting_bytes if isinstance(request, Hello) else 0)
+        stop = SHARED_STOP_MARGIN_S - STOP_MARGIN_S if isinstance(request, Stop) else 0.0
+        return answer / self.bytes_per_second + stop
 
     def retries_of(self, request: Request) -> int:
         """How often `request` is repeated before it counts as failed; greeting and stop have numbers of their own."""

@@ -89,6 +89,8 @@ FIRST_IN_RAM = 64
 """From here on values may be written while the torque is on, and are lost with the supply."""
 POSITION_MODE = 3
 """Operating Mode of position control within one turn."""
+TORQUE_ON_BY_GOAL = 0x08
+"""Bit of Drive Mode: every goal that is written switches the torque on."""
 COUNTS_A_TURN = 4096
 """Counts of goal and present position in a turn (0.088° each)."""
 FULL_PWM = 885

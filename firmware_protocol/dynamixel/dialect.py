@@ -49,6 +49,10 @@ WATCHDOG = 25
 themselves after half a second."""
 MOST_WRITES = 8
 """How often a step is written again because the servos, read back, do not hold it; then the link asks anew."""
+MOST_LATE = 3
+"""Readings in succession that seem to be late before the servos' clocks are believed."""
+NEAR = 23
+"""Counts (2°) that a servo may be away from its goal when its torque is switched on."""
 
 Servos = dict[int, Servo]
 
@@ -60,17 +64,23 @@ class _Job:
     sequence: int
     request: Request
     length: int
+    stops: int
+    """Number of the newest stop when it was asked."""
     heard: dict[int, Packet] = field(default_factory=dict)
     goals: dict[int, int] | None = None
     """Goals by servo that the step before has written; None in the first step of several."""
     writes: int = 0
+    freed: bool = False
+    """Of a release: whether all servos have been read without a stop."""
 
 
 class DynamixelDialect:
     """Servos of these IDs on one bus; the first is joint 1. Set points, positions and errors are counts of 1/4096 turn.
 
-    - Stop: each servo's goal becomes its measured position, and the bench is marked as stopped (STOP_MARK).
-    - Release: the same goals, the mark is taken away, and the torque switched on. Nothing else switches it on.
+    - Stop: the bench is marked as stopped (STOP_MARK) before anything is read, and each servo's goal becomes its
+      measured position, within its limits.
+    - Release: the same goals, and the mark is taken away; when they have been read back the torque is switched on.
+      Nothing else switches it on.
     - Set points: refused beyond a servo's own position limits, or while the bench is stopped or a torque is off.
     """
 
@@ -89,6 +99,7 @@ class DynamixelDialect:
             position_counts=COUNTS_A_TURN,
             every=EVERY,
             turn_bytes=2 * (asked + told) + OVERHEAD + 4 + 5 * count,
+            greeting_bytes=count * (OVERHEAD + 1 + WHOLE[1]),
             half_duplex=True,
         )
         self._decoder = PacketDecoder()
@@ -96,9 +107,11 @@ class DynamixelDialect:
         self._next = b""
         self._settings: dict[int, ServoSettings] = {}
         self._armed = self._stopped = False
+        self._stops = 0
+        """Stops since this dialect was made, its own and those that it has seen."""
         self._faults = ""
-        self._clock: int | None = None
-        self._tick = 0
+        self._clocks: dict[int, int] = {}
+        self._tick = self._late = 0
 
     @property
     def damaged(self) -> int:
@@ -134,14 +147,15 @@ class DynamixelDialect:
             case WriteSetPoints():
                 first = b"" if self._stopped else self._goals(request)
             case Stop():
-                self._stopped = True
+                self._stopped, self._stops, self._next = True, self._stops + 1, b""
+                first = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, STOP_MARK))
             case Sample() | ReadStatus() | Release():
                 pass
             case _:
                 name = type(request).__name__
                 raise ProtocolError(f"{name}: Dynamixel servos are only read, moved, stopped and released from here")
         self._jobs = [job for job in self._jobs if job.sequence != sequence][-_MOST_JOBS:]
-        self._jobs.append(_Job(sequence, request, area[1]))
+        self._jobs.append(_Job(sequence, request, area[1], self._stops))
         return first + encode(sync_read(self._ids, *area))
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
@@ -159,9 +173,21 @@ class DynamixelDialect:
         return replies
 
     def again(self, request: Request, frame: bytes) -> bytes:
-        """Of set points, after a stop, nothing but the question: until the bus has been silent for a moment the servos
-        would take them."""
-        return encode(sync_read(self._ids, *BLOCK)) if self._stopped and isinstance(request, WriteSetPoints) else frame
+        """Of set points from before a stop nothing but the question: until the bus has been silent for a moment, and
+        after a release, the servos would take them. A stop's servos are remembered over its repeats: where one is
+        silent the others stop."""
+        halted = True
+        for job in self._jobs:
+            if job.request is request:
+                halted = self._stopped or job.stops != self._stops
+                job.writes = 0
+                if not isinstance(request, Stop):
+                    job.heard.clear()
+        return encode(sync_read(self._ids, *BLOCK)) if halted and isinstance(request, WriteSetPoints) else frame
+
+    def forget(self, sequence: int) -> None:
+        """A request that has been given up takes no further step."""
+        self._jobs = [job for job in self._jobs if job.sequence != sequence]
 
     def answer(self) -> bytes:
         """The instructions of the next step of what is under way."""
@@ -193,29 +219,35 @@ class DynamixelDialect:
 
     def _known(self, job: _Job, servos: Servos) -> Reply | None:
         """The same of the requests that need the servos' present state."""
+        if any(one.stopped for one in servos.values()) and (job.freed or not self._stopped):
+            self._stopped, self._stops = True, self._stops + 1
         tick, flags = self._time(servos), self._flags(servos)
         match job.request:
             case Sample(_, mask):
                 readings = [(joint, servos[self._ids[joint - 1]].reading) for joint in joints_of(mask)]
                 return Snapshot(tick, flags, tuple(readings))
             case ReadStatus():
-                return Status(tick, flags, 0, 0, int(any(one.stopped for one in servos.values())))
+                return Status(tick, flags, 0, 0, self._stops)
             case WriteSetPoints() as request:
                 return self._taken(job, request, servos, tick, flags)
-            case Release():
-                return self._released(job, servos)
+            case Release() as request:
+                return self._released(job, request, servos)
         return self._frozen(job, servos, tick)
 
     # --- what each request comes to
 
     def _greeted(self, request: Hello, whole: Mapping[int, bytes]) -> Reply:
-        self._settings = {device: ServoSettings.of(block) for device, block in whole.items()}
-        for device, settings in self._settings.items():
+        found = {device: ServoSettings.of(block) for device, block in whole.items()}
+        for device, settings in found.items():
             if why := settings.unfit():
                 return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, f"servo {device} {why}")
+        self._settings = found
         servos = {device: Servo.of(block[BLOCK[0] :]) for device, block in whole.items()}
         self._time(servos)
-        self._stopped = any(one.stopped for one in servos.values())
+        self._clocks = {device: one.clock for device, one in servos.items()}
+        seen = any(one.stopped for one in servos.values())
+        self._stops += seen and not self._stopped
+        self._stopped = seen or (self._stopped and any(isinstance(job.request, Stop) for job in self._jobs))
         capabilities = Capability.SAMPLE | Capability.POLLED
         if all(settings.simulated for settings in self._settings.values()):
             capabilities |= Capability.SIMULATED
@@ -241,15 +273,16 @@ class DynamixelDialect:
         """The set points are taken when the goals read back are those that were sent."""
         if flags & (StatusFlag.RESTARTED | StatusFlag.HARDWARE_ERROR):
             return SetPointsTaken(tick, flags)
-        if flags & StatusFlag.FROZEN or self._stopped:
+        if flags & StatusFlag.FROZEN or job.stops != self._stops:
             return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, _why_frozen(servos))
+        self._armed &= all(one.watchdog == WATCHDOG for one in servos.values())  # else it is begun again
         if all(servos[self._ids[joint - 1]].goal == posture for joint, posture in request.postures):
             return SetPointsTaken(tick, flags)
         job.heard.clear()  # an answer to an earlier question, or the goals were lost: the link asks again
         return None
 
     def _frozen(self, job: _Job, servos: Servos, tick: int) -> Reply | None:
-        """A stop: goals become the measured positions, and the bench is marked; then both are read back.
+        """A stop: the bench was marked with the question; goals become the measured positions; both are read back.
 
         Where a servo is silent the others are stopped when they answer for the second time; confirmed is nothing.
         """
@@ -259,25 +292,62 @@ class DynamixelDialect:
                 return ServosStopped(tick, tuple(one.goal for one in servos.values()))
         if self._may_write(job):
             locked = {device: one.goal for device, one in servos.items() if one.watchdog < 0}
-            job.goals = {device: one.position for device, one in servos.items()} | locked
+            job.goals = self._here(servos) | locked
             self._then(self._write(Table.GOAL_POSITION, job.goals), {Table.BUS_WATCHDOG: STOP_MARK}, set(locked))
         return None
 
-    def _released(self, job: _Job, servos: Servos) -> Reply | None:
-        """A release: each servo holds the position that it has, with its torque on."""
-        if why := faults(servos):
-            line = f"{why}; when its cause is gone, switch the bench's supply off and on"
-            return ExplainedRefusal(job.request.OPCODE, Refusal.UNFIT, line)
-        if job.goals is not None:
-            ready = (s.torque and not s.stopped and s.goal == job.goals[device] for device, s in servos.items())
-            if all(ready):
+    def _released(self, job: _Job, request: Release, servos: Servos) -> Reply | None:
+        """A release: goals become the measured positions; when they have been read back the torque is switched on."""
+        if refusal := self._not_releasable(request, servos):
+            return refusal
+        if job.goals is not None and _holds(job.goals, servos):
+            job.freed = True
+            limp = [device for device, one in servos.items() if not one.torque]
+            if not limp:
                 self._stopped, self._armed = False, False
+                for other in self._jobs:
+                    other.heard.clear()  # what was read before
                 return Released()
+            if self._may_write(job):
+                self._then(self._write(Table.TORQUE_ENABLE, dict.fromkeys(limp, 1)), {}, set())
+            return None
         if self._may_write(job):
-            job.goals = {device: one.position for device, one in servos.items()}
+            job.goals = self._here(servos)
             free = self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0))
-            self._then(free + self._write(Table.GOAL_POSITION, job.goals), {Table.TORQUE_ENABLE: 1}, set())
+            self._then(free + self._write(Table.GOAL_POSITION, job.goals), {}, set())
         return None
+
+    def _not_releasable(self, request: Release, servos: Servos) -> ExplainedRefusal | None:
+        """Why the bench is not released; None where it may be."""
+        if why := faults(servos):
+            why += "; when its cause is gone, switch the bench's supply off and on"
+            return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, why)
+        if request.stop != self._stops:
+            why = f"stop {self._stops} is newer than the one that was to end ({request.stop}), and it holds"
+            return ExplainedRefusal(request.OPCODE, Refusal.OTHER_STOP, why)
+        if len(self._settings) < len(self._ids):
+            why = "the servos' settings have not been read on this connection"
+            return ExplainedRefusal(request.OPCODE, Refusal.BAD_SESSION, why)
+        why = self._beyond(servos)
+        return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, why) if why else None
+
+    def _here(self, servos: Servos) -> dict[int, int]:
+        """Goals at which the servos stay where they are: the measured positions, within the servos' own limits."""
+        goals = {device: one.position for device, one in servos.items()}
+        own = self._settings
+        return {i: max(own[i].low, min(own[i].high, goal)) if i in own else goal for i, goal in goals.items()}
+
+    def _beyond(self, servos: Servos) -> str:
+        """Why no goal would hold a servo where it is; empty where one would. A servo that has its torque may sag a
+        little beyond a limit."""
+        for device, goal in self._here(servos).items():
+            one, own = servos[device], self._settings[device]
+            if abs(one.position - goal) > (NEAR if one.torque else 0):
+                return (
+                    f"joint {self._ids.index(device) + 1}: servo {device} stands at {one.position} counts, outside its "
+                    f"position limits {own.low} to {own.high}: turn it back by hand, then release again"
+                )
+        return ""
 
     def _may_write(self, job: _Job) -> bool:
         job.heard.clear()
@@ -297,13 +367,22 @@ class DynamixelDialect:
     # --- what servos say of time and state
 
     def _time(self, servos: Servos) -> int:
-        """Milliseconds of the first servo's clock since this connection began, without its turns."""
-        first = servos.get(self._ids[0])
-        if first is not None:
-            if self._clock is not None:
-                passed = (first.clock - self._clock) % TICKS
-                self._tick += passed if passed < TICKS // 2 else 0  # a late answer is of an earlier time
-            self._clock = first.clock
+        """Milliseconds of the first servo's clock since this connection began, without its turns.
+
+        Time passes only when every servo's clock has gone on: a late answer is of an earlier time. Several of them in
+        succession are none: a servo has restarted, or nobody has asked for half a turn of the clocks.
+        """
+        clocks = {device: one.clock for device, one in servos.items()}
+        if len(clocks) < len(self._ids):
+            return self._tick
+        passed = {device: (clock - self._clocks.get(device, clock)) % TICKS for device, clock in clocks.items()}
+        late = any(time >= TICKS // 2 for time in passed.values())
+        self._late = self._late + 1 if late else 0
+        if all(passed.values()) and not late:
+            self._tick += passed[self._ids[0]]
+        elif self._clocks and self._late < MOST_LATE:
+            return self._tick
+        self._clocks, self._late = clocks, 0
         return self._tick
 
     def _flags(self, servos: Servos) -> int:
@@ -311,7 +390,7 @@ class DynamixelDialect:
         self._faults = faults(servos)
         if self._faults:
             flags |= StatusFlag.HARDWARE_ERROR
-        if any(one.stopped or not one.torque for one in servos.values()):
+        if self._stopped or any(not one.torque for one in servos.values()):
             flags |= StatusFlag.FROZEN
         if any(not one.torque for one in servos.values()):
             flags |= StatusFlag.NO_TORQUE
@@ -320,8 +399,16 @@ class DynamixelDialect:
         return int(flags)
 
 
+def _holds(goals: Mapping[int, int], servos: Servos) -> bool:
+    """Whether each servo is free, has the goal that was written, and would not turn if its torque came on now."""
+    return all(
+        not one.stopped and one.goal == goals[device] and (one.torque or abs(one.goal - one.position) <= NEAR)
+        for device, one in servos.items()
+    )
+
+
 _MOST_JOBS = 16
-"""Requests that are remembered while their replies are awaited; what the link has given up stays among them."""
+"""Requests that are remembered while their replies are awaited."""
 
 
 def _gains(block: bytes) -> tuple[int, int, int]:

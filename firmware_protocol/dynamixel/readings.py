@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from firmware_protocol.dynamixel.control_table import POSITION_MODE, WATCHDOG_ERROR, Table, in_words
+from firmware_protocol.dynamixel.control_table import POSITION_MODE, TORQUE_ON_BY_GOAL, WATCHDOG_ERROR, Table, in_words
 from firmware_protocol.joints import JointReading
 from firmware_protocol.message import check_range
 from firmware_protocol.replies import Gains, Stopped
@@ -106,6 +106,7 @@ class ServoSettings:
     """What a servo keeps without a supply, as far as it decides whether it can be driven."""
 
     simulated: bool
+    drive: int
     mode: int
     low: int
     high: int
@@ -116,6 +117,7 @@ class ServoSettings:
         information = whole[Table.MODEL_INFORMATION.address :][: Table.MODEL_INFORMATION.size]
         return cls(
             simulated=information == SIMULATED,
+            drive=Table.DRIVE_MODE.of(whole),
             mode=Table.OPERATING_MODE.of(whole),
             low=Table.MIN_POSITION_LIMIT.of(whole),
             high=Table.MAX_POSITION_LIMIT.of(whole),
@@ -125,6 +127,8 @@ class ServoSettings:
         """Why it cannot be driven; empty where it can."""
         if self.mode != POSITION_MODE:
             return f"is in operating mode {self.mode}, position control ({POSITION_MODE}) is needed"
+        if self.drive & TORQUE_ON_BY_GOAL:
+            return "has Torque On by Goal Update (Drive Mode bit 3): a goal would switch its torque on; clear the bit"
         return ""
 
 

@@ -10,6 +10,7 @@ from firmware_protocol.dynamixel.control_table import (
     FULL_PWM,
     POSITION_MODE,
     TICKS,
+    TORQUE_ON_BY_GOAL,
     WATCHDOG_ERROR,
     HardwareError,
     Table,
@@ -124,6 +125,8 @@ class Servo:
                 return error
         for item, value in values.items():
             self._set(item, value)
+        if Table.GOAL_POSITION in values and self[Table.DRIVE_MODE] & TORQUE_ON_BY_GOAL:
+            self._set(Table.TORQUE_ENABLE, 1)
         self._silent = 0
         return None
 

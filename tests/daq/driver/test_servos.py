@@ -8,12 +8,24 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import Capability, FineSetPoints, StatusFlag, Stop
+from firmware_protocol.commands import (
+    Capability,
+    FineSetPoints,
+    Hello,
+    ReadStatus,
+    Release,
+    Released,
+    Status,
+    StatusFlag,
+    Stop,
+    Stopped,
+)
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
-from firmware_protocol.dynamixel.packets import encode
+from firmware_protocol.dynamixel.packets import HEADER, encode
 from firmware_protocol.errors import ProtocolError
+from firmware_protocol.replies import ExplainedRefusal
 from mock_controller.servos.bench import Options
 from tests.daq.servo_bench import VirtualBench
 
@@ -101,6 +113,23 @@ def test_a_repeat_of_set_points_cannot_undo_a_stop(controller: Controller, bench
     assert goals(bench)[0] != 2600
 
 
+def test_set_points_from_before_a_stop_are_not_repeated_after_its_release(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    dialect.feed(bench.bench.receive(dialect.encode(1, Hello(2, 1))))
+    late = FineSetPoints(((1, 2600),), 4096)
+    lost = dialect.encode(2, late)
+    replies = {}
+    for request, sequence in ((Stop(), 3), (Release(1), 4)):
+        coming = bench.bench.receive(dialect.encode(sequence, request))
+        for _ in range(3):
+            bench.sleep_until(bench.now() + 0.002)
+            replies |= {number: reply for number, reply in dialect.feed(coming) if number != 2}
+            coming = bench.bench.receive(dialect.answer())
+    assert isinstance(replies[4], Released)
+    bench.bench.receive(dialect.again(late, lost))
+    assert goals(bench)[0] != 2600
+
+
 def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) -> None:
     with bench.controller() as first:
         first.set_points({1: 2300})
@@ -114,6 +143,96 @@ def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) 
         assert StatusFlag.FROZEN not in second.status().flags
         second.set_points({1: 2100})
     assert goals(bench)[0] == 2100
+
+
+def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 2300})
+    with bench.controller() as other:
+        assert other.stop().acknowledged
+    assert StatusFlag.FROZEN in controller.status().flags
+    for servo in bench.bench.servos:
+        servo.write(Table.BUS_WATCHDOG.address, b"\0")
+    held = goals(bench)
+    with pytest.raises(RequestRefusedError, match="the bench has been stopped"):
+        controller.set_points({1: 2600})
+    assert goals(bench) == held
+    controller.release()
+    controller.set_points({1: 2600})
+
+
+def test_a_greeting_does_not_forget_a_stop_under_way(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    dialect.encode(1, Stop())
+    dialect.feed(bench.bench.receive(dialect.encode(2, Hello(2, 1))))
+    late = FineSetPoints(((1, 2600),), 4096)
+    bench.bench.receive(dialect.encode(3, late))
+    assert goals(bench)[0] != 2600
+
+
+def test_a_release_that_names_an_older_stop_is_refused(controller: Controller, bench: VirtualBench) -> None:
+    assert controller.stop().acknowledged
+    first = controller.status().stop
+    assert controller.stop().acknowledged
+    with pytest.raises(RequestRefusedError, match="stop 2 is newer than the one that was to end"):
+        controller.release(first)
+    assert StatusFlag.FROZEN in controller.status().flags
+    controller.release(first + 1)
+    assert StatusFlag.FROZEN not in controller.status().flags
+
+
+@pytest.mark.parametrize("steps", range(3))
+def test_a_stop_ends_the_steps_of_a_release_under_way(steps: int) -> None:
+    bench = VirtualBench(Options(torque=False))
+    dialect = DynamixelDialect((1, 2))
+    dialect.feed(bench.bench.receive(dialect.encode(1, Hello(2, 1))))
+    coming = bench.bench.receive(dialect.encode(2, Release(0)))
+    for _ in range(steps):
+        assert dialect.feed(coming) == []
+        bench.sleep_until(bench.now() + 0.002)
+        coming = bench.bench.receive(dialect.answer())
+    torque = bench.bench.servos[0].torque
+    dialect.feed(coming)
+    coming = bench.bench.receive(dialect.encode(3, Stop()))
+    replies = {}
+    for _ in range(4):
+        replies |= dict(dialect.feed(coming))
+        bench.sleep_until(bench.now() + 0.002)
+        coming = bench.bench.receive(dialect.answer())
+    assert isinstance(replies[3], Stopped)
+    if steps < 2:
+        assert isinstance(replies[2], ExplainedRefusal)
+        assert bench.bench.servos[0].torque == torque
+    assert all(servo[Table.BUS_WATCHDOG] == 1 for servo in bench.bench.servos)
+
+
+def test_a_stop_of_another_host_between_the_steps_of_a_release_holds() -> None:
+    bench = VirtualBench(Options(torque=False))
+    with bench.controller() as controller:
+
+        def stopped_before_the_torque(data: bytes) -> bytes:
+            written = (ask.Instruction.SYNC_WRITE, Table.TORQUE_ENABLE.address)
+            if written in map(item_of, each_packet(data)):
+                for servo in bench.bench.servos:
+                    servo.write(Table.BUS_WATCHDOG.address, b"\1")
+            return data
+
+        bench.hearing = stopped_before_the_torque
+        with pytest.raises(RequestRefusedError, match="stop 1 is newer"):
+            controller.release()
+        assert StatusFlag.FROZEN in controller.status().flags
+
+
+def test_a_release_that_was_given_up_takes_no_further_step() -> None:
+    bench = VirtualBench(Options(torque=False))
+    with bench.controller() as controller:
+        bench.bench.gone.add(2)
+        with pytest.raises(LinkTimeoutError):
+            controller.link.request(Release(0), Released)
+        bench.bench.gone.clear()
+        controller.status()
+        bench.sleep_until(bench.now() + 0.1)
+        controller.status()
+        assert not any(servo.torque for servo in bench.bench.servos)
 
 
 def test_a_stop_needs_no_greeting(bench: VirtualBench) -> None:
@@ -138,6 +257,93 @@ def test_torque_comes_on_by_a_release_alone_and_moves_nothing() -> None:
         assert all(abs(now - then) < 25 for now, then in zip(positions(bench), before, strict=True))
 
 
+def item_of(packet: bytes) -> tuple[int, int]:
+    """Instruction and address of one packet of the host's."""
+    return packet[7], int.from_bytes(packet[8:10], "little")
+
+
+def each_packet(data: bytes) -> list[bytes]:
+    return [HEADER + piece for piece in data.split(HEADER)[1:]]
+
+
+def without(data: bytes, item: Table) -> bytes:
+    """What is heard when the Sync Writes to this item are damaged on the bus."""
+    lost = (ask.Instruction.SYNC_WRITE, item.address)
+    return b"".join(packet for packet in each_packet(data) if item_of(packet) != lost)
+
+
+def test_no_torque_comes_on_while_a_goal_has_not_arrived() -> None:
+    bench = VirtualBench(Options(torque=False))
+    for servo in bench.bench.servos:
+        servo.write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        damage = iter(range(10**6))
+        bench.hearing = lambda data: without(data, Table.GOAL_POSITION) if next(damage) < 6 else data
+        torques: list[bool] = []
+        bench.saying = lambda data: torques.append(bench.bench.servos[0].torque and goals(bench)[0] == 100) or data  # type: ignore[func-returns-value]
+        before = positions(bench)
+        controller.release()
+        bench.sleep_until(bench.now() + 0.5)
+        assert not any(torques)
+        assert all(servo.torque for servo in bench.bench.servos)
+        assert all(abs(now - then) < 25 for now, then in zip(positions(bench), before, strict=True))
+        bench.bench.reboot(1)
+        bench.hearing = lambda data: without(data, Table.GOAL_POSITION)
+        bench.bench.servos[0].write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))
+        with pytest.raises(LinkTimeoutError):
+            controller.release()
+        assert not bench.bench.servos[0].torque
+
+
+def test_a_limp_servo_outside_its_own_limits_is_not_given_torque() -> None:
+    bench = VirtualBench(Options(torque=False))
+    servo = bench.bench.servos[1]
+    servo.write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        with pytest.raises(RequestRefusedError, match=r"joint 2: servo 2 stands at .* outside its position limits"):
+            controller.release()
+        assert not servo.torque
+
+
+def test_a_stop_whose_answers_are_all_lost_still_stops(controller: Controller, bench: VirtualBench) -> None:
+    controller.set_points({1: 3000})
+    bench.sleep_until(bench.now() + 0.1)
+    bench.saying = lambda _data: b""
+    before = positions(bench)[0]
+    assert not controller.stop().acknowledged
+    assert positions(bench)[0] - before < 120
+    bench.saying = lambda data: data
+    assert StatusFlag.FROZEN in controller.status().flags
+
+
+def test_a_stop_of_a_limp_servo_outside_its_limits_is_confirmed_at_the_limit() -> None:
+    bench = VirtualBench(Options(torque=False))
+    bench.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        stopped = controller.stop()
+    assert stopped.acknowledged
+    assert stopped.frozen[2] == goals(bench)[1] == 3000
+
+
+def test_a_stop_that_gave_up_writing_writes_again_when_it_is_repeated(bench: VirtualBench) -> None:
+    with bench.controller() as controller:
+        controller.set_points({1: 2600})
+        damage = iter(range(10**6))
+        bench.hearing = lambda data: without(data, Table.GOAL_POSITION) if next(damage) < 30 else data
+        assert controller.stop().acknowledged
+
+
+def test_a_repeat_forgets_what_servos_answered_to_the_question_before(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+    question = ReadStatus()
+    frame = dialect.encode(1, question)
+    first, second = each_packet(bench.bench.receive(frame))
+    assert dialect.feed(first) == []
+    assert dialect.again(question, frame) == frame
+    assert dialect.feed(second) == []
+    assert len(dialect.feed(first)) == 1
+
+
 def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controller, bench: VirtualBench) -> None:
     controller.set_points({1: 3000})
     bench.sleep_until(bench.now() + 0.45)
@@ -146,6 +352,16 @@ def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controlle
     bench.sleep_until(bench.now() + 1.0)
     assert positions(bench) == held
     assert StatusFlag.FROZEN in bench.controller().status().flags
+
+
+def test_a_watch_whose_packet_was_damaged_is_begun_with_the_next_set_points(
+    controller: Controller, bench: VirtualBench
+) -> None:
+    bench.hearing = lambda data: without(data, Table.BUS_WATCHDOG)
+    controller.set_points({1: 2100})
+    bench.hearing = lambda data: data
+    controller.set_points({1: 2105})
+    assert [servo[Table.BUS_WATCHDOG] for servo in bench.bench.servos] == [25, 25]
 
 
 def test_a_connection_that_ends_in_good_order_ends_the_watch(bench: VirtualBench) -> None:
@@ -205,6 +421,45 @@ def test_a_clock_that_stands_still_is_not_believed(controller: Controller, bench
         controller.next_snapshot(first.tick + 19)
 
 
+def test_one_servo_whose_clock_stands_still_is_not_believed(controller: Controller, bench: VirtualBench) -> None:
+    first = controller.next_snapshot()
+    old: list[bytes] = []
+
+    def second_repeats_itself(data: bytes) -> bytes:
+        packets = each_packet(data)
+        old.extend(packets[1:2])
+        return b"".join([*packets[:1], *old[:1]])
+
+    bench.saying = second_repeats_itself
+    first = controller.next_snapshot(first.tick + 19)
+    with pytest.raises(NoSampleError, match="the controller's clock stands still at"):
+        controller.next_snapshot(first.tick + 19)
+
+
+def test_a_late_answer_takes_no_time_back_and_gives_none(bench: VirtualBench) -> None:
+    dialect = DynamixelDialect((1, 2))
+
+    def told(at_s: float) -> bytes:
+        bench.sleep_until(at_s)
+        return bench.bench.receive(encode(ask.sync_read((1, 2), 64, 72)))
+
+    def tick(sequence: int, block: bytes) -> int:
+        dialect.encode(sequence, ReadStatus())
+        ((_, status),) = dialect.feed(block)
+        assert isinstance(status, Status)
+        return status.tick
+
+    early, later, last = told(1.0), told(1.1), told(1.2)
+    assert [tick(1, early), tick(2, later), tick(3, early), tick(4, last)] == [0, 100, 100, 200]
+
+
+def test_clocks_are_believed_again_after_a_long_pause(controller: Controller, bench: VirtualBench) -> None:
+    tick = controller.next_snapshot().tick
+    bench.sleep_until(bench.now() + 20.0)
+    ticks = [controller.next_snapshot(tick).tick for _ in range(2)]
+    assert tick < ticks[0]
+
+
 def test_a_set_point_beyond_a_servos_own_limits_is_refused_before_it_is_sent(bench: VirtualBench) -> None:
     limited = VirtualBench(Options(torque=False))
     limited.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (1000).to_bytes(4, "little"))
@@ -220,6 +475,17 @@ def test_a_servo_in_another_mode_is_not_driven() -> None:
     bench.bench.servos[1].write(Table.OPERATING_MODE.address, b"\1")
     with pytest.raises(RequestRefusedError, match=r"servo 2 is in operating mode 1, position control \(3\) is needed"):
         bench.controller()
+
+
+def test_a_servo_whose_torque_comes_on_with_every_goal_is_not_driven() -> None:
+    bench = VirtualBench(Options(torque=False))
+    servo = bench.bench.servos[1]
+    servo.write(Table.DRIVE_MODE.address, b"\x08")
+    with pytest.raises(RequestRefusedError, match="servo 2 has Torque On by Goal Update"):
+        bench.controller()
+    assert not servo.torque
+    servo.write(Table.GOAL_POSITION.address, (2000).to_bytes(4, "little"))
+    assert servo.torque
 
 
 def test_what_servos_do_not_have_is_refused_in_one_line(controller: Controller) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from daq.link.timing import LinkTiming, copies_of, reply_opcode
 from firmware_protocol.commands import Hello, ReadStatus, Request, Sample, Status, Stop, Stopped
+from firmware_protocol.scale import LineScale
 
 LINE = LinkTiming(bytes_per_second=11520.0, period_s=0.03)
 FULL_FRAMES = 2 * 57
@@ -34,3 +35,12 @@ def test_only_a_stop_is_written_twice_at_once() -> None:
 
 def test_a_request_is_answered_by_its_own_kind_of_reply() -> None:
     assert (reply_opcode(Stop()), reply_opcode(ReadStatus())) == (Stopped.OPCODE, Status.OPCODE)
+
+
+def test_a_shared_wire_is_given_the_time_of_its_own_answers() -> None:
+    shared = LineScale(turn_bytes=400, greeting_bytes=1000, half_duplex=True)
+    line = LinkTiming(5760.0)
+    assert line.shared_wire_s(ReadStatus(), shared) == pytest.approx(400 / 5760)
+    assert line.shared_wire_s(Hello(2, 1), shared) == pytest.approx(1000 / 5760)
+    assert line.shared_wire_s(Hello(2, 1), LineScale(turn_bytes=400)) == 0.0
+    assert line.reply_timeout_s(Stop(), 30) + line.shared_wire_s(Stop(), shared) > 0.020
