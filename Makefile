@@ -122,8 +122,9 @@ UPGRADE ?=
 COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --custom-compile-command "make requirements"
 
+# Those of development come first: what the tests need may hold a package back that the product alone would not.
 requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
 	@$(COMPILE) --group installer --output-file requirements-installer.txt
-	@$(COMPILE) pyproject.toml --group build --output-file requirements.txt
-	@$(COMPILE) pyproject.toml --all-extras --group build --group dev --constraint requirements.txt --output-file requirements-dev.txt
+	@$(COMPILE) pyproject.toml --all-extras --group build --group dev --output-file requirements-dev.txt
+	@$(COMPILE) pyproject.toml --group build --constraint requirements-dev.txt --output-file requirements.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)
