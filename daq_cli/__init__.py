@@ -14,6 +14,16 @@ def main() -> None:
         early_stop.ask()
     # Matrices here are thin: a second thread in each product costs a fifth of a diagnosis. Simulations share the cores.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from daq_cli.app.command import main as run
+    from daq.contracts.errors import DaqError
+    from daq.contracts.extras import missing_extras_named
+    from daq_cli.app.needed import called, extra_of
 
-    run()
+    command = called(sys.argv[1:])
+    try:
+        with missing_extras_named(f"daq {command}".strip(), extra_of(command)):
+            from daq_cli.app.command import main as run
+
+            run()
+    except DaqError as error:  # every other one ends inside `run`
+        print(f"daq: {error}", file=sys.stderr)
+        raise SystemExit(error.exit_code) from None

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from daq.client import Client as Client
     from daq.contracts.errors import DaqError as DaqError
     from daq.contracts.experiment import ExperimentSpec as ExperimentSpec
+    from daq.contracts.extras import Extra
     from daq.contracts.machine import Machine as Machine
     from daq.contracts.machine import load_machine as load_machine
     from daq.contracts.trace import Trace as Trace
@@ -112,6 +113,26 @@ _HOME = {
 """Module of each public name. They are imported when they are first used: a notebook that only reads traces waits for
 no compiler."""
 
+_ON_A_ROBOT = {"Arm", "Run", "RunError", "connect", "machine_from_urdf", "plot", "run"}
+_WITH_MODELS = {
+    "DesignOptions",
+    "DesignedExperiments",
+    "Simulation",
+    "batch",
+    "design",
+    "diagnose",
+    "feedforward",
+    "fit",
+    "followed",
+    "learn",
+    "simulate",
+    "validate",
+    "write_mjcf",
+    "write_urdf",
+}
+_NEEDED: dict[Extra, tuple[str, ...]] = {"robot": ("matplotlib", "mujoco", "pydantic_settings"), "model": ("numba",)}
+"""Packages that tell whether an extra is installed."""
+
 __all__ = [  # noqa: PLE0604
     *_HOME,
     "__version__",
@@ -122,13 +143,27 @@ require_own_packages()
 
 
 def __getattr__(name: str) -> object:
-    """Imports a public name on its first use."""
+    """Imports a public name on its first use. Raises MissingExtraError for one whose extra is not installed."""
     if name not in _HOME:
         raise AttributeError(f"module 'ma2000' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
-    found: object = getattr(import_module(_HOME[name]), name)
+    from daq.contracts.extras import missing_extras_named
+
+    with missing_extras_named(f"ma2000.{name}", _extra_of(name)):
+        found: object = getattr(import_module(_HOME[name]), name)
     globals()[name] = found
     return found
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    """The public names that work with the extras that are installed."""
+    from daq.contracts.extras import is_installed
+
+    works = {extra: all(map(is_installed, packages)) for extra, packages in _NEEDED.items()}
+    return sorted(name for name in __all__ if (extra := _extra_of(name)) is None or works[extra])
+
+
+def _extra_of(name: str) -> Extra | None:
+    """The extra that a public name needs; None for one that a client's installation has."""
+    if name in _WITH_MODELS:
+        return "model"
+    return "robot" if name in _ON_A_ROBOT else None

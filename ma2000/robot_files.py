@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from daq.config.machine_text import machine_text
 from daq.contracts.errors import SpecError
+from daq.contracts.extras import missing_extras_named
 from daq.contracts.machine import Machine
-from model.machine_model.model import Model
-from model.robot_files.mjcf_writer import mjcf_text
-from model.robot_files.urdf_writer import urdf_text
+
+if TYPE_CHECKING:
+    from model.machine_model.model import Model
 
 
 def save_machine(machine: Machine, path: Path | str) -> Path:
@@ -25,6 +27,9 @@ def write_urdf(model: Model, path: Path | str) -> list[str]:
 
     Raises SpecError when the file cannot be written.
     """
+    with missing_extras_named("ma2000.write_urdf", "model"):
+        from model.robot_files.urdf_writer import urdf_text
+
     text, left_out = urdf_text(model)
     _written(text, Path(path))
     return left_out
@@ -35,6 +40,9 @@ def write_mjcf(model: Model, path: Path | str) -> list[str]:
 
     Raises SpecError for a link that no real body can be, and when the file cannot be written.
     """
+    with missing_extras_named("ma2000.write_mjcf", "model"):
+        from model.robot_files.mjcf_writer import mjcf_text
+
     text, left_out = mjcf_text(model)
     _written(text, Path(path))
     return left_out

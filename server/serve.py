@@ -10,8 +10,8 @@ from types import FrameType
 
 import uvicorn
 
-from daq.config import Settings
 from daq.config.service import ServiceSettings
+from daq.config.settings import Settings
 from daq.contracts.errors import SpecError
 from server.access.connections import Connection
 from server.access.gate import Gate

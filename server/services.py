@@ -13,8 +13,8 @@ from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from daq.config import Settings
 from daq.config.robot_files import load_memory_map
+from daq.config.settings import Settings
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 from urllib.request import getproxies, proxy_bypass
 
 import httpx
 from pydantic import TypeAdapter, ValidationError
-from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidProxy, InvalidURI
-from websockets.sync.client import ClientConnection, connect
 
 from daq.client.connection import API, CONNECT_WITHIN, Connection, is_loopback
 from daq.client.errors import ServiceNotReachedError
+from daq.client.websocket import WebSocket
 from daq.contracts.service.live import LiveFrame, LiveMessage, LiveRequest, SampleRate, Topic
 from firmware_protocol.invalid import first_invalid
 
 LARGEST_FRAME = 64 << 20
 """Size limit (bytes) of a frame: the history of an hour fits."""
-CLOSE_WITHIN = 2.0
 _FRAME: TypeAdapter[LiveFrame] = TypeAdapter(LiveFrame)
 
 
@@ -28,24 +25,10 @@ class LiveStream:
     """An open stream. Iterate over it for frames; `next_frame` waits no longer than it is told."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
-        """Raises ServiceNotReachedError, also when the service refuses this client."""
+        """Raises ServiceNotReachedError, also when the service refuses this client; MissingExtraError."""
         self._url = f"{_websocket(connection.url)}{API}/{robot}/live"
-        self._closed_last = ExitStack()
-        headers = {} if connection.token is None else {"Authorization": f"Bearer {connection.token}"}
-        try:
-            self._socket: ClientConnection = self._closed_last.enter_context(
-                connect(
-                    self._url,
-                    additional_headers=headers,
-                    open_timeout=CONNECT_WITHIN,
-                    close_timeout=CLOSE_WITHIN,
-                    max_size=LARGEST_FRAME,
-                    compression=None,
-                    proxy=proxy_to(connection.url),
-                )
-            )
-        except (OSError, InvalidHandshake, InvalidProxy, InvalidURI, TimeoutError) as error:
-            raise ServiceNotReachedError(f"{self._url}: no stream: {error or 'no answer in time'}") from error
+        proxy = proxy_to(connection.url)
+        self._socket = WebSocket(self._url, connection.token, CONNECT_WITHIN, LARGEST_FRAME, proxy)
 
     def __enter__(self) -> Self:
         return self
@@ -57,7 +40,7 @@ class LiveStream:
 
     def close(self) -> None:
         """Ends the stream."""
-        self._closed_last.close()
+        self._socket.close()
 
     def subscribe(
         self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None, points: int = 1000
@@ -71,19 +54,13 @@ class LiveStream:
 
     def send(self, request: LiveRequest) -> None:
         """Whatever the stream takes, such as a jog command. Raises ServiceNotReachedError."""
-        try:
-            self._socket.send(request.model_dump_json(exclude_none=True))
-        except ConnectionClosed as error:
-            raise self._lost(error) from error
+        self._socket.send(request.model_dump_json(exclude_none=True))
 
     def next_frame(self, timeout: float | None = None) -> LiveFrame | None:
         """The next frame; None when none came within `timeout` s. Raises ServiceNotReachedError."""
-        try:
-            text = self._socket.recv(timeout)
-        except TimeoutError:
+        text = self._socket.receive(timeout)
+        if text is None:
             return None
-        except ConnectionClosed as error:
-            raise self._lost(error) from error
         try:
             return _FRAME.validate_json(text, extra="ignore")
         except ValidationError as error:
@@ -98,10 +75,6 @@ class LiveStream:
         """The messages of all frames, one by one."""
         for frame in self:
             yield from frame.messages
-
-    def _lost(self, error: ConnectionClosed) -> ServiceNotReachedError:
-        reason = error.rcvd.reason if error.rcvd is not None and error.rcvd.reason else "the connection is lost"
-        return ServiceNotReachedError(f"{self._url}: {reason}")
 
 
 def open_stream(

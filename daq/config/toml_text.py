@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from types import NoneType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from daq.config.settings import Settings
+if TYPE_CHECKING:
+    from daq.config.settings import Settings
 
 
 def settings_text(settings: Settings) -> str:

@@ -1,14 +1,53 @@
-"""Packages that only some users need, and the line that says how to install one that is missing."""
+"""Packages that only some users need, and the line that says how to install one that is missing.
+
+pyproject.toml says what each extra installs; docs/installing.md, which extra is for whom.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Literal
 
 from daq.contracts.errors import DaqError
 from daq.contracts.exit_codes import WRONG_INPUT
 
-Extra = Literal["ros", "tables"]
+Extra = Literal["live", "robot", "model", "server", "tables", "ros", "cluster", "postgresql", "archive"]
+
+CONTAINS: dict[Extra, tuple[Extra, ...]] = {"robot": ("live",), "model": ("robot", "live"), "server": ("robot", "live")}
+"""Extras whose packages an extra installs, too."""
+EXTRA_OF: dict[str, Extra] = {
+    "websockets": "live",
+    "jinja2": "robot",
+    "matplotlib": "robot",
+    "mujoco": "robot",
+    "platformdirs": "robot",
+    "pydantic_settings": "robot",
+    "rich": "robot",
+    "scipy": "robot",
+    "serial": "robot",
+    "typer": "robot",
+    "numba": "model",
+    "alembic": "server",
+    "fastapi": "server",
+    "httptools": "server",
+    "prometheus_client": "server",
+    "sqlalchemy": "server",
+    "starlette": "server",
+    "uvicorn": "server",
+    "uvloop": "server",
+    "pandas": "tables",
+    "pyarrow": "tables",
+    "xarray": "tables",
+    "rosbags": "ros",
+    "dask": "cluster",
+    "dask_jobqueue": "cluster",
+    "distributed": "cluster",
+    "psycopg": "postgresql",
+    "obstore": "archive",
+}
+"""The smallest extra that installs a module."""
 
 
 class MissingExtraError(DaqError):
@@ -24,5 +63,33 @@ def require_extra(extra: Extra, what: str, *packages: str) -> None:
         what: names what needs the packages; the error begins with it.
     """
     for package in packages:
-        if find_spec(package) is None:
-            raise MissingExtraError(f"{what} needs the package {package}: pip install ma2000-daq[{extra}]")
+        if not is_installed(package):
+            raise _missing(what, package, extra)
+
+
+@contextmanager
+def missing_extras_named(what: str, extra: Extra | None = None) -> Iterator[None]:
+    """Turns the failed import of a package of an extra into MissingExtraError. Any other failed import stays as it is.
+
+    Args:
+        what: names what is done meanwhile; the error begins with it.
+        extra: what all of it needs. It is named in place of a smaller one, which would not suffice.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        smallest = EXTRA_OF.get(package)
+        if smallest is None or is_installed(package):
+            raise
+        suffices = extra is not None and smallest in CONTAINS.get(extra, ())
+        raise _missing(what, package, extra if extra is not None and suffices else smallest) from None
+
+
+def is_installed(package: str) -> bool:
+    """Whether a package can be imported. Imports nothing."""
+    return find_spec(package) is not None
+
+
+def _missing(what: str, package: str, extra: Extra) -> MissingExtraError:
+    return MissingExtraError(f"{what} needs the package {package}: pip install 'ma2000-daq[{extra}]'")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.util import find_spec
 
-from daq.contracts.errors import SpecError
+from daq.contracts.extras import require_extra
 from daq.executors.address import Address, parse_address
 from daq.executors.local import LocalWorkers, cores
 from daq.executors.workers import Workers
@@ -22,7 +21,7 @@ def open_workers(url: str, initializer: Callable[[], None] | None = None, patien
             by whoever starts them.
         patience: time (s) within which a running scheduler must answer, and have a worker; None for the usual one.
 
-    Raises SpecError for a URL of no executor or a missing package; ReachError for a scheduler that does not answer;
+    Raises SpecError for a URL of no executor; MissingExtraError; ReachError for a scheduler that does not answer;
     OtherVersionError.
     """
     address = parse_address(url)
@@ -39,9 +38,7 @@ def open_workers(url: str, initializer: Callable[[], None] | None = None, patien
 
 
 def require_installed(address: Address) -> None:
-    """Raises SpecError, which says what to install, where the executor's package is missing."""
+    """Raises MissingExtraError where the executor's package is missing."""
     module = NEEDED.get(address.kind)
-    if module is not None and find_spec(module) is None:
-        raise SpecError(
-            f"executor {address.url}: needs Dask: `pip install 'ma2000-daq[cluster]'` where daq is installed"
-        )
+    if module is not None:
+        require_extra("cluster", f"executor {address.url}", module)

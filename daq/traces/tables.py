@@ -31,7 +31,7 @@ def export_table(trace: Trace, path: Path) -> Path:
             require_extra("tables", f"{path}: Parquet", "pandas", "pyarrow")
             trace.to_pandas().to_parquet(path, engine="pyarrow")
         else:
-            require_extra("tables", f"{path}: netCDF", "xarray")
+            require_extra("tables", f"{path}: netCDF", "xarray", "scipy")
             _for_netcdf(trace.to_xarray()).to_netcdf(path, engine="scipy")
     except OSError as error:
         raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error

@@ -12,6 +12,7 @@ import time
 from dataclasses import dataclass, field
 from typing import IO
 
+from daq.contracts.extras import require_extra
 from daq.transport.url import SERVOS, MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
@@ -51,7 +52,10 @@ class MockProcess:
 
 
 def start_mock(port: MockPort) -> MockProcess:
-    """Starts a mock and waits until it listens. Raises TransportError with the mock's own words when it does not."""
+    """Starts a mock and waits until it listens. Raises TransportError with the mock's own words when it does
+    not; MissingExtraError."""
+    if port.dialect != SERVOS:
+        require_extra("robot", "the mock controller", "mujoco")
     where = ("--pty",) if port.through_pty else ("--tcp", "127.0.0.1:0")
     module = "mock_controller.servos" if port.dialect == SERVOS else "mock_controller"
     command = [sys.executable, "-m", module, *where, "--owned", *port.arguments]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from daq.config import Settings
+    from daq.config.settings import Settings
     from daq.contracts.trace_limits import TraceLimits
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
@@ -65,7 +65,7 @@ class Invocation:
     @cached_property
     def settings(self) -> Settings:
         """The settings. Raises SpecError."""
-        from daq.config import load_settings
+        from daq.config.settings import load_settings
 
         return load_settings(self.config_file)[0]
 

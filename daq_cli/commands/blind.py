@@ -54,6 +54,7 @@ def blind(
     json: JsonOption = False,
 ) -> None:
     """Hide effects in the mock, diagnose blindly, reveal, and score."""
+    from daq.contracts.extras import require_extra
     from daq.executors import open_workers
     from daq.executors.address import parse_address
     from daq.executors.workers import ending
@@ -64,7 +65,8 @@ def blind(
     if hashes:
         print(to_register())
         return
-    parse_address(executor)
+    if parse_address(executor).kind == "local":
+        require_extra("model", "daq blind", "numba")
     if registration is not None:
         if seeds is not None:
             raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")

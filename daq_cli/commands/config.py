@@ -16,7 +16,7 @@ app = typer.Typer(add_completion=False, help="Show and check the configuration."
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
     """Show every setting as a daq.toml, and the places where a configuration was looked for."""
-    from daq.config import config_files, load_settings
+    from daq.config.settings import config_files, load_settings
     from daq.config.toml_text import settings_text
 
     call = invocation(context)
@@ -63,8 +63,8 @@ def copy(
 @app.command()
 def check(context: typer.Context, json: JsonOption = False) -> None:
     """Check the configuration, the machine file, the memory map and the port; an error is one line."""
-    from daq.config import load_settings
     from daq.config.robot_files import load_memory_map
+    from daq.config.settings import load_settings
     from daq.executors.address import parse_service_address
     from daq.safety import unchecked
     from daq.transport import parse_port_url

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from daq.config import Settings
+from daq.config.settings import Settings
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.traces.layout import SUFFIX

@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass, field
 
+from daq.contracts.extras import require_extra
 from daq.contracts.progress import Cancel
 from daq.executors import Workers, done_in_any_order
+from daq.executors.local import LocalWorkers
 from server.batches.columns import Columns
 from server.batches.folder import BatchFolder, Row
 from server.batches.study import Answer, Common, OneTrace, Studying
@@ -93,8 +95,10 @@ def run_batch(
     """Studies every trace that the folder has no answer for; those that failed before are tried again.
 
     The tables are written at the end, also when the batch is interrupted. Raises CancelledError; SpecError when the
-    folder cannot be written; what `done_in_any_order` raises.
+    folder cannot be written; MissingExtraError; what `done_in_any_order` raises.
     """
+    if isinstance(workers, LocalWorkers):
+        require_extra("model", "a batch on this computer", "numba")
     left = [one for one in chosen if not folder.is_done(one.job.key)]
     about = {one.job.key: one.about for one in left}
     count = _Count(len(chosen), len(chosen) - len(left))

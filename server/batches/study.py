@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.extras import missing_extras_named
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import (
@@ -77,7 +78,8 @@ class Studying:
         begun = time.perf_counter()
         where = f"{platform.node()}:{os.getpid()}"
         try:
-            columns, text = _studied(_common(self._text), one.file)
+            with missing_extras_named("the study", "model"):
+                columns, text = _studied(_common(self._text), one.file)
         except DaqError as error:
             return Answer(key=one.key, problem=str(error), seconds=time.perf_counter() - begun, worker=where)
         return Answer(key=one.key, columns=columns, text=text, seconds=time.perf_counter() - begun, worker=where)

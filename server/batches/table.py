@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from daq.contracts.extras import is_installed
 from server.batches.columns import Columns
 
 
@@ -23,7 +23,7 @@ def write_csv(rows: Sequence[Columns], path: Path) -> Path:
 
 def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
     """Writes Parquet. Returns None where `pyarrow` is not installed (extra `tables`), and removes an older table."""
-    if find_spec("pyarrow") is None:
+    if not is_installed("pyarrow"):
         path.unlink(missing_ok=True)
         return None
     import pyarrow

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError
+from daq.contracts.extras import missing_extras_named
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.progress import CancelledError
@@ -77,7 +78,8 @@ def carry_out(folder: Path) -> Ended:
     mailbox.tell(0.0, "reading")
     task = Task.model_validate(mailbox.read(REQUEST))
     try:
-        return _Worker(task, mailbox).do()
+        with missing_extras_named(f"a job of the kind {task.request.kind}", "model"):
+            return _Worker(task, mailbox).do()
     except CancelledError:
         return Ended(cancelled=True)
     except DaqError as error:

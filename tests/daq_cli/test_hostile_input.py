@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.config import load_settings
+from daq.config.settings import load_settings
 from daq_cli.commands.run import KINDS
 from tests.daq_cli.hostile import FILES, NUMBERS, hostile_file, refuses
 from tests.daq_cli.invoke import CommandLine

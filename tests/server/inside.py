@@ -15,9 +15,8 @@ import pytest
 import uvicorn
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
-from daq.config import Settings
 from daq.config.service import ServiceSettings
-from daq.config.settings import RobotSettings, TraceSettings
+from daq.config.settings import RobotSettings, Settings, TraceSettings
 from server.access.gate import Gate
 from server.access.tokens import KnownTokens
 from server.app import make_app

@@ -122,7 +122,7 @@ def rename(
 def _edit(context: typer.Context, file: Path, edited: Any) -> None:
     """Reads, changes, checks and writes a program. Raises SpecError, SafetyError, and leaves the file as it was
     then."""
-    from daq.config import load_settings
+    from daq.config.settings import load_settings
     from daq.teaching.editing import new_violations
     from daq.teaching.program import load_program, save_program
 

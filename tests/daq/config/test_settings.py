@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from daq.config import config_files, load_settings
 from daq.config.limits import merged_limits
 from daq.config.robot_files import load_memory_map
-from daq.config.settings import Settings
+from daq.config.settings import Settings, config_files, load_settings
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import JointLimits, Limits
 from daq.contracts.machine import load_machine

@@ -52,7 +52,7 @@ def test_files_are_read_back_by_the_libraries_to_the_bit(tmp_path: Path) -> None
 
 
 def test_a_package_that_is_missing_is_told_with_the_command_that_installs_it() -> None:
-    with pytest.raises(MissingExtraError, match=r"needs the package no_such: pip install ma2000-daq\[tables\]"):
+    with pytest.raises(MissingExtraError, match=r"needs the package no_such: pip install 'ma2000-daq\[tables\]'"):
         require_extra("tables", "to_pandas()", "no_such")
 
 

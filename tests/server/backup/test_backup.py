@@ -359,8 +359,8 @@ def test_what_cannot_be_backed_up_or_restored_is_one_line(daq: CommandLine, tmp_
 
 
 def test_the_configured_places(tmp_path: Path) -> None:
-    from daq.config import Settings
     from daq.config.service import ServiceSettings
+    from daq.config.settings import Settings
 
     places = places_of(Settings(server=ServiceSettings(folder=tmp_path)))
     assert places.target(DATABASE) == tmp_path / "service.sqlite"
