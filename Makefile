@@ -126,5 +126,5 @@ COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 
 requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
 	@$(COMPILE) --group installer --output-file requirements-installer.txt
 	@$(COMPILE) pyproject.toml --all-extras --group build --group dev --output-file requirements-dev.txt
-	@$(COMPILE) pyproject.toml --group build --constraint requirements-dev.txt --output-file requirements.txt
+	@$(COMPILE) pyproject.toml --extra all --group build --constraint requirements-dev.txt --output-file requirements.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)

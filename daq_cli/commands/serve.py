@@ -21,9 +21,11 @@ def serve(
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any free one.")] = None,
 ) -> None:
     """Serve experiments, traces and the dashboard to people and programs."""
+    from daq.contracts.extras import require_extra
     from daq.transport.url import parse_port_url
     from server import logs
 
+    require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "alembic", "prometheus_client")
     logs.begin()  # first, so that errors of the configuration are lines of the log, too
     call = invocation(context)
     settings = call.settings

@@ -10,12 +10,17 @@ from packaging.utils import canonicalize_name
 from tests.repository.tracked import ROOT
 
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-FOR_USE = [*PYPROJECT["project"]["dependencies"], *PYPROJECT["dependency-groups"]["build"]]
+EXTRAS = [
+    line
+    for extra in PYPROJECT["project"]["optional-dependencies"].values()
+    for line in extra
+    if not line.startswith("ma2000-daq[")
+]
+FOR_USE = [*PYPROJECT["project"]["dependencies"], *EXTRAS, *PYPROJECT["dependency-groups"]["build"]]
 FOR_INSTALLING = PYPROJECT["dependency-groups"]["installer"]
 FOR_DEVELOPMENT = [
     *FOR_USE,
     *FOR_INSTALLING,
-    *(line for extra in PYPROJECT["project"]["optional-dependencies"].values() for line in extra),
     *(line for name in ("dev", "docs") for line in PYPROJECT["dependency-groups"][name] if isinstance(line, str)),
 ]
 
