@@ -1,5 +1,6 @@
 """What a user installs is whole: the code, the data files that the code reads, and the dashboard's built page."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -21,6 +22,7 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         packed = set(archive.namelist())
+        (metadata,) = (archive.read(name).decode() for name in packed if name.endswith(".dist-info/METADATA"))
     tracked = {str(path.relative_to(ROOT)) for path in tracked_files()}
     expected = {name for name in tracked if name.startswith(tuple(f"{package}/" for package in PACKAGES))}
     expected -= {name for name in expected if name.startswith(NOT_INSTALLED)}
@@ -32,3 +34,6 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     for form in (".js.gz", ".js.br"):
         assert any(name.startswith("dist/assets/") and name.endswith(form) for name in page)
     assert not any("node_modules" in name or name.startswith("src/") for name in page)
+    _, _, description = metadata.partition("\n\n")
+    assert description.startswith("# MA2000 DAQ\n")
+    assert re.findall(r"\]\((?!https?:)[^)]*\)|<img", description) == [], "an index shows no file of the repository"

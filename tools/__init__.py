@@ -1,0 +1,1 @@
+"""Commands for maintainers. They are not installed."""
