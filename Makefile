@@ -127,4 +127,5 @@ requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--
 	@$(COMPILE) --group installer --output-file requirements-installer.txt
 	@$(COMPILE) pyproject.toml --all-extras --group build --group dev --output-file requirements-dev.txt
 	@$(COMPILE) pyproject.toml --extra all --group build --constraint requirements-dev.txt --output-file requirements.txt
+	@$(COMPILE) --group release --constraint requirements-dev.txt --output-file requirements-release.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)

@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 PYTHONS = dict(pythons())
 WORDS = {
-    "batch": "fit {trace} --out batch",
+    "batch": "fit {folder} --out batch",
     "blind": "--seeds 1 --folder blind",
     "compare": "ma2000 {trace}",
     "design": "ma2000",
@@ -137,7 +137,7 @@ def test_with_a_robot_only_each_command_of_models_and_service_says_which_extra_i
     programs = installed(PYTHONS[version], f"{built.wheel}[robot]", tmp_path / "environment")
     assert run([programs / "daq", "run", "ramp", "--folder", tmp_path / "traces"], tmp_path).returncode == 0
     for name in sorted(MODEL | SERVER):
-        done = run([programs / "daq", name, *WORDS[name].format(trace=trace).split()], tmp_path)
+        done = run([programs / "daq", name, *WORDS[name].format(trace=trace, folder=trace.parent).split()], tmp_path)
         extra = "model" if name in MODEL else "server"
         line = rf"daq: .* needs the package \w+: pip install 'ma2000-daq\[{extra}\]'\n"
         assert (done.returncode, bool(re.fullmatch(line, done.stderr))) == (2, True), f"{name}: {done.stderr}"

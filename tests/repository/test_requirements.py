@@ -18,6 +18,7 @@ EXTRAS = [
 ]
 FOR_USE = [*PYPROJECT["project"]["dependencies"], *EXTRAS, *PYPROJECT["dependency-groups"]["build"]]
 FOR_INSTALLING = PYPROJECT["dependency-groups"]["installer"]
+FOR_A_RELEASE = PYPROJECT["dependency-groups"]["release"]
 FOR_DEVELOPMENT = [
     *FOR_USE,
     *FOR_INSTALLING,
@@ -44,8 +45,9 @@ def pinned(name: str) -> dict[str, list[tuple[str, int]]]:
         ("requirements-installer.txt", FOR_INSTALLING),
         ("requirements.txt", FOR_USE),
         ("requirements-dev.txt", FOR_DEVELOPMENT),
+        ("requirements-release.txt", FOR_A_RELEASE),
     ],
-    ids=["for installing", "for use", "for development"],
+    ids=["for installing", "for use", "for development", "for a release"],
 )
 def test_each_direct_dependency_is_pinned_to_versions_that_pyproject_allows(name: str, asked: list[str]) -> None:
     pins = pinned(name)
@@ -57,7 +59,7 @@ def test_each_direct_dependency_is_pinned_to_versions_that_pyproject_allows(name
         )
 
 
-@pytest.mark.parametrize("name", ["requirements-installer.txt", "requirements.txt", "requirements-dev.txt"])
+@pytest.mark.parametrize("name", sorted(path.name for path in ROOT.glob("requirements*.txt")))
 def test_each_pin_has_a_hash(name: str) -> None:
     assert [package for package, pins in pinned(name).items() for _, hashes in pins if hashes == 0] == []
 
