@@ -6,14 +6,20 @@ import json
 import re
 import sys
 import tomllib
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from packaging.requirements import Requirement
 
+import ma2000
+from daq.client.websocket import WebSocket
 from daq.contracts.extras import CONTAINS, EXTRA_OF, Extra, MissingExtraError, missing_extras_named
+from daq.executors import open_workers
+from daq.transport import MockPort
+from daq.transport.mock_process import start_mock
 from daq_cli.app.lazy import SUBCOMMANDS
 from daq_cli.app.needed import called, extra_of
 from ma2000 import _HOME
@@ -24,17 +30,20 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 EXTRAS = {name: [Requirement(line) for line in lines] for name, lines in PROJECT["optional-dependencies"].items()}
 OTHER_NAMES = {"serial": "pyserial", "pydantic_settings": "pydantic-settings", "prometheus_client": "prometheus-client"}
 OTHER_NAMES |= {"dask_jobqueue": "dask-jobqueue"}
+NO_TRACE: Any = None
 PULLED = {"starlette": "fastapi", "dask": "distributed"}
 """Packages that come with another one."""
 
 NAMES = """
-import json, ma2000
+import json, pydoc
+import ma2000
 said = {}
 for name in ma2000.__all__:
     try:
         getattr(ma2000, name)
     except Exception as error:
         said[name] = f"{type(error).__name__}: {error}"
+assert "read_trace" in pydoc.render_doc(ma2000)
 print(json.dumps({"said": said, "offered": dir(ma2000)}))
 """
 COMMANDS = """
@@ -156,3 +165,24 @@ def test_the_extra_that_is_named_suffices_for_the_whole(
 def test_a_failed_import_of_anything_else_stays_what_it_is(name: str) -> None:
     with pytest.raises(ModuleNotFoundError), missing_extras_named("this"):
         import_module(name)
+
+
+@pytest.mark.parametrize(
+    ("package", "needs_it", "line"),
+    [
+        (
+            "websockets",
+            lambda: WebSocket("ws://127.0.0.1:9", None, 1.0, 1, None),
+            "live stream .*websockets.*[live]",
+        ),
+        ("mujoco", lambda: start_mock(MockPort()), "the mock controller .*mujoco.*[robot]"),
+        ("matplotlib", lambda: ma2000.plot(NO_TRACE), "ma2000.plot .*matplotlib.*[robot]"),
+        ("distributed", lambda: open_workers("dask://127.0.0.1:9"), "executor dask://.*distributed.*[cluster]"),
+    ],
+)
+def test_what_needs_a_package_only_when_it_is_called_says_so_then(
+    package: str, needs_it: Callable[[], object], line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(MissingExtraError, match=line.replace("[", r"\[")):
+        needs_it()

@@ -49,6 +49,23 @@ model = ma2000.base_model(ma2000.load_machine("ma2000"))
 with ma2000.Client("http://127.0.0.1:8300") as client:
     print(len(trace), model.machine.name, client.robot().status())
 """
+SERVICE = """
+import subprocess, sys
+import ma2000
+from daq.contracts.service.jobs import FitRequest
+service = subprocess.Popen([sys.argv[1], "serve", "--port", "0"], stdout=subprocess.PIPE, text=True)
+try:
+    with ma2000.Client(service.stdout.readline().strip()) as client:
+        robot = client.robot()
+        robot.connect()
+        asked = robot.experiments.submit(ma2000.PRESETS["ramp"].spec)
+        done = robot.experiments.wait(asked.id)
+        job = robot.jobs.wait(robot.jobs.submit(FitRequest(traces=(done.trace,))).id)
+        print(f"{done.state}; {job.state}: {job.reason}")
+finally:
+    service.terminate()
+    service.wait()
+"""
 WRONG = 'import ma2000\nnumber: int = ma2000.read_trace("trace.mcap").record.trace_id\n'
 
 
@@ -141,3 +158,13 @@ def test_with_a_robot_only_each_command_of_models_and_service_says_which_extra_i
         extra = "model" if name in MODEL else "server"
         line = rf"daq: .* needs the package \w+: pip install 'ma2000-daq\[{extra}\]'\n"
         assert (done.returncode, bool(re.fullmatch(line, done.stderr))) == (2, True), f"{name}: {done.stderr}"
+
+
+def test_a_service_without_models_records_and_a_job_says_which_extra_it_needs(
+    built: Distributions, tmp_path: Path
+) -> None:
+    version = next(reversed(PYTHONS))
+    programs = installed(PYTHONS[version], f"{built.wheel}[server]", tmp_path / "environment")
+    done = run([programs / "python", "-c", SERVICE, programs / "daq"], tmp_path)
+    line = "failed: a job of the kind fit needs the package numba: pip install 'ma2000-daq[model]'"
+    assert done.stdout == f"done; {line}\n", done.stderr
