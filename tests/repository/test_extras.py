@@ -43,7 +43,7 @@ for name in ma2000.__all__:
         getattr(ma2000, name)
     except Exception as error:
         said[name] = f"{type(error).__name__}: {error}"
-assert "read_trace" in pydoc.render_doc(ma2000)
+assert "read_trace" in pydoc.render_doc(ma2000, renderer=pydoc.plaintext)
 print(json.dumps({"said": said, "offered": dir(ma2000)}))
 """
 COMMANDS = """
