@@ -57,14 +57,13 @@ def pythons() -> Iterator[tuple[str, Path]]:
             yield version, Path(one)
 
 
-def installed(python: Path, requirement: str, folder: Path) -> Path:
+def installed(python: Path, requirement: str, folder: Path, pins: str = "requirements-dev.txt") -> Path:
     """Makes an environment, installs a requirement into it in the pinned versions, and returns its programs' folder.
 
     Skips the test where no package index is reached.
     """
     _uv("venv", "--python", str(python), str(folder))
-    pins = str(ROOT / "requirements-dev.txt")
-    _uv("pip", "install", "--python", str(folder), "--constraint", pins, requirement)
+    _uv("pip", "install", "--python", str(folder), "--constraint", str(ROOT / pins), requirement)
     return folder / "bin"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import subprocess
 import sys
@@ -168,3 +169,17 @@ def test_a_service_without_models_records_and_a_job_says_which_extra_it_needs(
     done = run([programs / "python", "-c", SERVICE, programs / "daq"], tmp_path)
     line = "failed: a job of the kind fit needs the package numba: pip install 'ma2000-daq[model]'"
     assert done.stdout == f"done; {line}\n", done.stderr
+
+
+def test_a_list_of_what_a_client_consists_of_is_short(built: Distributions, tmp_path: Path) -> None:
+    python = next(iter(PYTHONS.values()))
+    client = installed(python, f"{built.wheel}[client]", tmp_path / "client")
+    tools = installed(python, "cyclonedx-bom", tmp_path / "tools", "requirements-release.txt")
+    options = ["--pyproject", ROOT / "pyproject.toml", "--mc-type", "application", "--spec-version", "1.6"]
+    done = run([tools / "cyclonedx-py", "environment", "--validate", *options, client / "python"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    listed = json.loads(done.stdout)
+    assert listed["metadata"]["component"]["name"] == "ma2000-daq"
+    names = {component["name"] for component in listed["components"]} - {"ma2000-daq"}
+    assert {"httpx", "mcap", "numpy", "pydantic", "lz4", "zstandard"} <= names
+    assert len(names) <= 18, names

@@ -1,10 +1,13 @@
 """The workflows of tests and releases: what they run is pinned, and they may do no more than they need."""
 
 import re
+import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 
+from tests.repository.fresh import installed, run
 from tests.repository.tracked import ROOT
 
 FOLDER = ROOT / ".github" / "workflows"
@@ -80,3 +83,12 @@ def test_files_and_commands_that_a_workflow_names_are_there(name: str) -> None:
         assert (ROOT / path).is_file()
     for module in re.findall(r"-m (tools\.\w+)", text):
         assert (ROOT / module.replace(".", "/")).with_suffix(".py").is_file()
+
+
+@pytest.mark.slow
+def test_an_auditor_of_workflows_finds_nothing(tmp_path: Path) -> None:
+    programs = installed(Path(sys.executable), "zizmor", tmp_path / "environment", "requirements-release.txt")
+    done = run([programs / "zizmor", "--offline", "--pedantic", FOLDER], tmp_path)
+    assert done.returncode == 0, done.stdout
+    (tmp_path / "bad.yml").write_text(WORKFLOWS["release.yml"].replace("permissions: {}", "permissions: write-all"))
+    assert "excessive-permissions" in run([programs / "zizmor", "--offline", "bad.yml"], tmp_path).stdout
