@@ -3,13 +3,12 @@
 python -m benchmarks installed_size [EXTRA ...] [--wheel FILE]
 
 Needs a network, or uv's cache. Versions are those of requirements-dev.txt. Sizes are without the bytecode that Python
-writes at the first import. Times are of the processor, which a busy machine changes little.
+writes at the first import.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figures import machine
+from benchmarks.startup import fastest
 
 ROOT = Path(__file__).parents[1]
 UV = Path(sys.executable).with_name("uv")
@@ -40,7 +40,7 @@ CLIENT_USE = "import ma2000; ma2000.read_trace; ma2000.Client"
 
 @dataclass(frozen=True)
 class Measured:
-    """An installation: its packages, their size (MB), and the processor's time (s) from the start of Python to use."""
+    """An installation: its packages, their size (MB), and times (s) from the start of Python."""
 
     extra: str
     packages: int
@@ -73,18 +73,7 @@ def measure(file: Path, extra: str, folder: Path, client: float, repeats: int) -
     python = [str(folder / "bin" / "python"), "-c"]
     use = [*python, OWN_USE.get(extra, CLIENT_USE)]
     subprocess.run(use, check=True, cwd=folder)  # writes the bytecode
-    return Measured(extra, packages, size, size - client if client else 0.0, processor_time(use, repeats))
-
-
-def processor_time(command: list[str], repeats: int) -> float:
-    """Least time (s) that the processor spends on a command."""
-    times = []
-    for _ in range(repeats):
-        before = os.times()
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        after = os.times()
-        times.append(after.children_user + after.children_system - before.children_user - before.children_system)
-    return min(times)
+    return Measured(extra, packages, size, size - client if client else 0.0, fastest(use, repeats))
 
 
 def _size(folder: Path) -> int:
@@ -97,12 +86,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks installed_size", description=__doc__)
     parser.add_argument("extras", nargs="*", metavar="EXTRA", help=f"of {', '.join(extras)} (default: all of them)")
     parser.add_argument("--wheel", type=Path, help="of this file, which is else built")
-    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--repeats", type=int, default=7)
     given = parser.parse_args()
     if unknown := set(given.extras) - set(extras):
         parser.error(f"no such extra: {', '.join(sorted(unknown))}; there are {', '.join(extras)}")
-    print(f"{machine()}; `python -c pass`: {processor_time([sys.executable, '-c', 'pass'], given.repeats):.2f} s\n")
-    print("| extra | packages | installed, MB | more than `client`, MB | time to use, s |\n|---|---|---|---|---|")
+    print(f"{machine()}; `python -c pass`: {fastest([sys.executable, '-c', 'pass'], given.repeats):.2f} s\n")
+    print("| extra | packages | installed, MB | more than `client`, MB | from start to use, s |\n|---|---|---|---|---|")
     client = 0.0
     with tempfile.TemporaryDirectory() as folder:
         file = given.wheel or wheel(Path(folder) / "wheel")
