@@ -217,7 +217,9 @@ class Services:
         )
         stop = StopService(robot)
         archive = None if bucket is None else self._make_archive(bucket, catalogue, name, jobs)
-        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models, archive)
+        return RobotServices(
+            robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models, archive
+        )
 
     def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:
         """Returns the archive of a robot, behind its folder of traces."""

@@ -21,7 +21,9 @@ class ArchiveSettings(FrozenRecord):
     request can."""
     region: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,64}$")] = "us-east-1"
     """Region of the bucket. Most other servers than Amazon's ignore it."""
-    prefix: Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9._-]{0,63}(/[A-Za-z0-9][A-Za-z0-9._-]{0,63})*)?$")] = ""
+    prefix: Annotated[
+        str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9._-]{0,63}(/[A-Za-z0-9][A-Za-z0-9._-]{0,63})*)?$")
+    ] = ""
     """Beginning of the objects' names, for several services with one bucket."""
     credentials: Path | None = None
     """File with `access_key` and `secret_key`; None for the environment (`AWS_ACCESS_KEY_ID` and so on)."""
@@ -31,7 +33,7 @@ class ArchiveSettings(FrozenRecord):
     """Total size (MB) of local traces beyond which the oldest archived ones are dropped; None keeps them."""
     keep_used: bool = True
     """Whether local copies of traces that a model or a job refers to stay in any case."""
-    timeout: Annotated[float, Field(ge=1, le=600)] = 30.0
+    timeout: Annotated[float, Field(ge=0.1, le=600)] = 30.0
     """Time (s) that one request to the store may take. A trace is sent and fetched in pieces of 8 MB."""
 
     @field_validator("endpoint")

@@ -283,7 +283,9 @@ def _print_archive(found: ArchiveStatus, *, as_json: bool) -> None:
         print_json(found.model_dump(mode="json"))
         return
     print(printable(f"archive:  {found.place}"))
-    print(f"state:    {found.state}, {found.archived} traces; {found.waiting} wait to be sent, {found.fetching} fetched")
+    print(
+        f"state:    {found.state}, {found.archived} traces; {found.waiting} wait to be sent, {found.fetching} fetched"
+    )
     limit = "" if found.local_limit is None else f" of {found.local_limit / 1e6:.0f}"
     print(f"here:     {found.local_bytes / 1e6:.1f}{limit} MB")
     if found.problem:

@@ -110,7 +110,9 @@ class Bucket:
                 raise self._error("keeping a trace", error) from error
         return Content(size, digest.hexdigest())
 
-    def read(self, key: str, size: int, take: Callable[[bytes], object], progress: Progress = lambda _: None) -> Content:
+    def read(
+        self, key: str, size: int, take: Callable[[bytes], object], progress: Progress = lambda _: None
+    ) -> Content:
         """Reads an object of `size` bytes piece by piece, each given to `take`. Raises what `take` raises;
         DamagedError if the object is gone or has another size; ArchiveError."""
         import obstore
@@ -168,7 +170,7 @@ def open_bucket(settings: ArchiveSettings) -> Bucket | None:
         return Bucket(settings, load_credentials(settings))
     except DaqError:
         raise
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001, whatever it is, its words may repeat the credentials
         raise SpecError(f"archive {settings.place}: cannot be used: {type(error).__name__}") from None
 
 
@@ -176,18 +178,22 @@ def _reason(error: Exception) -> tuple[type[ArchiveError], str]:
     from obstore import exceptions
 
     words = str(error)
-    low = words.lower()
-    if isinstance(error, FileNotFoundError):
-        if "nosuchbucket" in low:
-            return RefusedError, "there is no such bucket"
-        return DamagedError, "the store no longer has it"
-    if isinstance(error, exceptions.PermissionDeniedError | exceptions.UnauthenticatedError):
-        return RefusedError, "the store refuses these credentials, or what they may do"
-    if "timed out" in low or "timeout" in low.replace("retry_timeout", ""):
-        return ArchiveError, "no answer in time"
+    low = words.lower().replace("retry_timeout", "")
     status = STATUS.search(words)
-    if status is not None:
-        return ArchiveError, f"the store answers {status[1]}"
-    if any(word in low for word in REACHING):
-        return ArchiveError, "cannot be reached"
+    is_reach = any(word in low for word in REACHING)
+    reasons: list[tuple[bool, type[ArchiveError], str]] = [
+        ("nosuchbucket" in low, RefusedError, "there is no such bucket"),
+        (isinstance(error, FileNotFoundError), DamagedError, "the store no longer has it"),
+        (
+            isinstance(error, exceptions.PermissionDeniedError | exceptions.UnauthenticatedError),
+            RefusedError,
+            "the store refuses these credentials, or what they may do",
+        ),
+        ("timed out" in low or "timeout" in low, ArchiveError, "no answer in time"),
+        (status is not None, ArchiveError, f"the store answers {status[1] if status else ''}"),
+        (is_reach, ArchiveError, "cannot be reached"),
+    ]
+    for is_so, kind, why in reasons:
+        if is_so:
+            return kind, why
     return ArchiveError, "the store gives no valid answer"

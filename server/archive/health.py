@@ -26,16 +26,17 @@ class Trouble:
     next_try: float
 
 
-def pause_after(failures: int) -> float:
+def pause_after(failures: int, first: float = FIRST_PAUSE, longest: float = LONGEST_PAUSE) -> float:
     """Returns the pause (s) after so many failures in a row."""
-    return float(min(LONGEST_PAUSE, FIRST_PAUSE * 2.0 ** min(failures - 1, 30)))
+    return float(min(longest, first * 2.0 ** min(failures - 1, 30)))
 
 
 class Health:
     """Shared by those who ask the store. Safe to use from any thread."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, pauses: tuple[float, float] = (FIRST_PAUSE, LONGEST_PAUSE)) -> None:
         self._clock = clock
+        self._pauses = pauses
         self._lock = threading.Lock()
         self._trouble: Trouble | None = None
 
@@ -57,7 +58,7 @@ class Health:
             before = self._trouble
             failures = 1 if before is None else before.failures + 1
             since = self._clock.utc() if before is None else before.since
-            next_try = self._clock.monotonic() + pause_after(failures)
+            next_try = self._clock.monotonic() + pause_after(failures, *self._pauses)
             self._trouble = Trouble(state, str(error), failures, since, next_try)
         return before is None or before.state != state
 

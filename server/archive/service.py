@@ -26,7 +26,7 @@ from daq.contracts.service.archive import ArchiveStatus, TraceArchive, Transfer
 from daq.traces import disk
 from daq.traces.room import RESERVE
 from server.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError
-from server.archive.health import Health
+from server.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Health
 from server.archive.names import object_name
 from server.archive.transfers import Transfers
 from server.catalogue.catalogue import UPLOAD, Catalogue
@@ -52,6 +52,7 @@ class ArchiveContext:
         tell: records an event, in one line
         fetched: called after a fetch has ended, with or without success; must not block
         count: counts a transfer: direction, result, number of bytes
+        pauses: first and longest pause (s) after failures
     """
 
     robot: str
@@ -63,6 +64,7 @@ class ArchiveContext:
     tell: Callable[[str], None]
     fetched: Callable[[], None] = lambda: None
     count: Callable[[str, str, int], None] = lambda _direction, _result, _size: None
+    pauses: tuple[float, float] = (FIRST_PAUSE, LONGEST_PAUSE)
 
 
 class ArchiveService:
@@ -70,7 +72,7 @@ class ArchiveService:
 
     def __init__(self, context: ArchiveContext) -> None:
         self._context = context
-        self.health = Health(context.clock)
+        self.health = Health(context.clock, context.pauses)
         self._sending, self._fetching = Transfers("send"), Transfers("fetch")
         self._drops: set[str] = set()
         """Traces whose local copies somebody wants to be dropped, whatever the policy says."""
@@ -83,7 +85,9 @@ class ArchiveService:
         """When the last whole round ended (s, monotonic)."""
         self._threads = [
             threading.Thread(target=self._loop, args=(self._round, self._work), name="archive-send", daemon=True),
-            threading.Thread(target=self._loop, args=(self._fetch_next, self._asked), name="archive-fetch", daemon=True),
+            threading.Thread(
+                target=self._loop, args=(self._fetch_next, self._asked), name="archive-fetch", daemon=True
+            ),
         ]
 
     def start(self) -> None:
@@ -266,10 +270,8 @@ class ArchiveService:
             found = _content(path)
             name = object_name(context.settings.prefix, context.robot, local.file, local.created, found.sha256)
             self._sending.moved(trace, 0, found.size)
-            sent = context.bucket.send(name, path, lambda done: self._sending.moved(trace, done, found.size))
-            if sent != found:
-                raise DamagedError(f"archive: {path.name} changed while it was sent")
-            self._require_same(name, found)
+            context.bucket.send(name, path, lambda done: self._sending.moved(trace, done, found.size))
+            self._require_same(name, found)  # also if the file has changed meanwhile
         except OSError as error:
             log.warning("archive: %s: cannot be read: %s", path, disk.reason(error))
             self._sending.ended(trace, f"{path.name}: cannot be read: {disk.reason(error)}")
@@ -292,15 +294,24 @@ class ArchiveService:
             line = f"archive {self._context.bucket.place}: {name}: what comes back is not what was sent (SHA-256)"
             raise DamagedError(line)
 
+    def _require_still_there(self, found: Archived, now: datetime) -> None:
+        """Raises DamagedError unless the archive has the same as before: read back, if that was long ago."""
+        if now - found.checked > CHECKED_LATELY:
+            self._require_same(found.object, Content(found.size, found.sha256))
+            self._context.archived.note(found.trace, checked=now)
+        elif self._context.bucket.size_of(found.object) != found.size:
+            raise DamagedError(f"archive {self._context.bucket.place}: {found.object} has another size")
+
     def _fetch_next(self) -> bool:
         trace = self._fetching.first()
         if trace is None:
             return False
         context = self._context
         found = context.archived.get(trace)
+        if found is None:
+            self._end_fetch(trace, f"the archive does not have trace {trace} any more")
+            return True
         try:
-            if found is None:
-                raise DamagedError(f"the archive does not have trace {trace} any more")
             self._fetch_one(found)
         except (DamagedError, RefusedError) as error:  # another attempt does not help
             self._end_fetch(trace, str(error))
@@ -416,11 +427,7 @@ class ArchiveService:
             return False
         now = context.clock.utc()
         try:
-            if now - found.checked > CHECKED_LATELY:
-                self._require_same(found.object, Content(found.size, found.sha256))
-                context.archived.note(local.trace, checked=now)
-            elif context.bucket.size_of(found.object) != found.size:
-                raise DamagedError(f"archive {context.bucket.place}: {found.object} has another size")
+            self._require_still_there(found, now)
         except DamagedError as error:  # the local copy is the only one: it is sent again
             log.warning("%s", error)
             self._tell(f"{error}; the local copy stays, and is sent again")

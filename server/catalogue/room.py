@@ -23,7 +23,7 @@ def free_room(folder: Path) -> int:
     return _usage(folder).free
 
 
-def _usage(folder: Path) -> "_Usage":
+def _usage(folder: Path) -> _Usage:
     """Raises a 503 if the folder does not exist: its disk may not be mounted."""
     try:
         return _Usage(*shutil.disk_usage(folder))

@@ -121,7 +121,7 @@ class TraceStore:
             for first in range(0, len(names), 500):
                 part = TraceRow.id.in_(names[first : first + 500])
                 query = select(TraceRow.id, TraceRow.file).where(TraceRow.robot == robot, part)
-                found |= {identity: file for identity, file in session.execute(query)}
+                found.update((row.id, row.file) for row in session.execute(query))
         return found
 
     def get(self, robot: str, identity: str) -> CatalogueEntry:
