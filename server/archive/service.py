@@ -36,6 +36,9 @@ from server.store.archived import Archived, ArchivedStore, Local
 
 ROUND = 600.0
 """Time (s) between two looks for traces to send and copies to drop, beside those that are told of."""
+SENT_A_ROUND = 200
+"""Largest number of traces that are sent before copies are dropped: at first use years of traces may wait, and the disk
+may be full."""
 CHECKED_LATELY = timedelta(hours=1)
 """Time for which an object that was read back need not be read back again before the local copy goes."""
 RETRY_AFTER = 2
@@ -237,7 +240,7 @@ class ArchiveService:
             self._context.tell(line)
 
     def _round(self) -> bool:
-        """Sends everything that waits, and drops what may go. Returns False, since nothing is left to do then."""
+        """Deletes and sends what waits, and drops what may go. Returns whether more waits to be sent."""
         context = self._context
         if (wait := self.health.wait()) > 0 and self._closing.wait(wait):
             return False
@@ -245,11 +248,15 @@ class ArchiveService:
         if is_due:
             for trace in context.archived.to_send(context.robot):
                 self._sending.add(trace)
+            self._archived = context.archived.count(context.robot)
+            self._local_bytes = context.archived.local_size(context.robot)
         for gone in context.archived.to_delete(context.robot):
             context.bucket.remove(gone.object)
             context.archived.forget(gone.trace)
             self._succeeded()
-        while (trace := self._sending.first()) is not None and not self._closing.is_set():
+        for _ in range(SENT_A_ROUND):
+            if (trace := self._sending.first()) is None or self._closing.is_set():
+                break
             self._send_one(trace)
         self._drop_asked()
         limit = self._context.settings.keep_size
@@ -257,7 +264,7 @@ class ArchiveService:
             self._drop_by_policy()
         if is_due:
             self._looked = context.clock.monotonic()
-        return False
+        return len(self._sending) > 0
 
     def _send_one(self, trace: str) -> None:
         context = self._context
@@ -384,12 +391,11 @@ class ArchiveService:
     def _drop_by_policy(self) -> None:
         """Drops local copies that are too old, then the oldest while all of them take too much room."""
         context, settings = self._context, self._context.settings
-        self._archived = context.archived.count(context.robot)
+        self._over = ""
         if settings.keep_days is not None:
             old = context.clock.utc() - timedelta(days=settings.keep_days)
             self._drop_some(lambda _size: True, before=old)
-        self._local_bytes = context.archived.local_size(context.robot)
-        self._over = ""
+            self._local_bytes = context.archived.local_size(context.robot)
         if settings.keep_size is not None and self._local_bytes > (limit := settings.keep_size * MB):
             self._drop_some(lambda size: size > limit)
             self._local_bytes = context.archived.local_size(context.robot)

@@ -50,9 +50,11 @@ class Transfers:
                     self._waiting.move_to_end(trace)
 
     def ended(self, trace: str, problem: str = "") -> None:
-        """Takes a trace out of the queue; with a problem, it has failed and is not tried again by itself."""
+        """Takes a trace out of the queue; with a problem, it has failed and is not tried again by itself;
+        without one, an earlier failure is forgotten."""
         with self._lock:
             was = self._waiting.pop(trace, None)
+            self._failed.pop(trace, None)
             if problem:
                 self._failed[trace] = self._transfer("failed", 0, was.total if was else 0, problem)
                 while len(self._failed) > FAILURES_SHOWN:
