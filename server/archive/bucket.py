@@ -17,7 +17,7 @@ from daq.contracts.errors import DaqError, SpecError
 from server.archive.credentials import Credentials, load_credentials
 
 if TYPE_CHECKING:
-    from obstore.store import S3Store
+    from obstore.store import S3Config, S3Store
 
 PIECE = 8 << 20
 """Number of bytes that one request sends or fetches, so that a time limit on a request suits traces of every size."""
@@ -61,18 +61,21 @@ class Bucket:
         from obstore.store import S3Store
 
         self.place = settings.place
-        token = {} if credentials.session_token is None else {"session_token": credentials.session_token}
-        endpoint = {} if settings.endpoint is None else {"endpoint": settings.endpoint}
         # Every key is given: one that is not would be looked for in the environment, and credentials at the address
         # where a virtual machine of Amazon's finds its own.
+        config: S3Config = {
+            "region": settings.region,
+            "access_key_id": credentials.access_key.get_secret_value(),
+            "secret_access_key": credentials.secret_key.get_secret_value(),
+            "checksum_algorithm": "SHA256",
+        }
+        if credentials.session_token is not None:
+            config["session_token"] = credentials.session_token.get_secret_value()
+        if settings.endpoint is not None:
+            config["endpoint"] = config["aws_endpoint_url_s3"] = settings.endpoint
         self._store: S3Store = S3Store(
             settings.bucket,
-            region=settings.region,
-            access_key_id=credentials.access_key.get_secret_value(),
-            secret_access_key=credentials.secret_key.get_secret_value(),
-            checksum_algorithm="SHA256",
-            **{name: value.get_secret_value() for name, value in token.items()},
-            **endpoint,
+            config=config,
             client_options={
                 "allow_http": (settings.endpoint or "").startswith("http:"),
                 "timeout": timedelta(seconds=settings.timeout),

@@ -255,9 +255,10 @@ class ArchiveService:
             context.archived.forget(gone.trace)
             self._succeeded()
         for _ in range(SENT_A_ROUND):
-            if (trace := self._sending.first()) is None or self._closing.is_set():
+            waiting = self._sending.first()
+            if waiting is None or self._closing.is_set():
                 break
-            self._send_one(trace)
+            self._send_one(waiting)
         self._drop_asked()
         limit = self._context.settings.keep_size
         if is_due or (limit is not None and self._local_bytes > limit * MB and not self._over):

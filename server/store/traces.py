@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import delete, select, text, tuple_, update
+from sqlalchemy import delete, func, select, text, tuple_, update
 from sqlalchemy.orm import Session
 
 from daq.contracts.labels import Outcome, Source
@@ -142,17 +142,20 @@ class TraceStore:
 
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
-        query = select(TraceRow).where(TraceRow.robot == robot)
+        few = self._few_with(search.text.lower()) if search.text else None
+        if few == []:  # else SQLite reads the whole index for a list that is empty
+            return Page(items=())
+        if few is None:
+            query = select(TraceRow).where(TraceRow.robot == robot)
+        else:
+            # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads the whole index.
+            query = select(TraceRow).where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
         for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
             if wanted is not None:
                 query = query.where(getattr(TraceRow, column) == wanted)
-        few = None
         if search.text:
-            few = self._few_with(search.text.lower())
             searched = search.text.lower().replace("\0", "")
             query = query.where(TraceRow.searched.contains(searched, autoescape=True))
-        if few is not None:
-            query = query.where(TraceRow.id.in_(few))
         if search.tag is not None:
             query = query.where(TraceRow.id.in_(select(TraceTagRow.trace).filter_by(tag=search.tag)))
         if search.since is not None:

@@ -24,9 +24,11 @@ def shared_proxy(store: ObjectStore) -> Iterator[FaultyStore]:
 
 
 @pytest.fixture
-def proxy(shared_proxy: FaultyStore) -> FaultyStore:
+def proxy(shared_proxy: FaultyStore) -> Iterator[FaultyStore]:
     """The same, which passes everything on."""
+    shared_proxy.go_on.clear()
     shared_proxy.fail("")
     shared_proxy.seen.clear()
     shared_proxy.paths.clear()
-    return shared_proxy
+    yield shared_proxy
+    shared_proxy.go_on.set()

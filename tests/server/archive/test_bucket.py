@@ -48,7 +48,6 @@ def test_every_size_comes_back_as_it_was(store: ObjectStore, tmp_path: Path, siz
         ("403", RefusedError, "refuses these credentials"),
         ("refuse", ArchiveError, "cannot be reached"),
         ("stall", ArchiveError, "no answer in time"),
-        ("redirect", ArchiveError, "archive"),
     ],
 )
 def test_an_error_is_one_line_without_secrets(
@@ -109,18 +108,6 @@ def test_a_bucket_that_is_not_there_needs_a_person(store: ObjectStore, tmp_path:
 def test_nobody_answers_at_the_address(tmp_path: Path) -> None:
     with pytest.raises(ArchiveError, match="cannot be reached"):
         bucket_of("traces", "http://127.0.0.1:9").send("one", _file(tmp_path))
-
-
-def test_no_redirection_leads_to_another_address(store: ObjectStore, proxy: FaultyStore, tmp_path: Path) -> None:
-    name = store.bucket()
-    proxy.fail("redirect", "PUT", "GET")
-    bucket = bucket_of(name, proxy.url)
-    with pytest.raises(ArchiveError):
-        bucket.send("one", _file(tmp_path))
-    bucket_of(name, store.url).send("one", _file(tmp_path))
-    with pytest.raises(ArchiveError):
-        bucket.read("one", len(TEXT), lambda _piece: None)
-    assert "/elsewhere" not in proxy.paths
 
 
 def test_without_a_bucket_there_is_no_archive() -> None:

@@ -128,7 +128,7 @@ def test_a_service_without_an_archive_says_so(
         assert (answer.status_code, answer.json()["type"].partition("#")[2]) == (409, "no-archive")
         daq = CommandLine(capsys)
         root = str(api.base_url).partition("/api")[0]
-        daq("--server", root, "traces", "archive").complains(3, "this service has no archive; set [archive]")
+        daq("--server", root, "traces", "archive").complains(4, "this service has no archive; set [archive]")
     daq("traces", "archive").complains(2, "only a service has this")
 
 
