@@ -30,6 +30,7 @@ def archive_trace(
     trace: Identity, order: ArchiveOrder, rig: RobotDep, services: ServicesDep, caller: Operator
 ) -> TraceArchive:
     """Sends a trace to the archive now; with `drop`, its local copy goes when it is there."""
+    services.traces.file_of(rig.robot.name, trace)  # raises a 404 for a trace that there is not
     archive = _archive(rig)
     archive.send_and_drop(trace, drop=order.drop)
     if order.drop:

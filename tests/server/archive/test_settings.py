@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,18 @@ def _config(folder: Path, *lines: str) -> Path:
     path = folder / "daq.toml"
     path.write_text("\n".join(("[archive]", *lines, "")), "utf-8")
     return path
+
+
+def test_the_guides_configuration_can_be_said_and_says_everything(tmp_path: Path) -> None:
+    guide = Path(__file__).parents[3].joinpath("docs", "archive.md").read_text("utf-8")
+    (block,) = (
+        text for text in re.findall(r"^```toml\n(.*?)^```", guide, re.MULTILINE | re.DOTALL) if "[archive]" in text
+    )
+    path = tmp_path / "daq.toml"
+    path.write_text(block, "utf-8")
+    found = load_settings(path)[0].archive
+    assert found.model_fields_set == set(ArchiveSettings.model_fields)
+    assert found.place == "arm-traces at https://s3.lab:9000"
 
 
 @pytest.mark.parametrize(
