@@ -98,9 +98,12 @@ class Traces:
 
         Raises ServiceError when it cannot be fetched. While the archive is away, this waits.
         """
-        found = self._connection.ask(TraceArchive, Request("POST", f"{self._path}/{trace}/fetch", repeatable=True))
+        request = Request("POST", f"{self._path}/{trace}/fetch", repeatable=True)
+        found = self._connection.ask(TraceArchive, request)
         while not found.local:
-            if found.transfer is not None:
+            if found.transfer is None:  # somebody else was told that it failed
+                found = self._connection.ask(TraceArchive, request)
+            else:
                 progress(found.transfer)
                 if found.transfer.state == "failed":
                     line = found.transfer.problem

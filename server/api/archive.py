@@ -44,7 +44,7 @@ def fetch_trace(trace: Identity, rig: RobotDep, _: Viewer) -> TraceArchive:
     """Fetches a trace that only the archive has, as opening it does; returns how far this is."""
     archive = _archive(rig)
     if not archive.of(trace).local:
-        archive.fetch(trace)
+        archive.fetch_now(trace)
     return archive.of(trace)
 
 

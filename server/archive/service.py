@@ -134,13 +134,17 @@ class ArchiveService:
         if before is not None and before.state == "failed":
             self._fetching.ended(trace)  # whoever asks again has it tried again
             return ProblemError(503, "archive", before.problem, "try again, or look into the archive")
-        found = self._context.archived.get(trace)
-        if self._fetching.add(trace, 0 if found is None else found.size):
-            self._asked.set()
+        self.fetch_now(trace)
         said = words_of(self._fetching.of(trace))
         advice = "ask again in a moment; GET …/archive says how far it is"
         line = f"the archive has this trace, and it is being fetched: {said}"
         return ProblemError(503, "trace-in-archive", line, advice, headers={"Retry-After": str(RETRY_AFTER)})
+
+    def fetch_now(self, trace: str) -> None:
+        """Fetches a trace as soon as possible, also if that has failed before."""
+        found = self._context.archived.get(trace)
+        if self._fetching.add(trace, 0 if found is None else found.size):
+            self._asked.set()
 
     def bring(self, traces: Iterable[str]) -> Transfer:
         """Fetches traces. Returns how far this is altogether, or the first that has failed."""
@@ -151,9 +155,7 @@ class ArchiveService:
                 self._fetching.ended(trace)  # whoever asks again has it tried again
                 return before
             if before is None:
-                found = self._context.archived.get(trace)
-                if self._fetching.add(trace, 0 if found is None else found.size):
-                    self._asked.set()
+                self.fetch_now(trace)
         every = [one for trace in traces if (one := self._fetching.of(trace)) is not None]
         trouble = self.health.trouble
         return Transfer(
