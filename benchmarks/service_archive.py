@@ -2,7 +2,7 @@
 
     python -m benchmarks service_archive
 
-First traces of half a megabyte are sent and fetched. Then one experiment runs while nothing else happens, one while
+First traces of two megabytes are sent and fetched. Then one experiment runs while nothing else happens, one while
 traces are sent and dropped, and one while the store stalls; a client asks for lists meanwhile. At last the store fails
 in every way at random moments, and the service is killed with -9 at others, while traces are made, dropped, fetched and
 deleted. Then every trace is fetched, and held against the bytes that were recorded.
@@ -35,7 +35,7 @@ from tests.server.archive.store import ACCESS, SECRET, Fault, FaultyStore, Objec
 
 PORT = "mock://?pty=1&seed=3"
 ROWS = 9000
-"""Samples of a made-up trace of six joints: about a megabyte."""
+"""Samples of a made-up trace of six joints: about two megabytes."""
 LIST_TARGET_MS = 50.0
 LONGEST_MOMENT_S = 1.0
 
