@@ -18,14 +18,26 @@ describe('a trace that only the archive has', () => {
     const told: string[] = [];
     const waited: number[] = [];
     const wait = async (ms: number) => void waited.push(ms);
-    expect(await fromArchive(request(away, away), (text) => told.push(text), () => true, wait)).toBe('the trace');
+    expect(
+      await fromArchive(
+        request(away, away),
+        (text) => told.push(text),
+        () => true,
+        wait,
+      ),
+    ).toBe('the trace');
     expect(told).toEqual([away.detail, away.detail, '']);
     expect(waited).toEqual([1000, 1000]);
   });
 
   it('is given up when the archive cannot give it', async () => {
     const damaged = new Problem(503, 'archive', 'is not what was sent');
-    const found = fromArchive(request(away, damaged), () => {}, () => true, async () => {});
+    const found = fromArchive(
+      request(away, damaged),
+      () => {},
+      () => true,
+      async () => {},
+    );
     await expect(found).rejects.toBe(damaged);
   });
 
