@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { Problem } from '../api';
+import { Problem } from '../api/problem';
 import { fromArchive } from './from_archive';
 
 const away = new Problem(503, 'trace-in-archive', 'it is being fetched: 0.4 of 0.9 MB');

@@ -1,6 +1,6 @@
 /** Traces that only the archive has: the service fetches one when it is opened, and says how far it is. */
 
-import { Problem } from '../api';
+import { Problem } from '../api/problem';
 
 /** ms between two questions. */
 const ASK_EVERY = 1000;
