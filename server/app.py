@@ -13,6 +13,7 @@ from fastapi.routing import APIRoute
 from server import problems
 from server.access.gate import Gate
 from server.api import (
+    archive,
     controller,
     description,
     experiments,
@@ -73,7 +74,20 @@ def bare_app(services: Services | None) -> FastAPI:
     )
     problems.install(app)
     api = APIRouter(prefix=API)
-    for part in (robots, controller, teaching, programs, experiments, presets, queue, traces, jobs, live, system):
+    for part in (
+        robots,
+        controller,
+        teaching,
+        programs,
+        experiments,
+        presets,
+        queue,
+        traces,
+        archive,
+        jobs,
+        live,
+        system,
+    ):
         api.include_router(part.router)
     app.include_router(api)
     app.include_router(system.plain)

@@ -26,9 +26,12 @@ from daq.trajectories import control_period
 from server.access.lanes import Lanes
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
+from server.archive.bucket import Bucket, open_bucket
+from server.archive.service import ArchiveContext, ArchiveService
 from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
+from server.catalogue.room import disk_warnings
 from server.clock import Clock, SystemClock
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
@@ -46,6 +49,7 @@ from server.robot.robot import Robot, RobotPlace
 from server.robot.status import status_of
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService, Word
+from server.store.archived import ArchivedStore
 from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
@@ -76,6 +80,7 @@ class RobotServices:
     hub: Hub
     jobs: JobService
     models: Models
+    archive: ArchiveService | None
 
     def status(self) -> RobotStatus:
         """The status of the robot now."""
@@ -103,6 +108,7 @@ class Services:
         self.settings = settings
         self.clock = clock or SystemClock()
         parse_service_address(settings.server.executor)
+        bucket = open_bucket(settings.archive)
         self.store = Store(settings.server.database_url)
         self.store.migrate()
         self.store.require_sound()
@@ -128,7 +134,7 @@ class Services:
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
-        self._robots = {settings.robot.name: self._make_robot(settings)}
+        self._robots = {settings.robot.name: self._make_robot(settings, bucket)}
 
     def robots(self) -> list[RobotServices]:
         """Returns all robots; at present there is one."""
@@ -148,6 +154,8 @@ class Services:
             log.info("catalogue of %s: %s new traces in %s", rig.robot.name, found, rig.catalogue.folder)
             rig.queue.start()
             rig.jobs.start()
+            if rig.archive is not None:
+                rig.archive.start()
             rig.keeper.start(connect=self.settings.server.connect_at_start)
 
     def close(self) -> None:
@@ -157,10 +165,9 @@ class Services:
         every = self.robots()
         for rig in every:
             rig.queue.begin_no_more()  # first, or the end of the connection would pause the queue
-        _all_within(
-            SHUTDOWN,
-            [partial(end, SHUTDOWN) for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)],
-        )
+        archives = [rig.archive.close for rig in every if rig.archive is not None]
+        ends = [end for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)]
+        _all_within(SHUTDOWN, [partial(end, SHUTDOWN) for end in (*ends, *archives)])
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
@@ -172,7 +179,7 @@ class Services:
         self.uploads.close()
         self.motions.close()
 
-    def _make_robot(self, settings: Settings) -> RobotServices:
+    def _make_robot(self, settings: Settings, bucket: Bucket | None) -> RobotServices:
         robot = Robot(_place(settings), self.clock)
         name, folder = robot.place.name, robot.place.folder
         control = ControlService(
@@ -209,7 +216,36 @@ class Services:
             )
         )
         stop = StopService(robot)
-        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models)
+        archive = None if bucket is None else self._make_archive(bucket, catalogue, name, jobs)
+        return RobotServices(
+            robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models, archive
+        )
+
+    def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:
+        """Returns the archive of a robot, behind its folder of traces."""
+        archive = ArchiveService(
+            ArchiveContext(
+                robot=name,
+                settings=self.settings.archive,
+                bucket=bucket,
+                catalogue=catalogue,
+                archived=ArchivedStore(self.store),
+                clock=self.clock,
+                tell=lambda line: self.record_event(name, "archive", line),
+                fetched=jobs.look,
+                count=lambda *moved: self.metrics.count_transfer(name, *moved),
+            )
+        )
+        catalogue.archive = archive
+        return archive
+
+    def warnings(self) -> list[str]:
+        """Returns what will need somebody soon, one line each."""
+        warn_at = self.settings.traces.warn_at
+        found = disk_warnings(self.settings.traces.folder.absolute(), warn_at)
+        for rig in self.robots():
+            found += [] if rig.archive is None else rig.archive.warnings(warn_at)
+        return found
 
     def _make_queue(
         self, robot: Robot, control: ControlService, catalogue: Catalogue, *, unattended: bool

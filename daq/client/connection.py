@@ -69,7 +69,7 @@ class Connection:
         if token is not None and TOKEN.fullmatch(token) is None:
             raise SpecError("token: only ASCII characters without spaces are allowed; `daq token add` shows one")
         self.token = token
-        self._pause = pause
+        self.pause = pause
         self._http = httpx.Client(
             base_url=f"{self.url}{API}",
             headers={} if token is None else {"Authorization": f"Bearer {token}"},
@@ -138,7 +138,7 @@ class Connection:
             except httpx.TransportError as error:
                 if (wait := next(pauses, None)) is None:
                     raise ServiceNotReachedError(f"{self.url}: not reached: {reason_of(error)}") from error
-                self._pause(wait)
+                self.pause(wait)
                 continue
             if response.is_success:
                 return response
@@ -146,7 +146,7 @@ class Connection:
             wait = next(pauses, None) if _may_pass(problem) else None
             if wait is None:
                 raise ServiceError(problem)
-            self._pause(max(wait, min(LONGEST_PAUSE, _retry_after(response))))
+            self.pause(max(wait, min(LONGEST_PAUSE, _retry_after(response))))
 
     def _send(self, request: Request) -> httpx.Response:
         content, headers = request.content, dict(request.headers)

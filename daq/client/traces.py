@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -10,6 +10,8 @@ from daq.client.connection import PART, Connection, Request
 from daq.client.errors import ServiceError
 from daq.contracts.errors import TraceError
 from daq.contracts.labels import Outcome, Source
+from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive, Transfer
+from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.teaching import MeasuredGain
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 
@@ -18,6 +20,9 @@ LAST = "last"
 KINDS = {".mcap": "application/octet-stream", ".csv": "text/csv"}
 MOST_NAMED = 4
 """Number of traces named in the error about an ambiguous beginning."""
+FETCH_LOOK = 0.5
+"""Pause (s) between two looks at a trace that the service fetches from its archive."""
+Progress = Callable[[Transfer], None]
 UPLOAD_WITHIN = 600.0
 """Time-out (s) for the answer to an upload."""
 
@@ -27,6 +32,7 @@ class Traces:
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
+        self._robot = robot
         self._path = f"{robot}/traces"
 
     def list(
@@ -74,21 +80,76 @@ class Traces:
             raise TraceError(f"trace {wanted!r}: {len(found)} traces of the service begin so: {names}; give more of it")
         return exact[0] if exact else found[0]
 
-    def download(self, trace: str, target: Path) -> Path:
-        """The file as it was recorded: to `target`, or under its own name where that is a folder.
+    def archive(self) -> ArchiveStatus:
+        """The state of the archive. Raises ServiceError (`no-archive`) where there is none."""
+        return self._connection.get(ArchiveStatus, f"{self._robot}/archive")
+
+    def archived(self, trace: str) -> TraceArchive:
+        """Where a trace is, and how far it is on its way to the archive or back."""
+        return self._connection.get(TraceArchive, f"{self._path}/{trace}/archive")
+
+    def send_to_archive(self, trace: str, *, drop: bool = False) -> TraceArchive:
+        """Has a trace sent now; with `drop`, the service's local copy goes when the archive has it. Does not wait."""
+        request = Request("POST", f"{self._path}/{trace}/archive", ArchiveOrder(drop=drop), repeatable=True)
+        return self._connection.ask(TraceArchive, request)
+
+    def fetch(self, trace: str, progress: Progress = lambda _transfer: None) -> TraceArchive:
+        """Has a trace fetched from the archive, and waits until the service has it; `progress` is called meanwhile.
+
+        Raises ServiceError when it cannot be fetched. While the archive is away, this waits.
+        """
+        request = Request("POST", f"{self._path}/{trace}/fetch", repeatable=True)
+        found = self._connection.ask(TraceArchive, request)
+        while not found.local:
+            if found.transfer is None:  # somebody else was told that it failed
+                found = self._connection.ask(TraceArchive, request)
+            else:
+                progress(found.transfer)
+                if found.transfer.state == "failed":
+                    line = found.transfer.problem
+                    problem = ProblemDetails(type="#archive", title="Not available", status=503, detail=line)
+                    raise ServiceError(problem)
+            self._connection.pause(FETCH_LOOK)
+            found = self.archived(trace)
+        return found
+
+    def _details(self, trace: str) -> TraceDetails:
+        """The same as `get`, after the service has fetched the trace from the archive, where it has to."""
+        try:
+            return self.get(trace)
+        except ServiceError as error:
+            if error.kind != "trace-in-archive":
+                raise
+            self.fetch(trace)
+            return self.get(trace)
+
+    def _download(self, trace: str, name: str, target: Path, progress: Progress) -> None:
+        """Downloads a file of a trace, which the service fetches from the archive before, where it has to."""
+        path = f"{self._path}/{trace}/{name}"
+        try:
+            self._connection.download(path, target)
+        except ServiceError as error:
+            if error.kind != "trace-in-archive":
+                raise
+            self.fetch(trace, progress)
+            self._connection.download(path, target)
+
+    def download(self, trace: str, target: Path, progress: Progress = lambda _transfer: None) -> Path:
+        """The file as it was recorded: to `target`, or under its own name where that is a folder. `progress` is called
+        while the service fetches it from the archive.
 
         Returns the file. Raises TraceError when another one is there, or it cannot be written.
         """
         target = Path(target)
         if target.is_dir():
-            target = target / Path(self.get(trace).entry.file).name
+            target = target / Path(self._details(trace).entry.file).name
         try:
             if not target.exists():
-                self._connection.download(f"{self._path}/{trace}/data.mcap", target)
+                self._download(trace, "data.mcap", target, progress)
                 return target
             fetched = target.with_name(f".{target.name}.fetched")
             try:
-                self._connection.download(f"{self._path}/{trace}/data.mcap", fetched)
+                self._download(trace, "data.mcap", fetched, progress)
                 if fetched.read_bytes() != target.read_bytes():
                     raise TraceError(f"{target}: is there already, and is not trace {trace}; nothing was written over")
             finally:
@@ -100,7 +161,7 @@ class Traces:
     def download_csv(self, trace: str, target: Path) -> Path:
         """Time and signals as plain CSV, in s, rad and V. Raises TraceError when it cannot be written."""
         try:
-            self._connection.download(f"{self._path}/{trace}/data.csv", target)
+            self._download(trace, "data.csv", target, lambda _transfer: None)
         except OSError as error:
             raise TraceError(f"{target}: cannot be written: {error.strerror or error}") from error
         return target

@@ -16,6 +16,7 @@ from pydantic_settings import (
     SettingsError,
 )
 
+from daq.config.archive import ArchiveSettings
 from daq.config.limits import merged_limits
 from daq.config.service import ServiceSettings
 from daq.contracts.documents import parse_toml, read_text, shown
@@ -50,6 +51,8 @@ class TraceSettings(FrozenRecord):
     folder: Path = Path("traces")
     limits: TraceLimits = TraceLimits()
     """Limits for files that are read, whatever their origin."""
+    warn_at: Annotated[float, Field(gt=0, le=1)] = 0.9
+    """Share of the disk of the traces, and of `archive.keep_size`, from which the service warns."""
 
     @field_validator("folder")
     @classmethod
@@ -71,6 +74,7 @@ class Settings(BaseSettings):
     robot: RobotSettings = RobotSettings()
     traces: TraceSettings = TraceSettings()
     server: ServiceSettings = ServiceSettings()
+    archive: ArchiveSettings = ArchiveSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
 
     @classmethod
@@ -148,8 +152,14 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
         if first.kind == "extra_forbidden":
             message = f"no such key; allowed here: {', '.join(_keys_at(first.place[:-1]))}"
         where = _variable_of(first.place) or f"configuration {origin}"
-        value = "" if isinstance(first.value, dict) else f" = {shown(first.value)}"
+        value = "" if isinstance(first.value, dict) or _is_secret(first.place) else f" = {shown(first.value)}"
         raise SpecError(f"{where}: {first.where()}{value}: {message}") from error
+
+
+def _is_secret(where: tuple[int | str, ...]) -> bool:
+    """Whether a wrong value may be a secret, or an address with one in it: who writes a key of the archive into the
+    wrong place shall not find it in a log."""
+    return where[:1] == ("archive",) and where[-1] not in ArchiveSettings.model_fields.keys() - {"endpoint"}
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:

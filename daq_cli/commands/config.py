@@ -15,12 +15,16 @@ app = typer.Typer(add_completion=False, help="Show and check the configuration."
 
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
-    """Show every setting as a daq.toml, and the places where a configuration was looked for."""
+    """Show every setting as a daq.toml, without passwords, and the places where a configuration was looked for."""
     from daq.config.settings import config_files, load_settings
     from daq.config.toml_text import settings_text
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
+    if settings.server.database is not None:
+        from server.store.address import masked_settings  # here: it needs the extra `server`
+
+        settings = masked_settings(settings)
     if json:
         print_json({"file": path, "settings": settings.model_dump(mode="json")})
         return
@@ -68,6 +72,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     from daq.executors.address import parse_service_address
     from daq.safety import unchecked
     from daq.transport import parse_port_url
+    from server.archive.bucket import open_bucket
     from server.store.address import parse_address
 
     call = invocation(context)
@@ -78,6 +83,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     parse_port_url(port or settings.port)
     parse_address(settings.server.database_url)
     parse_service_address(settings.server.executor)
+    open_bucket(settings.archive)
     unset = unchecked(machine, machine.limits)
     if json:
         found = {"machine": machine.name, "joints": len(machine.joints), "memory_map": memory_map.name}

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.figures import JointFigureSet
 from daq.contracts.machine import load_machine
+from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive, Transfer
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.experiments import (
     Experiment,
@@ -372,11 +373,36 @@ def _comparison() -> ComparisonJobResult:
     return ComparisonJobResult(id=JOB, data=data)
 
 
+def _archive() -> list[BaseModel]:
+    on_its_way = Transfer(direction="fetch", state="moving", done=400_000, total=900_000)
+    digest = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
+    return [
+        ArchiveOrder(drop=True),
+        on_its_way,
+        TraceArchive(
+            id=TRACE, local=False, archived=NOON, checked=NOON, size=900_000, sha256=digest, transfer=on_its_way
+        ),
+        ArchiveStatus(
+            place="ma2000 at https://s3.lab",
+            state="away",
+            problem="archive ma2000 at https://s3.lab: keeping a trace: cannot be reached",
+            since=NOON,
+            next_try=8.0,
+            archived=398,
+            waiting=14,
+            fetching=1,
+            local_bytes=84_000_000_000,
+            local_limit=100_000_000_000,
+        ),
+    ]
+
+
 def _system() -> list[BaseModel]:
     storage = StorageStatus(
         traces_folder="/var/lib/ma2000-daq/traces",
         traces_free=50_000_000_000,
         traces_reserve=20_000_000,
+        traces_size=500_000_000_000,
         traces=412,
         database="sqlite",
         database_size=1_200_000,
@@ -388,6 +414,7 @@ def _system() -> list[BaseModel]:
             version="0.1.0",
             uptime=86400.0,
             storage=storage,
+            warnings=("the disk of the traces is 90% full: 50000 MB are free; no experiment is taken below 20 MB",),
             live_clients=3,
             live_dropped=0,
             jobs_at_once=1,
@@ -401,7 +428,7 @@ def _system() -> list[BaseModel]:
 @cache
 def examples() -> dict[str, Any]:
     """The examples as plain data, by the name of their schema."""
-    every = [*_experiments(), *_robot(), *_teaching(), *_traces(), *_models(), *_system()]
+    every = [*_experiments(), *_robot(), *_teaching(), *_traces(), *_models(), *_archive(), *_system()]
     return {type(one).__name__: one.model_dump(mode="json") for one in every}
 
 

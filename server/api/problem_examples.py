@@ -81,6 +81,27 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "delete those first",
     ),
     _met(
+        ".*/(archive|fetch)$|get .*/traces/",
+        409,
+        "no-archive",
+        "this service has no archive",
+        "set [archive] in its daq.toml (docs/archive.md)",
+    ),
+    _met(
+        "get .*/traces/",
+        503,
+        "trace-in-archive",
+        "the archive has this trace, and it is being fetched: 0.0 of 1.2 MB",
+        "ask again in a moment; GET …/archive says how far it is",
+    ),
+    _met(
+        "get .*/traces/",
+        503,
+        "archive",
+        "archive ma2000 at https://s3.lab: ma2000/2026/ramp-0f3c9a1be4d27788.mcap is not what was sent (SHA-256)",
+        "try again, or look into the archive",
+    ),
+    _met(
         "delete .*/models/",
         409,
         "model-in-use",

@@ -36,6 +36,7 @@ class StateMetrics(Collector):
         yield from self._of_experiments()
         yield from self._of_jobs()
         yield from self._of_disks()
+        yield from self._of_archives()
 
     def _of_robots(self) -> Iterable[Metric]:
         link = CounterMetricFamily("daq_link", "Counts of the link since it was opened.", labels=("robot", "counter"))
@@ -92,5 +93,23 @@ class StateMetrics(Collector):
             with suppress(ProblemError):  # no figure for a folder that is not there
                 free.add_metric((name,), free_room(folder.absolute()))
         yield free
+        warnings = "Number of warnings about disk and archive, which GET /api/v1/system has in words."
+        yield GaugeMetricFamily("daq_storage_warnings", warnings, value=len(self._services.warnings()))
         reserve = "Free room on the disk of traces below which no experiment is taken."
         yield GaugeMetricFamily("daq_disk_reserve_bytes", reserve, value=RESERVE)
+
+    def _of_archives(self) -> Iterable[Metric]:
+        reached = GaugeMetricFamily("daq_archive_reached", "1 while the archive answers.", labels=("robot",))
+        traces = GaugeMetricFamily("daq_archive_traces", "Traces of the archive.", labels=("robot",))
+        waiting = GaugeMetricFamily("daq_archive_waiting", "Traces that wait.", labels=("robot", "direction"))
+        local = GaugeMetricFamily("daq_local_traces_bytes", "Size of the traces of the folder.", labels=("robot",))
+        for rig in self._services.robots():
+            if rig.archive is None:
+                continue
+            name, status = rig.robot.name, rig.archive.status()
+            reached.add_metric((name,), status.state == "ok")
+            traces.add_metric((name,), status.archived)
+            waiting.add_metric((name, "send"), status.waiting)
+            waiting.add_metric((name, "fetch"), status.fetching)
+            local.add_metric((name,), status.local_bytes)
+        yield from (reached, traces, waiting, local)

@@ -17,7 +17,7 @@ from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
 from daq.traces.room import RESERVE
 from server.access.caller import caller_of
 from server.api.dependencies import ServicesDep, Viewer
-from server.catalogue.room import free_room
+from server.catalogue.room import disk_size, disk_warnings, free_room
 from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
@@ -77,10 +77,12 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
             traces_folder=str(folder),
             traces_free=free_room(folder),
             traces_reserve=RESERVE,
+            traces_size=disk_size(folder),
             traces=count,
             database=make_url(services.store.url).get_backend_name(),
             database_size=file.stat().st_size if file is not None and file.is_file() else None,
         ),
+        warnings=tuple(services.warnings()),
         live_clients=sum(rig.hub.clients for rig in services.robots()),
         live_dropped=sum(rig.hub.dropped for rig in services.robots()),
         jobs_at_once=services.settings.server.jobs_at_once,
@@ -106,7 +108,11 @@ def _checks(services: Services) -> dict[str, str]:
             checks["traces"] = f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free"
     except OSError as error:
         checks["traces"] = str(error)
+    warnings = disk_warnings(services.settings.traces.folder, services.settings.traces.warn_at)
+    checks["room"] = "; ".join(warnings)
     for rig in services.robots():
+        if rig.archive is not None:
+            checks[f"archive of {rig.robot.name}"] = "; ".join(rig.archive.warnings(services.settings.traces.warn_at))
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
     return checks
 

@@ -6,11 +6,14 @@ import logging
 import shutil
 import threading
 import time
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
+from typing import Protocol
 
 from sqlalchemy.exc import OperationalError
 
+from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import TraceFilter
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
@@ -24,6 +27,8 @@ UPLOAD = ".upload-"
 """Beginning of the name of a folder into which an upload is written."""
 UPLOAD_IS_OLD = 2 * 3600.0
 """Time (s) after which such a folder is no longer in use, since its reader has an hour at most."""
+OPENED_STAYS = 600.0
+"""Time (s) for which the file of a trace stays after somebody has opened it."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
 """Number of characters of an error that the log shows."""
@@ -34,8 +39,24 @@ def is_text(name: str) -> bool:
     return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
+class Fetching(Protocol):
+    """What the catalogue asks of the archive. No method waits for the store."""
+
+    def send(self, trace: str) -> None:
+        """A trace is in the folder now."""
+
+    def fetch(self, trace: str) -> ProblemError:
+        """Fetches a trace that only the archive has; returns the problem that says how far this is."""
+
+    def bring(self, traces: Iterable[str]) -> Transfer:
+        """Fetches traces. Returns how far this is altogether, or the first that has failed."""
+
+    def deleted(self) -> None:
+        """A trace has been deleted."""
+
+
 class Catalogue:
-    """One folder and its table. Safe to use from any thread."""
+    """One folder and its table. Safe to use from any thread. `archive`: the archive behind the folder, if any."""
 
     def __init__(
         self,
@@ -51,6 +72,10 @@ class Catalogue:
         self._experiments = experiments
         self._lock = threading.Lock()
         self.limits = limits
+        self.archive: Fetching | None = None
+        self._opened: dict[str, float] = {}
+        self._opening = threading.Lock()
+        """Held for a moment by who opens a file, and by who drops one."""
 
     def bring_up_to_date(self) -> int:
         """Salvages traces that a crash left unfinished, and adds every file that is not in the table. Returns how many
@@ -81,7 +106,7 @@ class Catalogue:
         """Adds one finished file. Returns the trace's number; None if the file is not a trace, which the log says."""
         with self._lock:
             summary = self._take_in(path)
-            return None if summary is None else summary.trace_id
+        return None if summary is None else summary.trace_id
 
     def move_in(self, source: Path, target: Path, summary: TraceSummary) -> bool:
         """Moves a finished file with this summary from elsewhere on the disk to `target` in the folder, and adds it.
@@ -112,6 +137,8 @@ class Catalogue:
 
         with self._lock:
             self._traces.remove(self._robot, identity, take_away)
+        if self.archive is not None:
+            self.archive.deleted()
         return path
 
     def find(self, wanted: TraceFilter, most: int) -> tuple[str, ...]:
@@ -128,13 +155,70 @@ class Catalogue:
         return tuple(found[:most])
 
     def path_of(self, identity: str) -> Path:
-        """Returns the file of a trace. Raises a 404, also if the file is gone."""
-        name = self._traces.file_of(self._robot, identity)
-        path = self.folder / name
-        if not path.is_file():
+        """Returns the file of a trace. Raises a 404, also if the file is gone; a 503 if only the archive has it, from
+        which it is fetched then."""
+        path = self.place_of(identity)
+        if not self.is_here(identity, path):
+            assert self.archive is not None
+            raise self.archive.fetch(identity)
+        return path
+
+    def place_of(self, identity: str) -> Path:
+        """Returns where the file of a trace is, or will be once it is fetched from the archive. Raises a 404 if it is
+        in neither, a 409 if there is no archive any more."""
+        path = self.folder / self._traces.file_of(self._robot, identity)
+        if path.is_file():
+            return path
+        if not self._traces.is_archived(identity):
             advice = "it was removed from the folder of traces: upload it again, or delete the trace"
             raise not_found(f"file for trace {identity!r} any more", advice)
+        if self.archive is None:
+            line = f"only the archive has trace {identity!r}, and this service has no archive"
+            raise conflict("no-archive", line, "set [archive] in its daq.toml (docs/archive.md)")
         return path
+
+    def bring(self, traces: Iterable[str]) -> Transfer | None:
+        """Fetches from the archive what the folder does not have. Returns None if it has all of these traces; else how
+        far it is, or the first that has failed. Raises a 404 for one that is in neither."""
+        if self.archive is None:
+            return None
+        names = self._traces.files_of(self._robot, traces)
+        absent = {one: self.folder / name for one, name in names.items() if not self.is_here(one, self.folder / name)}
+        for one in absent:
+            self.place_of(one)
+        return self.archive.bring(absent) if absent else None
+
+    def is_here(self, identity: str, path: Path) -> bool:
+        """Whether the folder has the file of a trace, which stays there for a while then."""
+        with self._opening:
+            if not path.is_file():
+                return False
+            now = time.monotonic()
+            self._opened = {one: at for one, at in self._opened.items() if now - at < OPENED_STAYS} | {identity: now}
+        return True
+
+    def take_back(self, identity: str, source: Path) -> Path:
+        """Moves a file that was fetched from the archive into the folder. Raises a 404, and OSError."""
+        target = self.folder / self._traces.file_of(self._robot, identity)
+        with self._lock:
+            if not target.exists():
+                disk.rename(source, target)
+            self._traces.mark_missing([target.name], missing=False)
+        self.is_here(identity, target)
+        return target
+
+    def drop(self, identity: str, is_allowed: Callable[[], bool] = lambda: True) -> bool:
+        """Deletes the local copy of a trace that the archive has. Returns False, and changes nothing, if somebody has
+        just opened it, or it is not allowed any more. Raises a 404, and OSError."""
+        path = self.folder / self._traces.file_of(self._robot, identity)
+        with self._lock, self._opening:
+            if time.monotonic() - self._opened.get(identity, -OPENED_STAYS) < OPENED_STAYS or not is_allowed():
+                return False
+            # After a crash between the two, the next start finds the file and says so.
+            self._traces.mark_missing([path.name], missing=True)
+            path.unlink(missing_ok=True)
+            disk.sync_folder(self.folder)
+        return True
 
     def _take_in(self, path: Path) -> TraceSummary | None:
         """Adds one file. A file that cannot be added is logged, so that it does not keep the others out. Raises
@@ -159,6 +243,8 @@ class Catalogue:
         """Passes the outcome on to the experiment of the trace, if there is one."""
         assert summary.trace_id is not None
         self._experiments.traced(summary.trace_id, summary.outcome)
+        if self.archive is not None:
+            self.archive.send(summary.trace_id)
 
     def _summary(self, path: Path) -> TraceSummary | None:
         try:
@@ -192,7 +278,7 @@ class Catalogue:
                     experiment=self._experiments.of_trace(summary.trace_id),
                     notes=summary.notes,
                 ),
-                lambda file: (self.folder / file).is_file(),
+                lambda file: (self.folder / file).is_file() or self._traces.is_archived(summary.trace_id or ""),
             )
         except ProblemError as error:
             log.warning("not in the catalogue: %s: %s", path, error)

@@ -15,6 +15,7 @@ from sqlalchemy.exc import OperationalError
 
 from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine
+from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.executors import Workers, open_workers
 from daq.executors.address import LOCAL
@@ -84,6 +85,8 @@ class JobService:
         self._closing = False
         self._executors: dict[Lane, Workers] = {}
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
+        self._fetched: dict[str, Transfer] = {}
+        """Waiting jobs whose traces are fetched from the archive, and how far these are."""
         self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
@@ -103,7 +106,7 @@ class JobService:
         task = Task(
             request=request,
             machine=context.machine,
-            traces={number: context.catalogue.path_of(number) for number in found or traces_of(request)},
+            traces={number: context.catalogue.place_of(number) for number in found or traces_of(request)},
             models={number: context.models.path_of(number) for number in models_of(request) if number != MACHINE},
             names={number: context.models.name_of(number) for number in models_of(request)},
             limits=context.catalogue.limits,
@@ -170,11 +173,14 @@ class JobService:
         waiting = self._context.jobs.waiting(self._context.robot) if any(job.state == "queued" for job in jobs) else []
         running = [job for job, _future in list(self._running.values())]
         return tuple(
-            with_what_it_waits_for(job, running, waiting) if job.state == "queued" else self._with_progress(job)
+            self._with_progress(with_what_it_waits_for(job, running, waiting) if job.state == "queued" else job)
             for job in jobs
         )
 
     def _with_progress(self, job: Job) -> Job:
+        fetched = self._fetched.get(job.id)
+        if job.state == "queued" and fetched is not None:
+            return job.model_copy(update={"progress_text": _words_of(fetched)})
         if job.state != "running":
             return job
         reported = self._reported(job.id)
@@ -220,7 +226,7 @@ class JobService:
                 # The disk may be full, or the database locked: try again at the next check.
                 log.exception("jobs")
                 failed = True
-            self._wake.wait(LOOK_EVERY if self._running or failed else None)
+            self._wake.wait(LOOK_EVERY if self._running or self._fetched or failed else None)
 
     def _begin(self) -> bool:
         """Hands waiting jobs to free workers of their lanes. Returns whether any has begun."""
@@ -228,22 +234,44 @@ class JobService:
         places = {"short": SHORT_LANE_WORKERS, "long": context.at_once, "batch": BATCH_LANE_WORKERS}
         free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
         has_begun = False
-        for job in context.jobs.waiting(context.robot):
+        waiting = {job.id: job for job in context.jobs.waiting(context.robot)}
+        for job in waiting.values():
             lane = lane_of(job.request)
             if free[lane] <= 0:
+                continue
+            away = self._away(job)
+            if away is not None and away.state != "failed":
                 continue
             try:  # its state first: a job cancelled before that is never computed
                 begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
             except ProblemError:  # it has just been cancelled
                 continue
-            future = self._handed_over(job.id, lane, places[lane])
+            future = self._handed_over(job.id, lane, places[lane]) if away is None else _refused(away.problem)
             self._running[job.id] = begun, future
             if not future.done():
                 free[lane] -= 1
             has_begun = True
             self._tell(begun)
             future.add_done_callback(lambda _future: self._wake.set())
+        self._fetched = {job: fetched for job, fetched in self._fetched.items() if job in waiting}
         return has_begun
+
+    def _away(self, job: Job) -> Transfer | None:
+        """Returns how far the traces of a job are that only the archive has; None if all are here."""
+        try:
+            away = self._context.catalogue.bring(traces_of(job.request))
+        except ProblemError as error:
+            away = Transfer(direction="fetch", state="failed", done=0, total=0, problem=error.detail)
+        if away is None or away.state == "failed":
+            self._fetched.pop(job.id, None)
+        elif self._fetched.get(job.id) != away:
+            self._fetched[job.id] = away
+            self._tell(job)
+        return away
+
+    def look(self) -> None:
+        """Looks whether a waiting job can begin, since traces have been fetched."""
+        self._wake.set()
 
     def _at_work(self, lane: Lane) -> int:
         running = list(self._running.values())
@@ -381,6 +409,19 @@ def _failed(error: Exception) -> Future[Ended]:
     future: Future[Ended] = Future()
     future.set_exception(error)
     return future
+
+
+def _refused(problem: str) -> Future[Ended]:
+    future: Future[Ended] = Future()
+    future.set_result(Ended(problem=problem))
+    return future
+
+
+def _words_of(fetched: Transfer) -> str:
+    """What a job waits for whose traces are fetched."""
+    if fetched.problem:
+        return f"its traces are in the archive: {fetched.problem}"
+    return f"fetching its traces from the archive: {fetched.done / 1e6:.1f} of {fetched.total / 1e6:.1f} MB"
 
 
 def _fault(error: Exception) -> str:

@@ -6,6 +6,7 @@ from sqlalchemy import Engine, create_engine
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
+from daq.config.settings import Settings
 from daq.contracts import exit_codes
 from daq.contracts.documents import shown
 from daq.contracts.errors import DaqError
@@ -41,6 +42,18 @@ def masked(url: URL) -> str:
     """Returns an address without its password, also if that is given as a parameter, for messages."""
     query = {name: "hidden" if "pass" in name.lower() else value for name, value in url.query.items()}
     return url.set(query=query).render_as_string()
+
+
+def masked_settings(settings: Settings) -> Settings:
+    """Returns settings that can be shown: without the password of the database."""
+    if settings.server.database is None:
+        return settings
+    try:
+        shown_address = masked(make_url(settings.server.database))
+    except ArgumentError:
+        shown_address = "hidden: is not the address of a database"
+    section = settings.server.model_copy(update={"database": shown_address})
+    return settings.model_copy(update={"server": section})
 
 
 def open_engine(url: str) -> Engine:

@@ -134,7 +134,7 @@ class ExperimentStore:
         """Returns the number of experiments in each state; states without any are left out."""
         query = select(ExperimentRow.state, func.count()).filter_by(robot=robot).group_by(ExperimentRow.state)
         with self._store.reading() as session:
-            return dict(session.execute(query).tuples().all())
+            return {row[0]: row[1] for row in session.execute(query)}
 
     def count_waiting(self, robot: str) -> int:
         """Returns the number of queued experiments. It reads the database the first time only."""

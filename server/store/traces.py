@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import delete, select, text, tuple_, update
+from sqlalchemy import delete, func, select, text, tuple_, update
 from sqlalchemy.orm import Session
 
 from daq.contracts.labels import Outcome, Source
@@ -17,7 +17,7 @@ from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, page_of
 from server.store.remembered import Remembered
-from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
+from server.store.tables import ArchivedRow, TraceRow, TraceTagRow, TraceUseRow
 
 TRIGRAM = 3
 """Number of characters of the shortest text that an index of trigrams finds."""
@@ -114,11 +114,27 @@ class TraceStore:
         with self._store.reading() as session:
             return _row(session, robot, identity).file
 
+    def files_of(self, robot: str, identities: Iterable[str]) -> dict[str, str]:
+        """Returns the names of the files of traces, those that are in the table."""
+        names, found = list(identities), dict[str, str]()
+        with self._store.reading() as session:
+            for first in range(0, len(names), 500):
+                part = TraceRow.id.in_(names[first : first + 500])
+                query = select(TraceRow.id, TraceRow.file).where(TraceRow.robot == robot, part)
+                found.update((row.id, row.file) for row in session.execute(query))
+        return found
+
     def get(self, robot: str, identity: str) -> CatalogueEntry:
         """Returns a trace's entry. Raises a 404."""
         with self._store.reading() as session:
             row = _row(session, robot, identity)
-            return _entry(row, _tags(session, [row.id]).get(row.id, ()))
+            archived = bool(_archived(session, [row.id]))
+            return _entry(row, _tags(session, [row.id]).get(row.id, ()), archived=archived)
+
+    def is_archived(self, identity: str) -> bool:
+        """Whether the archive has a trace."""
+        with self._store.reading() as session:
+            return bool(_archived(session, [identity]))
 
     def found(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first, read anew."""
@@ -126,17 +142,20 @@ class TraceStore:
 
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
-        query = select(TraceRow).where(TraceRow.robot == robot)
+        few = self._few_with(search.text.lower()) if search.text else None
+        if few == []:  # else SQLite reads the whole index for a list that is empty
+            return Page(items=())
+        if few is None:
+            query = select(TraceRow).where(TraceRow.robot == robot)
+        else:
+            # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads the whole index.
+            query = select(TraceRow).where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
         for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
             if wanted is not None:
                 query = query.where(getattr(TraceRow, column) == wanted)
-        few = None
         if search.text:
-            few = self._few_with(search.text.lower())
             searched = search.text.lower().replace("\0", "")
             query = query.where(TraceRow.searched.contains(searched, autoescape=True))
-        if few is not None:
-            query = query.where(TraceRow.id.in_(few))
         if search.tag is not None:
             query = query.where(TraceRow.id.in_(select(TraceTagRow.trace).filter_by(tag=search.tag)))
         if search.since is not None:
@@ -150,10 +169,11 @@ class TraceStore:
         with self._store.reading() as session:
             rows = list(session.scalars(query))
             tags = _tags(session, [row.id for row in rows])
+            archived = _archived(session, [row.id for row in rows])
         return page_of(
             rows,
             limit,
-            lambda row: _entry(row, tags.get(row.id, ())),
+            lambda row: _entry(row, tags.get(row.id, ()), archived=row.id in archived),
             lambda row: Cursor(row.created.timestamp(), row.id),
         )
 
@@ -190,7 +210,7 @@ class TraceStore:
             session.flush()
             tags = _tags(session, [row.id]).get(row.id, ())
             row.searched = _searched(row, tags)
-            return _entry(row, tags)
+            return _entry(row, tags, archived=bool(_archived(session, [row.id])))
 
     def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
         """Deletes the row. Raises a 404, and a 409 if a model or a job uses the trace.
@@ -204,6 +224,8 @@ class TraceStore:
             if users:
                 line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
                 raise conflict("trace-in-use", line, "delete those first")
+            # The archive's service deletes the object, when the store can be reached.
+            session.execute(update(ArchivedRow).filter_by(trace=identity).values(deleting=True))
             session.delete(row)
             session.flush()
             also()
@@ -224,13 +246,20 @@ def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]
     return found
 
 
+def _archived(session: Session, identities: list[str]) -> set[str]:
+    query = select(ArchivedRow.trace).where(ArchivedRow.trace.in_(identities), ArchivedRow.deleting.is_(False))
+    return set(session.scalars(query))
+
+
 def _searched(row: TraceRow, tags: Iterable[str]) -> str:
     parts = (row.id, row.file, row.name, row.kind, row.operator, row.notes, row.source, row.outcome, *tags)
     return "\n".join(part for part in parts if part).lower()
 
 
-def _entry(row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
+def _entry(row: TraceRow, tags: tuple[str, ...], *, archived: bool) -> CatalogueEntry:
+    own = CatalogueEntry.model_fields.keys() - {"tags", "joints", "missing", "archived", "local"}
     return CatalogueEntry.model_validate(
-        {name: getattr(row, name) for name in CatalogueEntry.model_fields if name not in ("tags", "joints")}
+        {name: getattr(row, name) for name in own}
         | {"tags": tags, "joints": tuple(row.joints)}
+        | {"missing": row.missing and not archived, "archived": archived, "local": not row.missing}
     )

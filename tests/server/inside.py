@@ -15,6 +15,7 @@ import pytest
 import uvicorn
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
+from daq.config.archive import ArchiveSettings
 from daq.config.service import ServiceSettings
 from daq.config.settings import RobotSettings, Settings, TraceSettings
 from server.access.gate import Gate
@@ -55,15 +56,20 @@ class _Server(uvicorn.Server):
 
 @contextmanager
 def service_inside(
-    folder: Path, clock: SystemClock, monkeypatch: pytest.MonkeyPatch, database: str | None = None
+    folder: Path,
+    clock: SystemClock,
+    monkeypatch: pytest.MonkeyPatch,
+    database: str | None = None,
+    archive: ArchiveSettings | None = None,
 ) -> Iterator[httpx.Client]:
-    """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, and
-    in `database`."""
+    """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, in
+    `database`, and in `archive`."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder / "run"))
     settings = Settings(
         robot=RobotSettings(port=MOCK),
         traces=TraceSettings(folder=folder / "traces"),
         server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
+        archive=archive or ArchiveSettings(),
     )
     services = Services(settings, clock)
     gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True)

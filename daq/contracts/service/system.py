@@ -35,6 +35,8 @@ class StorageStatus(Wire):
     traces_free: int
     traces_reserve: int
     """New experiments are refused if less than this is free."""
+    traces_size: int
+    """Size of the disk of the traces (bytes)."""
     traces: int
     """Number of traces in the catalogue."""
     database: str
@@ -48,6 +50,8 @@ class SystemStatus(Wire):
     uptime: float
     """Time (s) since the service started."""
     storage: StorageStatus
+    warnings: tuple[str, ...] = ()
+    """What will need somebody soon, one line each: a disk that fills, an archive that is away."""
     live_clients: int
     live_dropped: int
     jobs_at_once: int

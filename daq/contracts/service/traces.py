@@ -36,7 +36,11 @@ class CatalogueEntry(Wire):
     tags: tuple[str, ...] = ()
     notes: str = ""
     missing: bool = False
-    """Whether its file is gone, though the catalogue has it."""
+    """Whether its file is gone, though the catalogue has it: neither the folder nor the archive has it."""
+    archived: bool = False
+    """Whether the archive has it."""
+    local: bool = True
+    """Whether the folder has it; if not, it is fetched from the archive when somebody opens it."""
 
 
 class TraceDetails(Wire):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
+from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import (
     BatchRequest,
     CompareRequest,
@@ -38,6 +39,7 @@ from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
 from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
+from server.store.archived import Archived, ArchivedStore
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
@@ -191,6 +193,78 @@ def test_a_job_that_begins_while_it_is_being_cancelled_is_told_to_end(bench: Ben
     bench.jobs.before("change", lambda: bench.jobs.change("ma2000", job.id, Event.TAKEN, bench.clock.utc()))
     assert bench.service.cancel(job.id, "anna").state == "running"
     assert (bench.folder / job.id / CANCEL).exists()
+
+
+class HandArchive:
+    """An archive behind the folder, which fetches when the test says so."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.problem = ""
+        self.asked: list[str] = []
+        self._bench = bench
+        self._file = bench.catalogue.folder / "1.mcap"
+        ArchivedStore(bench.store).add(
+            Archived(TRACE, "ma2000", "one", 4, "0" * 64, bench.clock.utc(), bench.clock.utc())
+        )
+        self._file.unlink()
+        bench.catalogue.archive = self
+
+    def send(self, trace: str) -> None:
+        """Sends nothing."""
+
+    def deleted(self) -> None:
+        """Deletes nothing."""
+
+    def fetch(self, trace: str) -> ProblemError:
+        """Is not asked by jobs."""
+        raise AssertionError(trace)
+
+    def bring(self, traces: Iterable[str]) -> Transfer:
+        """Tells how far it is."""
+        self.asked += traces
+        state: Literal["failed", "moving"] = "failed" if self.problem else "moving"
+        return Transfer(direction="fetch", state=state, done=1_000_000, total=4_000_000, problem=self.problem)
+
+    def ends(self) -> None:
+        """The trace is there."""
+        self._file.touch()
+        self._bench.service.look()
+
+
+def test_a_job_waits_until_its_trace_is_fetched_from_the_archive_and_says_so(bench: Bench) -> None:
+    archive = HandArchive(bench)
+    job = _submitted(bench)
+    bench.service.start()
+    with bench.changed:
+        bench.changed.wait_for(lambda: any(one.progress_text for one in bench.told))
+    assert bench.state_of(job) == "queued"
+    said = bench.service.with_progress(job).progress_text
+    assert said == "fetching its traces from the archive: 1.0 of 4.0 MB"
+    assert bench.executor.given == []
+    archive.ends()
+    assert bench.end_of(job).state == "done"
+    assert set(archive.asked) == {TRACE}
+
+
+def test_a_job_whose_trace_the_archive_cannot_give_fails_with_one_line_and_the_next_begins(bench: Bench) -> None:
+    archive = HandArchive(bench)
+    archive.problem = "archive traces at http://s3.lab: one is not what was sent (SHA-256)"
+    job = _submitted(bench)
+    bench.service.start()
+    ended = bench.end_of(job)
+    assert (ended.state, ended.reason, ended.failure) == ("failed", archive.problem, "refused")
+    archive.ends()
+    assert bench.end_of(_submitted(bench)).state == "done"
+
+
+def test_a_job_that_waits_for_the_archive_can_be_cancelled(bench: Bench) -> None:
+    HandArchive(bench)
+    job = _submitted(bench)
+    bench.service.start()
+    with bench.changed:
+        bench.changed.wait_for(lambda: any(one.progress_text for one in bench.told))
+    assert bench.service.cancel(job.id, "anna").state == "cancelled"
+    assert bench.executor.given == []
 
 
 def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> None:

@@ -911,6 +911,70 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/archive": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Archive
+         * @description Returns whether the archive answers, and what waits for it.
+         */
+        get: operations["get_archive"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/traces/{trace}/archive": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Trace Archive
+         * @description Returns where a trace is, and how far it is on its way.
+         */
+        get: operations["get_trace_archive"];
+        put?: never;
+        /**
+         * Archive Trace
+         * @description Sends a trace to the archive now; with `drop`, its local copy goes when it is there.
+         */
+        post: operations["archive_trace"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/traces/{trace}/fetch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Fetch Trace
+         * @description Fetches a trace that only the archive has, as opening it does; returns how far this is.
+         */
+        post: operations["fetch_trace"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/jobs": {
         parameters: {
             query?: never;
@@ -1378,6 +1442,46 @@ export interface components {
             reason: string;
         };
         /**
+         * ArchiveOrder
+         * @description Asks for a trace to be archived now. `drop`: the local copy goes when that is done, whatever the policy says.
+         */
+        ArchiveOrder: {
+            /**
+             * Drop
+             * @default false
+             */
+            drop?: boolean;
+        };
+        /**
+         * ArchiveStatus
+         * @description State of the archive.
+         */
+        ArchiveStatus: {
+            /** Place */
+            place: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "ok" | "away" | "refused";
+            /** Problem */
+            problem: string;
+            /** Since */
+            since: string | null;
+            /** Next Try */
+            next_try: number | null;
+            /** Archived */
+            archived: number;
+            /** Waiting */
+            waiting: number;
+            /** Fetching */
+            fetching: number;
+            /** Local Bytes */
+            local_bytes: number;
+            /** Local Limit */
+            local_limit: number | null;
+        };
+        /**
          * AwaitInput
          * @description Waits until process input `line` (0–7) is on or off; the program ends in an error after `longest` s.
          */
@@ -1578,6 +1682,16 @@ export interface components {
              * @default false
              */
             missing?: boolean;
+            /**
+             * Archived
+             * @default false
+             */
+            archived?: boolean;
+            /**
+             * Local
+             * @default true
+             */
+            local?: boolean;
         };
         /**
          * Combination
@@ -5213,6 +5327,8 @@ export interface components {
             traces_free: number;
             /** Traces Reserve */
             traces_reserve: number;
+            /** Traces Size */
+            traces_size: number;
             /** Traces */
             traces: number;
             /** Database */
@@ -5255,6 +5371,11 @@ export interface components {
             /** Uptime */
             uptime: number;
             storage: components["schemas"]["StorageStatus"];
+            /**
+             * Warnings
+             * @default []
+             */
+            warnings?: string[];
             /** Live Clients */
             live_clients: number;
             /** Live Dropped */
@@ -5414,6 +5535,25 @@ export interface components {
             samples: number;
             /** Joints */
             joints: components["schemas"]["JointAgreement"][];
+        };
+        /**
+         * TraceArchive
+         * @description Where a trace is, and how far it is on its way.
+         */
+        TraceArchive: {
+            /** Id */
+            id: string;
+            /** Local */
+            local: boolean;
+            /** Archived */
+            archived: string | null;
+            /** Checked */
+            checked: string | null;
+            /** Size */
+            size: number | null;
+            /** Sha256 */
+            sha256: string | null;
+            transfer: components["schemas"]["Transfer"] | null;
         };
         /**
          * TraceChange
@@ -5596,6 +5736,31 @@ export interface components {
             rms: number;
             /** Largest */
             largest: number;
+        };
+        /**
+         * Transfer
+         * @description A trace on its way between this computer and the archive.
+         */
+        Transfer: {
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "send" | "fetch";
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "waiting" | "moving" | "failed";
+            /** Done */
+            done: number;
+            /** Total */
+            total: number;
+            /**
+             * Problem
+             * @default
+             */
+            problem?: string;
         };
         /**
          * TriedEffect
@@ -7330,6 +7495,105 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TraceSignals"];
+                };
+            };
+        };
+    };
+    get_archive: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArchiveStatus"];
+                };
+            };
+        };
+    };
+    get_trace_archive: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                trace: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceArchive"];
+                };
+            };
+        };
+    };
+    archive_trace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                trace: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ArchiveOrder"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceArchive"];
+                };
+            };
+        };
+    };
+    fetch_trace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                trace: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceArchive"];
                 };
             };
         };

@@ -1,0 +1,202 @@
+"""One bucket of a store that speaks S3, through `obstore`. Every error is one line without a secret in it."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import timedelta
+from importlib.util import find_spec
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from daq.config.archive import ArchiveSettings
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError, SpecError
+from server.archive.credentials import Credentials, load_credentials
+
+if TYPE_CHECKING:
+    from obstore.store import S3Config, S3Store
+
+PIECE = 8 << 20
+"""Number of bytes that one request sends or fetches, so that a time limit on a request suits traces of every size."""
+AT_ONCE = 2
+"""Number of pieces that are sent at once, so that little memory and little of the line is taken."""
+RETRIES, RETRY_WITHIN = 2, timedelta(seconds=10)
+"""How often `obstore` repeats a request, and for how long; after that the service waits longer and tries again."""
+STATUS = re.compile(r"\b(?:status(?: code)?:?|error code|server error[^0-9]{0,20})\s*\(?([1-5]\d\d)\b", re.IGNORECASE)
+"""The status of an answer, in the words of `obstore`."""
+REACHING = ("connect", "dns", "tcp", "closed before", "reset by peer", "refused", "error sending request")
+Progress = Callable[[int], None]
+"""Called with the number of bytes that have been moved so far."""
+
+
+class ArchiveError(DaqError):
+    """The store did not do what it was asked. Another attempt may succeed: it is away, slow, or answers errors."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+class RefusedError(ArchiveError):
+    """The store refuses this service, or its bucket is not there: a person must look."""
+
+
+class DamagedError(ArchiveError):
+    """What the store has is not what was sent: it is gone, shorter, or different."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """Size (bytes) and SHA-256 of what was read."""
+
+    size: int
+    sha256: str
+
+
+class Bucket:
+    """Objects by their names. Safe to use from any thread; each call waits for the store, for `timeout` s a piece."""
+
+    def __init__(self, settings: ArchiveSettings, credentials: Credentials) -> None:
+        from obstore.store import S3Store
+
+        self.place = settings.place
+        # Every key is given: one that is not would be looked for in the environment, and credentials at the address
+        # where a virtual machine of Amazon's finds its own.
+        config: S3Config = {
+            "region": settings.region,
+            "access_key_id": credentials.access_key.get_secret_value(),
+            "secret_access_key": credentials.secret_key.get_secret_value(),
+            "checksum_algorithm": "SHA256",
+        }
+        if credentials.session_token is not None:
+            config["session_token"] = credentials.session_token.get_secret_value()
+        if settings.endpoint is not None:
+            config["endpoint"] = config["aws_endpoint_url_s3"] = settings.endpoint
+        self._store: S3Store = S3Store(
+            settings.bucket,
+            config=config,
+            client_options={
+                "allow_http": (settings.endpoint or "").startswith("http:"),
+                "timeout": timedelta(seconds=settings.timeout),
+                "connect_timeout": timedelta(seconds=min(5.0, settings.timeout)),
+            },
+            retry_config={"max_retries": RETRIES, "retry_timeout": RETRY_WITHIN},
+        )
+
+    def send(self, key: str, file: Path, progress: Progress = lambda _done: None) -> Content:
+        """Sends a file, and returns what was sent. Raises OSError if the file cannot be read, ArchiveError."""
+        import obstore
+
+        digest, size = hashlib.sha256(), 0
+
+        def pieces(stream: IO[bytes]) -> Iterator[bytes]:
+            nonlocal size
+            while piece := stream.read(PIECE):
+                digest.update(piece)
+                size += len(piece)
+                yield piece
+                progress(size)
+
+        with file.open("rb") as stream:
+            is_small = file.stat().st_size <= PIECE
+            first = stream.read(PIECE) if is_small else b""
+            try:
+                if is_small:
+                    digest.update(first)
+                    size = len(first)
+                    obstore.put(self._store, key, first, use_multipart=False)
+                    progress(size)
+                else:
+                    obstore.put(self._store, key, pieces(stream), chunk_size=PIECE, max_concurrency=AT_ONCE)
+            except Exception as error:
+                raise self._error("keeping a trace", error) from error
+        return Content(size, digest.hexdigest())
+
+    def read(
+        self, key: str, size: int, take: Callable[[bytes], object], progress: Progress = lambda _: None
+    ) -> Content:
+        """Reads an object of `size` bytes piece by piece, each given to `take`. Raises what `take` raises;
+        DamagedError if the object is gone or has another size; ArchiveError."""
+        import obstore
+
+        digest, done = hashlib.sha256(), 0
+        if self.size_of(key) != size:
+            raise DamagedError(f"archive {self.place}: {key} has another size than what was sent")
+        while done < size:
+            try:
+                piece = bytes(obstore.get_range(self._store, key, start=done, end=min(size, done + PIECE)))
+            except Exception as error:
+                raise self._error("reading a trace", error) from error
+            if len(piece) != min(size, done + PIECE) - done:
+                raise ArchiveError(f"archive {self.place}: reading a trace: the answer was cut short")
+            digest.update(piece)
+            done += len(piece)
+            take(piece)
+            progress(done)
+        return Content(done, digest.hexdigest())
+
+    def size_of(self, key: str) -> int:
+        """Returns the size of an object. Raises DamagedError if there is none, ArchiveError."""
+        import obstore
+
+        try:
+            return obstore.head(self._store, key)["size"]
+        except Exception as error:
+            raise self._error("reading a trace", error) from error
+
+    def remove(self, key: str) -> None:
+        """Deletes an object; one that is gone already is no error. Raises ArchiveError."""
+        import obstore
+
+        try:
+            obstore.delete(self._store, key)
+        except FileNotFoundError:
+            pass
+        except Exception as error:
+            raise self._error("deleting a trace", error) from error
+
+    def _error(self, doing: str, error: Exception) -> ArchiveError:
+        """What went wrong, in our own words: those of a store may repeat names, keys and signatures."""
+        kind, why = _reason(error)
+        return kind(f"archive {self.place}: {doing}: {why}")
+
+
+def open_bucket(settings: ArchiveSettings) -> Bucket | None:
+    """Opens the archive; None if none is configured. Nothing is asked of the store yet. Raises SpecError."""
+    if settings.bucket is None:
+        return None
+    if find_spec("obstore") is None:
+        install = "`pip install 'ma2000-daq[archive]'` where daq is installed"
+        raise SpecError(f"archive.bucket {settings.bucket}: obstore is not installed: {install}")
+    try:
+        return Bucket(settings, load_credentials(settings))
+    except DaqError:
+        raise
+    except Exception as error:  # noqa: BLE001, whatever it is, its words may repeat the credentials
+        raise SpecError(f"archive {settings.place}: cannot be used: {type(error).__name__}") from None
+
+
+def _reason(error: Exception) -> tuple[type[ArchiveError], str]:
+    from obstore import exceptions
+
+    words = str(error)
+    low = words.lower().replace("retry_timeout", "")
+    status = STATUS.search(words)
+    is_reach = any(word in low for word in REACHING)
+    reasons: list[tuple[bool, type[ArchiveError], str]] = [
+        ("nosuchbucket" in low, RefusedError, "there is no such bucket"),
+        (isinstance(error, FileNotFoundError), DamagedError, "the store no longer has it"),
+        (
+            isinstance(error, exceptions.PermissionDeniedError | exceptions.UnauthenticatedError),
+            RefusedError,
+            "the store refuses these credentials, or what they may do",
+        ),
+        ("timed out" in low or "timeout" in low, ArchiveError, "no answer in time"),
+        (status is not None, ArchiveError, f"the store answers {status[1] if status else ''}"),
+        (is_reach, ArchiveError, "cannot be reached"),
+    ]
+    for is_so, kind, why in reasons:
+        if is_so:
+            return kind, why
+    return ArchiveError, "the store gives no valid answer"

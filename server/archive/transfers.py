@@ -1,0 +1,75 @@
+"""Traces on their way between this computer and the archive, and those that wait."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+
+from daq.contracts.service.archive import Transfer
+
+FAILURES_SHOWN = 500
+"""Number of failed transfers that are remembered, the newest."""
+
+
+class Transfers:
+    """A queue of one direction, by trace. Safe to use from any thread; nothing waits."""
+
+    def __init__(self, direction: str) -> None:
+        self._direction = direction
+        self._lock = threading.Lock()
+        self._waiting: OrderedDict[str, Transfer] = OrderedDict()
+        self._failed: OrderedDict[str, Transfer] = OrderedDict()
+
+    def add(self, trace: str, total: int = 0) -> bool:
+        """Adds a trace at the end. Returns False if it waits already. One that failed is tried again."""
+        with self._lock:
+            self._failed.pop(trace, None)
+            if trace in self._waiting:
+                return False
+            self._waiting[trace] = self._transfer("waiting", 0, total)
+            return True
+
+    def first(self) -> str | None:
+        """Returns the trace that is next, which stays in the queue."""
+        with self._lock:
+            return next(iter(self._waiting), None)
+
+    def moved(self, trace: str, done: int, total: int) -> None:
+        """Notes how much has been moved."""
+        with self._lock:
+            if trace in self._waiting:
+                self._waiting[trace] = self._transfer("moving", done, total)
+
+    def held_up(self, trace: str, problem: str, *, last: bool = False) -> None:
+        """Notes that a trace waits for another attempt; with `last`, behind all others."""
+        with self._lock:
+            if trace in self._waiting:
+                total = self._waiting[trace].total
+                self._waiting[trace] = self._transfer("waiting", 0, total, problem)
+                if last:
+                    self._waiting.move_to_end(trace)
+
+    def ended(self, trace: str, problem: str = "") -> None:
+        """Takes a trace out of the queue; with a problem, it has failed and is not tried again by itself;
+        without one, an earlier failure is forgotten."""
+        with self._lock:
+            was = self._waiting.pop(trace, None)
+            self._failed.pop(trace, None)
+            if problem:
+                self._failed[trace] = self._transfer("failed", 0, was.total if was else 0, problem)
+                while len(self._failed) > FAILURES_SHOWN:
+                    self._failed.popitem(last=False)
+
+    def of(self, trace: str) -> Transfer | None:
+        """Returns how far a trace is; None if it neither waits nor has failed."""
+        with self._lock:
+            return self._waiting.get(trace) or self._failed.get(trace)
+
+    def __len__(self) -> int:
+        with self._lock:
+            return len(self._waiting)
+
+    def _transfer(self, state: str, done: int, total: int, problem: str = "") -> Transfer:
+        return Transfer.model_validate(
+            {"direction": self._direction, "state": state, "done": done, "total": total, "problem": problem}
+        )

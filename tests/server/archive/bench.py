@@ -1,0 +1,117 @@
+"""An archive behind a folder of traces, with its own threads, on a store that may fail."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from daq.traces.csv_table import import_csv
+from daq.traces.naming import trace_path
+from daq.traces.store import write_trace
+from server.archive.bucket import Bucket
+from server.archive.service import ArchiveContext, ArchiveService
+from server.catalogue.catalogue import Catalogue
+from server.clock import SystemClock
+from server.store.archived import ArchivedStore
+from server.store.engine import Store
+from server.store.experiments import ExperimentStore
+from server.store.traces import TraceStore
+from tests.server.archive.store import CREDENTIALS, settings_of
+
+ROBOT = "ma2000"
+QUICK = (0.01, 0.05)
+"""Pauses (s) after failures."""
+
+
+class TurnedClock(SystemClock):
+    """The computer's clock, with a wall clock that is ahead."""
+
+    ahead = timedelta(0)
+
+    def utc(self) -> datetime:
+        """What it shows."""
+        return datetime.now(UTC) + self.ahead
+
+
+class Bench:
+    """`told` are the archive's events, `counted` its transfers."""
+
+    def __init__(self, folder: Path, bucket: str, url: str, **settings: Any) -> None:
+        self.folder = folder
+        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
+        self.store.migrate()
+        self.traces = TraceStore(self.store)
+        self.archived = ArchivedStore(self.store)
+        self.catalogue = Catalogue(folder / "traces", ROBOT, self.traces, ExperimentStore(self.store))
+        self.catalogue.folder.mkdir(exist_ok=True)
+        self.clock = TurnedClock()
+        self.told: list[str] = []
+        self.counted: list[tuple[str, str, int]] = []
+        self._changed = threading.Condition()
+        found = settings_of(bucket, url, **({"timeout": 0.3} | settings))
+        self.service = ArchiveService(
+            ArchiveContext(
+                robot=ROBOT,
+                settings=found,
+                bucket=Bucket(found, CREDENTIALS),
+                catalogue=self.catalogue,
+                archived=self.archived,
+                clock=self.clock,
+                tell=self._tell,
+                fetched=self._change,
+                count=self._count,
+                pauses=QUICK,
+            )
+        )
+        self.catalogue.archive = self.service
+        self._made = 0
+
+    def _tell(self, line: str) -> None:
+        self.told.append(line)
+        self._change()
+
+    def _count(self, direction: str, result: str, size: int) -> None:
+        self.counted.append((direction, result, size))
+        self._change()
+
+    def _change(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def trace(self, samples: int = 50) -> str:
+        """A new trace in the folder and in the catalogue. Its number."""
+        self._made += 1
+        table = self.folder / "table.csv"
+        rows = (f"{0.02 * n:.2f},{0.001 * n * self._made}" for n in range(samples))
+        table.write_text("time,position_1\n" + "\n".join(rows), "utf-8")
+        trace = import_csv(table)
+        path = trace_path(self.catalogue.folder, trace.record)
+        write_trace(trace, path)
+        self.catalogue.add(path)
+        return str(trace.record.trace_id)
+
+    def path(self, trace: str) -> Path:
+        """Where its file is, or would be."""
+        return self.catalogue.folder / self.traces.file_of(ROBOT, trace)
+
+    def until(self, is_so: Callable[[], bool]) -> None:
+        """Waits for something that the archive's threads do; the test's own time limit ends the wait."""
+        with self._changed:
+            while not self._changed.wait_for(is_so, 0.02):
+                pass
+
+    def until_archived(self, *traces: str) -> None:
+        """Waits until the archive has these traces."""
+        self.until(lambda: all(self.archived.get(trace) is not None for trace in traces))
+
+    def nobody_reads(self) -> None:
+        """As when ten minutes have passed since somebody opened a trace."""
+        self.catalogue._opened.clear()
+
+    def close(self) -> None:
+        """Ends it, as the service does."""
+        self.service.close(5.0)
+        self.store.close()

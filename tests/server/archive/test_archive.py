@@ -1,0 +1,299 @@
+"""Traces between the folder and the archive: none is ever lost, whatever the store does."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server.problems import ProblemError
+from server.store.models import ModelStore, NewModel
+from tests.server.archive.bench import ROBOT, Bench
+from tests.server.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore
+
+Make = Callable[..., Bench]
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Make]:
+    """Makes benches, and closes them."""
+    made: list[Bench] = []
+
+    def make(bucket: str, url: str, **settings: Any) -> Bench:
+        made.append(Bench(tmp_path, bucket, url, **settings))
+        return made[-1]
+
+    yield make
+    for bench in made:
+        bench.close()
+
+
+@pytest.fixture
+def bench(store: ObjectStore, proxy: FaultyStore, make: Make) -> Bench:
+    """A bench whose store may fail; nothing is dropped by itself."""
+    return make(store.bucket(), proxy.url)
+
+
+def _model_of(bench: Bench, trace: str) -> ModelStore:
+    models = ModelStore(bench.store)
+    now = bench.clock.utc()
+    models.insert(NewModel("a" * 12, ROBOT, "rig b", "a.json", now, "anna", None, None, (trace,)))
+    return models
+
+
+def _drop(bench: Bench, trace: str) -> bytes:
+    """Has a trace archived and its local copy dropped; what the file was."""
+    content = bench.path(trace).read_bytes()
+    bench.nobody_reads()
+    bench.service.send_and_drop(trace, drop=True)
+    bench.until(lambda: not bench.path(trace).exists())
+    return content
+
+
+def test_a_trace_is_sent_when_it_is_in_the_catalogue(bench: Bench, store: ObjectStore) -> None:
+    before = bench.trace()
+    bench.service.start()
+    after = bench.trace()
+    bench.until_archived(before, after)
+    for trace in (before, after):
+        found, content = bench.archived.get(trace), bench.path(trace).read_bytes()
+        assert found is not None
+        assert store.objects(bench.service.status().place.split()[0])[found.object] == content
+        assert found.sha256 == hashlib.sha256(content).hexdigest()
+        entry = bench.traces.get(ROBOT, trace)
+        assert (entry.archived, entry.local, entry.missing) == (True, True, False)
+    assert bench.told == []
+
+
+def test_a_dropped_trace_is_fetched_when_it_is_opened(bench: Bench) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    content = _drop(bench, trace)
+    entry = bench.traces.get(ROBOT, trace)
+    assert (entry.archived, entry.local, entry.missing) == (True, False, False)
+    with pytest.raises(ProblemError) as caught:
+        bench.catalogue.path_of(trace)
+    assert (caught.value.status, caught.value.kind) == (503, "trace-in-archive")
+    bench.until(lambda: bench.service.of(trace).local)
+    assert bench.catalogue.path_of(trace).read_bytes() == content
+    assert bench.traces.get(ROBOT, trace).local
+    assert [one.name for one in bench.catalogue.folder.iterdir()] == [bench.path(trace).name]
+
+
+def test_a_start_after_a_drop_keeps_the_trace_and_sends_nothing_twice(
+    bench: Bench, make: Make, store: ObjectStore, proxy: FaultyStore
+) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    _drop(bench, trace)
+    bench.close()
+    proxy.seen.clear()
+    again = make(bench.service.status().place.split()[0], proxy.url)
+    again.catalogue.bring_up_to_date()
+    again.service.start()
+    again.until(lambda: again.service.status().archived == 1)
+    assert again.catalogue.place_of(trace) == bench.path(trace)
+    assert "PUT" not in proxy.seen
+
+
+@pytest.mark.parametrize("fault", ["500", "403", "refuse", "cut", "wrong"])
+def test_a_local_copy_stays_while_the_store_fails_and_goes_when_it_is_back(
+    bench: Bench, proxy: FaultyStore, fault: Fault
+) -> None:
+    trace = bench.trace()
+    content = bench.path(trace).read_bytes()
+    proxy.fail(fault)
+    bench.nobody_reads()
+    bench.service.send_and_drop(trace, drop=True)
+    bench.service.start()
+    bench.until(lambda: len(bench.counted) >= 2)
+    status = bench.service.status()
+    assert (status.state, status.waiting) == ("refused" if fault == "403" else "away", 1)
+    assert status.problem.startswith("archive traces-")
+    assert ACCESS not in status.problem
+    assert SECRET not in status.problem
+    assert bench.archived.get(trace) is None
+    assert bench.path(trace).read_bytes() == content
+    assert any("1 traces wait to be sent" in line for line in bench.service.warnings(0.9))
+    proxy.fail("")
+    bench.until(lambda: not bench.path(trace).exists())
+    assert bench.service.status().state == "ok"
+    assert bench.service.warnings(0.9) == []
+    assert bench.told[-1].endswith("answers again")
+
+
+@pytest.mark.parametrize("fault", ["500", "refuse", "cut"])
+def test_a_fetch_waits_until_the_store_is_back(bench: Bench, proxy: FaultyStore, fault: Fault) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    content = _drop(bench, trace)
+    proxy.fail(fault)
+    bench.service.fetch(trace)
+    bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
+    transfer = bench.service.of(trace).transfer
+    assert transfer is not None
+    assert transfer.state != "failed"
+    assert not bench.path(trace).exists()
+    proxy.fail("")
+    bench.until(lambda: bench.service.of(trace).local)
+    assert bench.path(trace).read_bytes() == content
+
+
+def test_wrong_bytes_never_become_a_trace(bench: Bench, proxy: FaultyStore) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    content = _drop(bench, trace)
+    proxy.fail("wrong", "GET")
+    bench.service.fetch(trace)
+    bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
+    transfer = bench.service.of(trace).transfer
+    assert transfer is not None
+    assert (transfer.state, transfer.problem[-30:]) == ("failed", "is not what was sent (SHA-256)"[-30:])
+    assert list(bench.catalogue.folder.iterdir()) == []
+    assert bench.service.fetch(trace).kind == "archive"
+    proxy.fail("")
+    assert bench.service.fetch(trace).kind == "trace-in-archive"
+    bench.until(lambda: bench.service.of(trace).local)
+    assert bench.path(trace).read_bytes() == content
+
+
+def test_bytes_that_were_wrong_once_are_fetched_again(bench: Bench, proxy: FaultyStore) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    content = _drop(bench, trace)
+    proxy.fail("wrong", "GET", times=1)
+    bench.service.fetch(trace)
+    bench.until(lambda: bench.service.of(trace).local)
+    assert bench.path(trace).read_bytes() == content
+
+
+def test_an_object_that_was_damaged_since_is_found_before_the_local_copy_goes(bench: Bench, store: ObjectStore) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    bench.until_archived(trace)
+    found = bench.archived.get(trace)
+    assert found is not None
+    content = bench.path(trace).read_bytes()
+    bucket = bench.service.status().place.split()[0]
+    store.client.put_object(Bucket=bucket, Key=found.object, Body=bytes(len(content)))
+    bench.clock.ahead = timedelta(hours=2)
+    bench.nobody_reads()
+    bench.service.send_and_drop(trace, drop=True)
+    bench.until(lambda: not bench.path(trace).exists())  # not before it was sent again
+    assert store.objects(bucket)[found.object] == content
+    assert any("the local copy stays, and is sent again" in line for line in bench.told)
+
+
+def test_a_file_that_has_changed_is_sent_again_before_it_goes(bench: Bench, store: ObjectStore) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    bench.until_archived(trace)
+    changed = bench.path(trace).read_bytes() + b"more"
+    bench.path(trace).write_bytes(changed)
+    bench.nobody_reads()
+    bench.service.send_and_drop(trace, drop=True)
+    bench.until(lambda: not bench.path(trace).exists())
+    assert changed in store.objects(bench.service.status().place.split()[0]).values()
+
+
+def test_old_copies_go_unless_they_are_used_opened_or_not_yet_archived(store: ObjectStore, make: Make) -> None:
+    bench = make(store.bucket(), store.url, keep_days=30)
+    old, used, opened = bench.trace(), bench.trace(), bench.trace()
+    _model_of(bench, used)
+    bench.nobody_reads()
+    bench.catalogue.path_of(opened)
+    bench.clock.ahead = timedelta(days=31)
+    bench.service.start()
+    bench.until(lambda: not bench.path(old).exists())
+    bench.until_archived(used, opened)
+    bench.close()
+    assert bench.path(used).exists()
+    assert bench.path(opened).exists()
+
+
+def test_the_oldest_copies_go_when_all_take_too_much(store: ObjectStore, make: Make) -> None:
+    bench = make(store.bucket(), store.url, keep_size=0, keep_used=False)
+    first, second = bench.trace(), bench.trace()
+    models = _model_of(bench, second)
+    bench.nobody_reads()
+    bench.service.start()
+    bench.until(lambda: not bench.path(first).exists() and not bench.path(second).exists())
+    with pytest.raises(ProblemError, match="is used by model 'rig b'"):
+        bench.catalogue.remove(second)
+    models.remove(ROBOT, "a" * 12)
+    bench.catalogue.remove(second)
+
+
+def test_a_limit_that_cannot_be_kept_is_told(store: ObjectStore, make: Make) -> None:
+    bench = make(store.bucket(), store.url, keep_size=0)
+    used = bench.trace()
+    _model_of(bench, used)
+    bench.nobody_reads()
+    bench.service.start()
+    bench.until(lambda: any("no more can be dropped" in line for line in bench.service.warnings(0.9)))
+    (line,) = bench.service.warnings(0.9)
+    assert line.startswith("local traces take 0 of 0 MB (archive.keep_size), and no more can be dropped: models and")
+    assert bench.path(used).exists()
+
+
+def test_a_limit_is_told_before_it_bites(store: ObjectStore, make: Make) -> None:
+    bench = make(store.bucket(), store.url, keep_size=1)
+    bench.trace(9000)
+    bench.service.start()
+    bench.until(lambda: bench.service.status().local_bytes > 0)
+    share = bench.service.status().local_bytes / 1e6
+    assert 0 < share < 1
+    assert bench.service.warnings(share + 0.01) == []
+    (line,) = bench.service.warnings(share - 0.01)
+    assert line.endswith("of 1 MB (archive.keep_size): beyond that the oldest archived ones go")
+
+
+def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
+    bench: Bench, store: ObjectStore, proxy: FaultyStore
+) -> None:
+    trace, kept = bench.trace(), bench.trace()
+    bench.service.start()
+    bench.until_archived(trace, kept)
+    proxy.fail("503")
+    bench.catalogue.remove(trace)
+    bucket = bench.service.status().place.split()[0]
+    bench.until(lambda: bench.service.status().state == "away")
+    assert len(store.objects(bucket)) == 2
+    proxy.fail("")
+    bench.until(lambda: len(store.objects(bucket)) == 1)
+    assert bench.archived.get(kept) is not None
+
+
+def test_a_fetch_without_room_says_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    _drop(bench, trace)
+    monkeypatch.setattr("server.archive.service.RESERVE", 1 << 60)
+    bench.service.fetch(trace)
+    bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
+    transfer = bench.service.of(trace).transfer
+    assert transfer is not None
+    assert "MB are free, fetching needs" in transfer.problem
+
+
+def test_a_trace_of_the_archive_is_not_uploaded_a_second_time(bench: Bench, tmp_path: Path) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    content = _drop(bench, trace)
+    other = bench.catalogue.folder / "other_name.mcap"
+    other.write_bytes(content)
+    assert bench.catalogue.add(other) is None
+
+
+def test_without_an_archive_a_trace_that_only_that_has_says_so(bench: Bench) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    _drop(bench, trace)
+    bench.catalogue.archive = None
+    with pytest.raises(ProblemError) as caught:
+        bench.catalogue.path_of(trace)
+    assert caught.value.kind == "no-archive"
