@@ -16,6 +16,7 @@ from server.api import (
     controller,
     description,
     experiments,
+    fleet,
     jobs,
     live,
     presets,
@@ -73,7 +74,20 @@ def bare_app(services: Services | None) -> FastAPI:
     )
     problems.install(app)
     api = APIRouter(prefix=API)
-    for part in (robots, controller, teaching, programs, experiments, presets, queue, traces, jobs, live, system):
+    for part in (
+        robots,
+        fleet,
+        controller,
+        teaching,
+        programs,
+        experiments,
+        presets,
+        queue,
+        traces,
+        jobs,
+        live,
+        system,
+    ):
         api.include_router(part.router)
     app.include_router(api)
     app.include_router(system.plain)

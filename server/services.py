@@ -32,6 +32,7 @@ from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
+from server.jobs.shared_workers import SharedWorkers
 from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
@@ -76,6 +77,7 @@ class RobotServices:
     hub: Hub
     jobs: JobService
     models: Models
+    unattended: bool
 
     def status(self) -> RobotStatus:
         """The status of the robot now."""
@@ -128,10 +130,11 @@ class Services:
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
-        self._robots = {settings.robot.name: self._make_robot(settings)}
+        self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
+        self._robots = {own.robot.name: self._make_robot(own) for own in settings.each_robot()}
 
     def robots(self) -> list[RobotServices]:
-        """Returns all robots; at present there is one."""
+        """Returns all robots, in the order of the configuration."""
         return list(self._robots.values())
 
     def robot(self, name: str) -> RobotServices:
@@ -161,6 +164,7 @@ class Services:
             SHUTDOWN,
             [partial(end, SHUTDOWN) for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)],
         )
+        self.workers.abandon()
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
@@ -206,10 +210,22 @@ class Services:
                 changed=lambda job: self._job_changed(hub, job),
                 at_once=settings.server.jobs_at_once,
                 executor=settings.server.executor,
+                workers=self.workers,
             )
         )
-        stop = StopService(robot)
-        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models)
+        return RobotServices(
+            robot=robot,
+            keeper=Keeper(robot),
+            stop=StopService(robot),
+            control=control,
+            queue=queue,
+            catalogue=catalogue,
+            teaching=teaching,
+            hub=hub,
+            jobs=jobs,
+            models=models,
+            unattended=settings.server.unattended,
+        )
 
     def _make_queue(
         self, robot: Robot, control: ControlService, catalogue: Catalogue, *, unattended: bool

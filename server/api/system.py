@@ -66,7 +66,6 @@ async def get_me(caller: Viewer) -> Me:
 @router.get("/system")
 def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     """Returns version, uptime, storage and live clients of the service."""
-    folder = services.settings.traces.folder.absolute()
     file = _database_file(services)
     with services.store.reading() as session:
         count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
@@ -74,8 +73,8 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         version=VERSION,
         uptime=services.clock.monotonic() - services.begun,
         storage=StorageStatus(
-            traces_folder=str(folder),
-            traces_free=free_room(folder),
+            traces_folder=", ".join(str(rig.catalogue.folder) for rig in services.robots()),
+            traces_free=min(free_room(rig.catalogue.folder) for rig in services.robots()),
             traces_reserve=RESERVE,
             traces=count,
             database=make_url(services.store.url).get_backend_name(),
@@ -85,7 +84,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         live_dropped=sum(rig.hub.dropped for rig in services.robots()),
         jobs_at_once=services.settings.server.jobs_at_once,
         short_jobs_at_once=SHORT_LANE_WORKERS,
-        unattended=services.settings.server.unattended,
+        unattended=any(rig.unattended for rig in services.robots()),
         stop_port=services.stop_port,
     )
 
@@ -99,16 +98,20 @@ def _checks(services: Services) -> dict[str, str]:
         services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
-    try:
-        _require_writable(services.settings.traces.folder)
-        free = shutil.disk_usage(services.settings.traces.folder).free
-        if free < RESERVE:
-            checks["traces"] = f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free"
-    except OSError as error:
-        checks["traces"] = str(error)
     for rig in services.robots():
+        checks["traces"] = checks["traces"] or _problem_of_folder(rig.catalogue.folder)
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
     return checks
+
+
+def _problem_of_folder(folder: Path) -> str:
+    """Returns why no trace can be written to a folder; an empty text if it can."""
+    try:
+        _require_writable(folder)
+        free = shutil.disk_usage(folder).free
+    except OSError as error:
+        return str(error)
+    return f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free" if free < RESERVE else ""
 
 
 def _require_writable(folder: Path) -> None:

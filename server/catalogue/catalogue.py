@@ -63,9 +63,9 @@ class Catalogue:
                 else:
                     log.info("salvaged %s: %s samples", salvaged.path, salvaged.samples)
             there = {entry.name for entry in self.folder.iterdir() if entry.name.endswith(layout.SUFFIX)}
-            known = self._traces.files()
-            self._traces.mark_missing(known - there, missing=True)
-            self._traces.mark_missing(known & there, missing=False)
+            known = self._traces.files(self._robot)
+            self._traces.mark_missing(self._robot, known - there, missing=True)
+            self._traces.mark_missing(self._robot, known & there, missing=False)
             return sum(self._take_in(self.folder / name) is not None for name in sorted(there - known))
 
     def clear_uploads(self) -> None:

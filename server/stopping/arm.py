@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from daq.acquisition.port_stop import stop_at_port
 from daq.acquisition.stop_socket import StopAnswer, request_stop
-from daq.contracts.service.robot import StopResult
+from daq.contracts.service.robot import FleetStopResult, StopResult
 from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, require_same
 
 
@@ -40,6 +41,22 @@ def stop_arm(reach: Reach) -> StopResult:
         note=answer.text,
         detail=detail,
         text=f"{head}: {detail}",
+    )
+
+
+def together(results: Mapping[str, StopResult]) -> FleetStopResult:
+    """Returns the results of the stops of all robots as one, which is as good as the worst of them."""
+    parts = results if len(results) > 1 else {}
+    texts = [f"{name}: {result.text}" for name, result in parts.items()] or [one.text for one in results.values()]
+    details = [f"{name}: {result.detail or result.text}" for name, result in parts.items() if not result.confirmed]
+    return FleetStopResult(
+        delivered=all(result.delivered for result in results.values()),
+        confirmed=all(result.confirmed for result in results.values()),
+        seconds=max(result.seconds for result in results.values()),
+        note="; ".join(details),
+        detail="; ".join(details) or f"all {len(results)} arms hold their set points." if parts else texts[0],
+        text="; ".join(texts),
+        robots=dict(results),
     )
 
 
