@@ -30,6 +30,7 @@ from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
+from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
@@ -130,6 +131,7 @@ class Services:
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
+        self.comparisons = Comparisons(self.jobs)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own) for own in settings.each_robot()}
 

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
+from typing import Annotated
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 
 from daq.contracts.errors import SpecError
-from daq.contracts.service.fleet import FleetExperimentRequest, FleetExperiments, FleetRobot, FleetStatus
+from daq.contracts.service.fleet import (
+    FleetComparison,
+    FleetExperimentRequest,
+    FleetExperiments,
+    FleetRobot,
+    FleetStatus,
+)
 from daq.contracts.service.robot import FleetStopResult
 from server.api.dependencies import IdempotencyKey, Operator, ServicesDep, Turn, Viewer
 from server.api.experiments import require_possible
 from server.catalogue.room import require_room
+from server.fleet.comparison import Arm
+from server.jobs.mailbox import RESULT
 from server.problems import PROBLEMS, ProblemError
 from server.services import RobotServices, Services
 from server.stopping.arm import together
@@ -63,6 +73,28 @@ def submit_fleet_experiment(
     return FleetExperiments(
         experiments=tuple(rig.queue.submit(body.request, caller.name, idempotency_key)[0] for rig in rigs)
     )
+
+
+@router.get("/comparison")
+def compare_fleet(
+    services: ServicesDep,
+    _: Viewer,
+    _turn: Turn,
+    experiment: Annotated[
+        str | None, Query(max_length=400, description="Its name; else the most fitted one.")
+    ] = None,
+    days: Annotated[float, Query(ge=0, le=36500, description="Least time between the compared fits, in days.")] = 30,
+) -> FleetComparison:
+    """Compares the robots' fits to the same experiment over time, and says which numbers have changed."""
+    arms = [
+        Arm(
+            rig.robot.name,
+            partial(rig.jobs.result_file, name=RESULT),
+            partial(services.traces.get, rig.robot.name),
+        )
+        for rig in services.robots()
+    ]
+    return services.comparisons.compare(arms, experiment, days)
 
 
 def _chosen(services: Services, names: tuple[str, ...] | None) -> list[RobotServices]:
