@@ -148,9 +148,15 @@ class Services:
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
         for rig in self.robots():
-            found = rig.catalogue.bring_up_to_date()
-            rig.catalogue.clear_uploads()
-            log.info("catalogue of %s: %s new traces in %s", rig.robot.name, found, rig.catalogue.folder)
+            try:
+                found = rig.catalogue.bring_up_to_date()
+                rig.catalogue.clear_uploads()
+                log.info("catalogue of %s: %s new traces in %s", rig.robot.name, found, rig.catalogue.folder)
+            except OSError as error:
+                if len(self._robots) == 1:
+                    raise
+                # The other robots work without this one's folder, in which no experiment is recorded meanwhile.
+                log.error("catalogue of %s: %s", rig.robot.name, error)  # noqa: TRY400 - the line says it all
             rig.queue.start()
             rig.jobs.start()
             rig.keeper.start(connect=self.settings.server.connect_at_start)

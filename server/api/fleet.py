@@ -80,9 +80,7 @@ def compare_fleet(
     services: ServicesDep,
     _: Viewer,
     _turn: Turn,
-    experiment: Annotated[
-        str | None, Query(max_length=400, description="Its name; else the most fitted one.")
-    ] = None,
+    experiment: Annotated[str | None, Query(max_length=400, description="Its name; else the most fitted one.")] = None,
     days: Annotated[float, Query(ge=0, le=36500, description="Least time between the compared fits, in days.")] = 30,
 ) -> FleetComparison:
     """Compares the robots' fits to the same experiment over time, and says which numbers have changed."""

@@ -38,14 +38,15 @@ async def healthz() -> Health:
 
 @plain.get("/readyz", responses={503: {"model": Health}})
 async def readyz(request: Request, services: ServicesDep, response: Response) -> Health:
-    """Answers 200 while database and traces' folder can be written; a robot need not be connected.
+    """Answers 200 while the database and the folder of a robot's traces can be written; none need be connected.
 
     Callers who may see the robot get the details. The answer is up to a second old.
     """
     problems = await services.readiness.check(lambda: _checks(services))
     if caller_of(request) is None:
         problems = {name: problem and NOT_WELL for name, problem in problems.items()}
-    if any(problems[name] for name in ("database", "traces")):
+    folders = [problem for name, problem in problems.items() if name.startswith("traces")]
+    if problems["database"] or all(folders):
         response.status_code = 503
         return Health(status="not ready", version=VERSION, checks=problems)
     return Health(status="ok", version=VERSION, checks=problems)
@@ -90,7 +91,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
 
 
 def _checks(services: Services) -> dict[str, str]:
-    checks = {"database": "", "traces": ""}
+    checks = {"database": ""}
     file = _database_file(services)
     try:
         if file is not None:
@@ -99,7 +100,8 @@ def _checks(services: Services) -> dict[str, str]:
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
     for rig in services.robots():
-        checks["traces"] = checks["traces"] or _problem_of_folder(rig.catalogue.folder)
+        name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
+        checks[name] = _problem_of_folder(rig.catalogue.folder)
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
     return checks
 
