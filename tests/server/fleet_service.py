@@ -58,7 +58,9 @@ def fleet_service(folder: Path, ports: Mapping[str, str]) -> Iterator[FleetServi
         assert process.stdout is not None
         url = process.stdout.readline().decode().strip()
         assert url, f"the service did not start: exit code {process.wait()}"
-        yield FleetService(process, url, folder)
+        service = FleetService(process, url, folder)
+        with service.client:
+            yield service
     finally:
         process.terminate()
         try:

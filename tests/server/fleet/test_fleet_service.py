@@ -9,7 +9,7 @@ import pytest
 
 from daq.client import Client
 from daq.contracts.errors import SpecError
-from daq.traces.store import read_trace
+from daq.traces.reader import read_trace
 from tests.server.fleet_service import FleetService, fleet_service
 
 pytestmark = pytest.mark.slow
