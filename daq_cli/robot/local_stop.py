@@ -34,8 +34,9 @@ def _ports(call: Invocation) -> list[tuple[str, str]]:
     """Names and ports of the robots to stop. Raises SpecError."""
     if call.port_option:
         return [("robot", call.port_option)]
-    own = call.configuration.each_robot() if call.robot_option is None else (call.settings,)
-    return [(one.robot.name, one.robot.port) for one in own if one.robot.port is not None]
+    wanted = call.robot_option
+    own = [one.robot for one in call.configuration.each_robot() if wanted in (None, one.robot.name)]
+    return [(robot.name, robot.port) for robot in own if robot.port is not None]
 
 
 def _device(url: str) -> object:
