@@ -58,7 +58,11 @@ function stateOf(robot: FleetRobot, isHeard: boolean, isLive: boolean): Pick<Car
   const why = robot.queue.paused ? `queue paused: ${robot.queue.reason}` : robot.queue.waiting_for;
   if (!isLive) return { tone: 'warn', state: 'no fresh samples', why };
   if (robot.limp.length > 0)
-    return { tone: 'warn', state: `limp: joint ${robot.limp.join(', ')}`, why: 'Nothing holds these joints.' };
+    return {
+      tone: 'warn',
+      state: `limp: joint ${robot.limp.join(', ')}`,
+      why: 'Nothing holds these joints.',
+    };
   if (robot.activity !== 'none') return { tone: 'busy', state: robot.activity, why };
   return { tone: 'good', state: robot.arm, why };
 }
@@ -80,7 +84,11 @@ export function summary(cards: readonly Card[]): string {
 /** What is known of an arm, or of all: for whether a stop still holds. */
 export function armOf(robots: readonly FleetRobot[]): ArmNow {
   const known = robots.map((robot) =>
-    robot.connection !== 'connected' ? 'unknown' : robot.arm === 'stopped' || robot.arm === 'fault' ? 'stopped' : 'free',
+    robot.connection !== 'connected'
+      ? 'unknown'
+      : robot.arm === 'stopped' || robot.arm === 'fault'
+        ? 'stopped'
+        : 'free',
   );
   if (known.includes('free')) return 'free';
   return known.length === 0 || known.includes('unknown') ? 'unknown' : 'stopped';

@@ -36,8 +36,18 @@ const FLEET: FleetComparison = {
   days: 30,
   words: { b: { joint: 1, group: 'joint 1', short: 'delay', label: 'J1 delay' } },
   robots: [
-    { robot: 'left', fits: [fit('1', 1, 0.2), fit('2', 31, 0.21)], reference: '1', changes: [change('a', 0.01, false)] },
-    { robot: 'right', fits: [fit('3', 1, 0.2), fit('4', 31, 0.5)], reference: '3', changes: [change('b', 0.3, true)] },
+    {
+      robot: 'left',
+      fits: [fit('1', 1, 0.2), fit('2', 31, 0.21)],
+      reference: '1',
+      changes: [change('a', 0.01, false)],
+    },
+    {
+      robot: 'right',
+      fits: [fit('3', 1, 0.2), fit('4', 31, 0.5)],
+      reference: '3',
+      changes: [change('b', 0.3, true)],
+    },
     { robot: 'new', fits: [], reference: null, changes: [] },
   ],
 };

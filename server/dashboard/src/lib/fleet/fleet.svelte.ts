@@ -16,7 +16,9 @@ class Fleet {
   private now = $state(0);
   cards: readonly Card[] = $derived(this.robots.map((robot) => cardOf(robot, this.now - this.at)));
   /** How many arms somebody should look at. */
-  troubled: number = $derived(this.cards.filter((card) => card.tone === 'bad' || card.tone === 'warn').length);
+  troubled: number = $derived(
+    this.cards.filter((card) => card.tone === 'bad' || card.tone === 'warn').length,
+  );
   private busy = false;
   private isStarted = false;
 
