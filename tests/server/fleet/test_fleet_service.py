@@ -20,7 +20,7 @@ LONG = {"spec": {"trajectory": {"kind": "sine", "duration": 60.0}, "joints": [1]
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
-    ports = {name: f"mock://?lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=3)}
+    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=3)}
     with fleet_service(tmp_path_factory.mktemp("fleet"), ports) as service:
         yield service
 
