@@ -22,14 +22,17 @@ LONG = {"spec": {"trajectory": {"kind": "sine", "duration": 60.0}, "joints": [1]
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
     ports = {name: f"mock://?pty=1&lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=3)}
     with fleet_service(tmp_path_factory.mktemp("fleet"), ports) as service:
+        for name in ports:  # here, so that no mock is left running by a test
+            service.post(f"robots/{name}/connect")
         yield service
+        for name in ports:
+            service.post(f"robots/{name}/disconnect")
 
 
 @pytest.fixture
 def fleet(running: FleetService) -> FleetService:
     """The same, with both arms connected, not stopped, and open queues."""
     for name in ("left", "right"):
-        running.post(f"robots/{name}/connect")
         for one in running.get(f"robots/{name}/queue/experiments"):
             running.post(f"robots/{name}/experiments/{one['id']}/cancel")
         running.post(f"robots/{name}/reset", {})
