@@ -75,8 +75,9 @@ def test_a_stop_of_all_stops_every_arm_at_both_doors(fleet: FleetService) -> Non
     with Client(fleet.url) as client:
         found = client.stop()
         assert found.confirmed, found
-        assert [one.arm for one in client.fleet().robots] == ["stopped", "stopped"]
-        assert all(one.queue.paused for one in client.fleet().robots)
+        # The listener may have been quicker than the service, which hears of the stops then.
+        while any(one.arm != "stopped" or not one.queue.paused for one in client.fleet().robots):
+            assert fleet.process.poll() is None
     port = fleet.get("system")["stop_port"]
     answer = fleet.client.post(f"http://127.0.0.1:{port}/api/v1/fleet/stop")
     assert answer.json()["confirmed"], answer.text
