@@ -183,7 +183,7 @@ def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path
         restore(tmp_path / f"{number}.zip", there, NOW, quietly)
         named = traces_in(there)
         assert len(named) >= 2
-        assert all((there.traces / name).is_file() for name in named)
+        assert all((there.traces["ma2000"] / name).is_file() for name in named)
 
 
 def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archive: Path, tmp_path: Path) -> None:
