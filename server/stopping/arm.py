@@ -46,18 +46,26 @@ def stop_arm(reach: Reach) -> StopResult:
 
 def together(results: Mapping[str, StopResult]) -> FleetStopResult:
     """Returns the results of the stops of all robots as one, which is as good as the worst of them."""
-    parts = results if len(results) > 1 else {}
-    texts = [f"{name}: {result.text}" for name, result in parts.items()] or [one.text for one in results.values()]
-    details = [f"{name}: {result.detail or result.text}" for name, result in parts.items() if not result.confirmed]
+    every = list(results.values())
+    texts = [f"{name}: {result.text}" for name, result in results.items()]
     return FleetStopResult(
-        delivered=all(result.delivered for result in results.values()),
-        confirmed=all(result.confirmed for result in results.values()),
-        seconds=max(result.seconds for result in results.values()),
-        note="; ".join(details),
-        detail="; ".join(details) or f"all {len(results)} arms hold their set points." if parts else texts[0],
-        text="; ".join(texts),
+        delivered=all(result.delivered for result in every),
+        confirmed=all(result.confirmed for result in every),
+        seconds=max(result.seconds for result in every),
+        note=every[0].note if len(every) == 1 else "",
+        detail=every[0].detail if len(every) == 1 else _in_detail(results),
+        text=every[0].text if len(every) == 1 else "; ".join(texts),
         robots=dict(results),
     )
+
+
+def _in_detail(results: Mapping[str, StopResult]) -> str:
+    """Returns which arms are not known to be stopped, and which are."""
+    stopped = ", ".join(name for name, result in results.items() if result.confirmed)
+    others = ", ".join(f"{name} ({result.note})" for name, result in results.items() if not result.confirmed)
+    if not others:
+        return f"all {len(results)} arms hold their set points."
+    return f"not confirmed: {others}. Use the emergency stop. Confirmed: {stopped or 'none'}."
 
 
 def _ask(reach: Reach) -> StopAnswer:

@@ -18,7 +18,9 @@ from server.store.engine import Store
 from tests.server.clocks import HandClock
 
 FROZEN = StopResult(delivered=True, confirmed=True, tick=7, seconds=0.1, text="stopped, confirmed by the board")
-LOST = StopResult(delivered=False, confirmed=False, seconds=0.9, text="stop NOT DELIVERED: no link. Use it.")
+LOST = StopResult(
+    delivered=False, confirmed=False, seconds=0.9, note="no link", text="stop NOT DELIVERED: no link. Use it."
+)
 
 
 def test_all_arms_are_stopped_at_the_same_time_and_every_stop_is_told(tmp_path: Path) -> None:
@@ -48,7 +50,7 @@ def test_all_arms_are_stopped_at_the_same_time_and_every_stop_is_told(tmp_path: 
 def test_one_arm_that_does_not_confirm_is_named() -> None:
     found = together({"left": FROZEN, "right": LOST})
     assert (found.delivered, found.confirmed, found.seconds) == (False, False, 0.9)
-    assert found.detail == "right: stop NOT DELIVERED: no link. Use it."
+    assert found.detail == "not confirmed: right (no link). Use the emergency stop. Confirmed: left."
     assert found.text == "left: stopped, confirmed by the board; right: stop NOT DELIVERED: no link. Use it."
 
 

@@ -47,6 +47,7 @@ describe('the card of an arm', () => {
     [{ connection: 'disconnected', sample_age: null, simulated: null }, 'quiet', 'not connected'],
     [{ sample_age: 2 }, 'warn', 'no fresh samples'],
     [{ limp: [2] }, 'warn', 'limp: joint 2'],
+    [{ queue: { ...ROBOT.queue, paused: true } }, 'warn', 'idle'],
     [{ activity: 'experiment', arm: 'running' }, 'busy', 'experiment'],
   ] as const)('tells %o', (changes, tone, state) => {
     expect(cardOf(robot(changes as Partial<FleetRobot>), 0)).toMatchObject({ tone, state });

@@ -64,7 +64,8 @@ function stateOf(robot: FleetRobot, isHeard: boolean, isLive: boolean): Pick<Car
       why: 'Nothing holds these joints.',
     };
   if (robot.activity !== 'none') return { tone: 'busy', state: robot.activity, why };
-  return { tone: 'good', state: robot.arm, why };
+  const waits = robot.queue.paused && robot.queue.queued > 0;
+  return { tone: waits ? 'warn' : 'good', state: robot.arm, why };
 }
 
 /** How many arms are in which condition, as one line. */

@@ -77,6 +77,7 @@ export function verdictOf(comparison: FleetComparison): string {
   const changed = compared.filter((arm) => arm.changes.some((one) => one.changed));
   const names = changed.map((arm) => arm.robot).join(', ');
   const numbers = compared.reduce((sum, arm) => sum + arm.changes.length, 0);
+  if (numbers === 0) return 'No number was determined by two fits of the same arm.';
   return changed.length === 0
     ? `None of ${numbers} numbers has changed by more than its interval allows.`
     : `Changed by more than the intervals allow: ${names}.`;
