@@ -13,9 +13,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import select
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -54,10 +56,12 @@ class Line:
 
     def flood(self, until: float) -> None:
         """Sends noise to the service until this time (s, monotonic), as quickly as it is read."""
-        noise = os.urandom(PIECE)
-        with contextlib.suppress(OSError):
+        noise, service = os.urandom(PIECE), self._ends[-1]
+        with contextlib.suppress(OSError, ValueError):  # the service has hung up
             while time.monotonic() < until:
-                self.flooded += self._ends[-1].send(noise)
+                _, may_write, _ = select.select([], [service], [], 0.05)
+                if may_write:
+                    self.flooded += service.send(noise, socket.MSG_DONTWAIT)
 
     def cut(self) -> None:
         """Ends the line for good."""
@@ -170,9 +174,10 @@ class Recorded:
 def recorded(fleet: FleetUnderTest, robot: str, experiment: str) -> Recorded:
     """Waits for the end of an experiment, and reads its trace."""
     ended = fleet.ended(robot, experiment)
-    if ended["trace"] is None:
-        return Recorded(ended["state"], 0, 0, 0.0)
-    file = fleet.ask("GET", f"/robots/{robot}/traces/{ended['trace']}")["entry"]["file"]
+    try:
+        file = fleet.ask("GET", f"/robots/{robot}/traces/{ended['trace']}")["entry"]["file"]
+    except RuntimeError:  # a killed owner's trace is found when the robot is connected again
+        return Recorded(f"{ended['state']}, no trace yet", 0, 0, 0.0)
     late, lost = jitter(fleet.folder / "traces" / robot / file)
     return Recorded(ended["state"], lost, len(late) + lost, quantile(late, 0.99))
 
@@ -182,6 +187,7 @@ def run(fleet: FleetUnderTest, seconds: float, lines: dict[str, Line] | None) ->
     made = fleet.ask("POST", "/fleet/experiments", json={"request": {"spec": sway(seconds)}})["experiments"]
     for one in made:
         fleet.until_recording(one["robot"], one["id"])
+    print(f"recording on {len(made)} arms", file=sys.stderr, flush=True)
     if lines is not None:
         time.sleep(DISTURBED_AFTER * seconds)
         flooding = threading.Thread(target=lines[FLOODING].flood, args=(time.monotonic() + 0.4 * seconds,))
