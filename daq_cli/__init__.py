@@ -11,7 +11,7 @@ def main() -> None:
     if sys.argv[1:2] == ["stop"] and not {"-h", "--help"} & set(sys.argv):
         from daq_cli.app import early_stop
 
-        early_stop.ask()
+        early_stop.ask(sys.argv[2:])
     # Matrices here are thin: a second thread in each product costs a fifth of a diagnosis. Simulations share the cores.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq.contracts.errors import DaqError

@@ -17,6 +17,7 @@ from server.api import (
     controller,
     description,
     experiments,
+    fleet,
     jobs,
     live,
     presets,
@@ -76,6 +77,7 @@ def bare_app(services: Services | None) -> FastAPI:
     api = APIRouter(prefix=API)
     for part in (
         robots,
+        fleet,
         controller,
         teaching,
         programs,

@@ -111,7 +111,7 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         service_port=listener.getsockname()[1],
         open_on_loopback=_is_open_here(section),
         names=tuple(name.lower() for name in section.names),
-        urls={settings.robot.name: settings.port},
+        urls={own.robot.name: own.port for own in settings.each_robot()},
         database_url=section.database_url,
         sqlite=sqlite_file(section.database_url),
     )

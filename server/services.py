@@ -33,8 +33,10 @@ from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.catalogue.room import disk_warnings
 from server.clock import Clock, SystemClock
+from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
+from server.jobs.shared_workers import SharedWorkers
 from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
@@ -80,6 +82,7 @@ class RobotServices:
     hub: Hub
     jobs: JobService
     models: Models
+    unattended: bool
     archive: ArchiveService | None
 
     def status(self) -> RobotStatus:
@@ -134,10 +137,12 @@ class Services:
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
-        self._robots = {settings.robot.name: self._make_robot(settings, bucket)}
+        self.comparisons = Comparisons(self.jobs)
+        self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
+        self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
 
     def robots(self) -> list[RobotServices]:
-        """Returns all robots; at present there is one."""
+        """Returns all robots, in the order of the configuration."""
         return list(self._robots.values())
 
     def robot(self, name: str) -> RobotServices:
@@ -149,9 +154,15 @@ class Services:
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
         for rig in self.robots():
-            found = rig.catalogue.bring_up_to_date()
-            rig.catalogue.clear_uploads()
-            log.info("catalogue of %s: %s new traces in %s", rig.robot.name, found, rig.catalogue.folder)
+            try:
+                found = rig.catalogue.bring_up_to_date()
+                rig.catalogue.clear_uploads()
+                log.info("catalogue of %s: %s new traces in %s", rig.robot.name, found, rig.catalogue.folder)
+            except OSError as error:
+                if len(self._robots) == 1:
+                    raise
+                # The other robots work without this one's folder, in which no experiment is recorded meanwhile.
+                log.error("catalogue of %s: %s", rig.robot.name, error)  # noqa: TRY400 - the line says it all
             rig.queue.start()
             rig.jobs.start()
             if rig.archive is not None:
@@ -168,6 +179,7 @@ class Services:
         archives = [rig.archive.close for rig in every if rig.archive is not None]
         ends = [end for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)]
         _all_within(SHUTDOWN, [partial(end, SHUTDOWN) for end in (*ends, *archives)])
+        self.workers.abandon()
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
@@ -213,12 +225,22 @@ class Services:
                 changed=lambda job: self._job_changed(hub, job),
                 at_once=settings.server.jobs_at_once,
                 executor=settings.server.executor,
+                workers=self.workers,
             )
         )
-        stop = StopService(robot)
-        archive = None if bucket is None else self._make_archive(bucket, catalogue, name, jobs)
         return RobotServices(
-            robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models, archive
+            robot=robot,
+            keeper=Keeper(robot),
+            stop=StopService(robot),
+            control=control,
+            queue=queue,
+            catalogue=catalogue,
+            teaching=teaching,
+            hub=hub,
+            jobs=jobs,
+            models=models,
+            archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
+            unattended=settings.server.unattended,
         )
 
     def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:

@@ -35,7 +35,7 @@ def stop_addresses(url: str, stop_url: str | None = None) -> list[str]:
     return [url, str(found.copy_with(port=stop_port_after(found.port), path="/")).rstrip("/")]
 
 
-def stop(addresses: Sequence[str], robot_path: str, token: str | None) -> StopResult:
+def stop(addresses: Sequence[str], path: str, token: str | None, kind: type[StopResult] = StopResult) -> StopResult:
     """Asks at every address at once; the first confirmed answer counts, else the one that says most.
 
     Never raises: what is not known is in the result, which then says to use the emergency stop.
@@ -43,7 +43,7 @@ def stop(addresses: Sequence[str], robot_path: str, token: str | None) -> StopRe
     headers = {} if token is None else {"Authorization": f"Bearer {token}"}
     pool = ThreadPoolExecutor(len(addresses), thread_name_prefix="stop")
     asked: set[Future[StopResult]] = {
-        pool.submit(_ask, f"{address}{API}/{robot_path}/stop", headers) for address in addresses
+        pool.submit(_ask, f"{address}{API}/{path}/stop", headers, kind) for address in addresses
     }
     answers: list[StopResult] = []
     try:
@@ -62,7 +62,7 @@ def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool]:
     return answer.confirmed, answer.delivered, answer.seconds > 0, isinstance(answer, NoSuchRobot)
 
 
-def _ask(url: str, headers: dict[str, str]) -> StopResult:
+def _ask(url: str, headers: dict[str, str], kind: type[StopResult]) -> StopResult:
     try:
         timeout = httpx.Timeout(ANSWER_WITHIN, connect=CONNECT_WITHIN)
         response = httpx.post(url, headers=headers, timeout=timeout, trust_env=False)
@@ -70,7 +70,7 @@ def _ask(url: str, headers: dict[str, str]) -> StopResult:
         return _undelivered(f"{url}: {reason_of(error)}")
     try:
         if response.is_success:
-            return StopResult.model_validate_json(response.content, extra="ignore")
+            return kind.model_validate_json(response.content, extra="ignore")
         problem = ProblemDetails.model_validate_json(response.content)
         why = f"{problem.detail}; {problem.advice}".strip("; ")
         return _undelivered(why, NoSuchRobot if problem.status == 404 else StopResult)

@@ -18,7 +18,7 @@ from pydantic_settings import (
 
 from daq.config.archive import ArchiveSettings
 from daq.config.limits import merged_limits
-from daq.config.service import ServiceSettings
+from daq.config.service import ServiceSettings, TrueOrFalse
 from daq.contracts.documents import parse_toml, read_text, shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
@@ -34,15 +34,39 @@ SERVER_VARIABLE = "DAQ_SERVER"
 """Environment variable of the command line: URL of a service. It does not configure the section `[server]`."""
 
 
+RobotName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
+MOST_ROBOTS = 32
+"""Largest number of robots of one service: an assumption. Each has a process of its own, and a dozen threads."""
+
+
 class RobotSettings(FrozenRecord):
     """The arm: its name in files and addresses, its machine file, its port."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")] = "ma2000"
+    name: RobotName = "ma2000"
     machine: str = "ma2000"
     port: str | None = None
     memory_map: Path | None = None
     limits: Limits | None = None
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+
+
+class FleetRobotSettings(FrozenRecord):
+    """Table `[robots.NAME]`: one of several robots (docs/fleet.md)."""
+
+    machine: str = "ma2000"
+    port: str | None = None
+    memory_map: Path | None = None
+    limits: Limits | None = None
+    """As in `RobotSettings`."""
+    traces: Path | None = None
+    """Folder of its traces; None for the folder of its name in that of `[traces]`."""
+    unattended: TrueOrFalse = False
+    """Whether the queue may move this arm, a real one, while no operator has confirmed being present."""
+
+    @field_validator("traces")
+    @classmethod
+    def _expanded(cls, folder: Path | None) -> Path | None:
+        return None if folder is None else folder.expanduser()
 
 
 class TraceSettings(FrozenRecord):
@@ -72,6 +96,9 @@ class Settings(BaseSettings):
     )
 
     robot: RobotSettings = RobotSettings()
+    """The only robot, unless there are several."""
+    robots: Annotated[dict[RobotName, FleetRobotSettings], Field(max_length=MOST_ROBOTS)] = {}
+    """Several robots, by name, in place of `robot`. `of_robot` has the settings of one of them."""
     traces: TraceSettings = TraceSettings()
     server: ServiceSettings = ServiceSettings()
     archive: ArchiveSettings = ArchiveSettings()
@@ -96,6 +123,39 @@ class Settings(BaseSettings):
     def port(self) -> str:
         """The configured port, or the mock when none is configured."""
         return self.robot.port or MOCK_URL
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all robots."""
+        return tuple(self.robots) or (self.robot.name,)
+
+    def of_robot(self, name: str | None = None) -> Settings:
+        """The settings of one robot, as if it were the only one. Without a name, there must be no other.
+
+        Raises SpecError with the names that there are.
+        """
+        if name is None and len(self.names) > 1:
+            raise SpecError(f"several robots are configured: say which one with --robot: {', '.join(self.names)}")
+        name = self.names[0] if name is None else name
+        if name not in self.names:
+            raise SpecError(f"robot {shown(name)}: is not configured; there is {', '.join(self.names)}")
+        if not self.robots:
+            return self
+        table = self.robots[name]
+        own = table.model_dump(exclude={"limits", "traces", "unattended"}, exclude_unset=True)
+        folder = table.traces or self.traces.folder / name
+        return self.model_copy(
+            update={
+                "robot": RobotSettings(name=name, **own, limits=table.limits),
+                "robots": {},
+                "traces": self.traces.model_copy(update={"folder": folder}),
+                "server": self.server.model_copy(update={"unattended": table.unattended}),
+            }
+        )
+
+    def each_robot(self) -> tuple[Settings, ...]:
+        """The settings of every robot."""
+        return tuple(self.of_robot(name) for name in self.names)
 
     def machine(self) -> Machine:
         """The machine file, with this configuration's limits in it. Raises SpecError."""
@@ -131,16 +191,20 @@ def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:
 def _parse(path: Path) -> Settings:
     what = f"configuration {path}"
     data = parse_toml(read_text(path, what), what)
-    server = data.get("server")
-    given = server.get("unattended") if isinstance(server, dict) else None
-    if isinstance(given, str):  # only the environment, which holds nothing but text, may give text
-        raise SpecError(f"{what}: server.unattended = {shown(given)}: must be true or false, without quotation marks")
+    robots = data.get("robots")
+    tables = {"server": data.get("server")}
+    tables |= {f"robots.{name}": table for name, table in robots.items()} if isinstance(robots, dict) else {}
+    for name, table in tables.items():
+        given = table.get("unattended") if isinstance(table, dict) else None
+        if isinstance(given, str):  # only the environment, which holds nothing but text, may give text
+            allowed = "must be true or false, without quotation marks"
+            raise SpecError(f"{what}: {name}.unattended = {shown(given)}: {allowed}")
     return _validated(data, str(path))
 
 
 def _validated(data: dict[str, Any], origin: str) -> Settings:
     try:
-        return Settings(**data)
+        settings = Settings(**data)
     except SettingsError as error:
         # An environment variable of a whole section must hold JSON; its name is in the error's text.
         raise SpecError(f"environment: {error}; write single keys, such as DAQ_ROBOT__PORT") from error
@@ -154,6 +218,29 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
         where = _variable_of(first.place) or f"configuration {origin}"
         value = "" if isinstance(first.value, dict) or _is_secret(first.place) else f" = {shown(first.value)}"
         raise SpecError(f"{where}: {first.where()}{value}: {message}") from error
+    _require_apart(settings, f"configuration {origin}")
+    return settings
+
+
+def _require_apart(settings: Settings, what: str) -> None:
+    """Raises SpecError for several robots that one table is about, or that share a port or a folder."""
+    if not settings.robots:
+        return
+    if "robot" in settings.model_fields_set:
+        raise SpecError(f"{what}: robot and robots: give one of them; [robots.NAME] has all that [robot] has")
+    if settings.server.unattended:
+        raise SpecError(
+            f"{what}: server.unattended: with several robots each says so for itself: robots.NAME.unattended"
+        )
+    taken: dict[str, str] = {}
+    for own in settings.each_robot():
+        name, port = own.robot.name, own.robot.port or MOCK_URL
+        apart = [f"folder of traces {os.path.realpath(own.traces.folder)}"]
+        if not port.startswith(MOCK_URL):
+            apart.append(f"port {port.partition('?')[0]}")
+        for one in apart:
+            if (other := taken.setdefault(one, name)) != name:
+                raise SpecError(f"{what}: robots {other} and {name} have the same {one}")
 
 
 def _is_secret(where: tuple[int | str, ...]) -> bool:

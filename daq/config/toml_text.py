@@ -12,7 +12,12 @@ if TYPE_CHECKING:
 
 def settings_text(settings: Settings) -> str:
     """A daq.toml that loads to these settings. A setting without a value becomes a comment, for TOML has no null."""
-    return tables_text(settings.model_dump(mode="json"))
+    data = settings.model_dump(mode="json")
+    if settings.robots:  # each has a table of its own
+        del data["robot"], data["server"]["unattended"]
+    else:
+        del data["robots"]
+    return tables_text(data)
 
 
 def tables_text(data: dict[str, Any]) -> str:

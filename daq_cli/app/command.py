@@ -15,7 +15,7 @@ import typer
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq_cli.app.context import Invocation
-from daq_cli.app.lazy import HERE, LazyGroup
+from daq_cli.app.lazy import ALL_ROBOTS, HERE, LazyGroup
 from firmware_protocol.errors import ProtocolError
 
 WRONG_NAMES = frozenset(
@@ -71,6 +71,9 @@ def options(
         str | None,
         typer.Option(envvar=SERVER_VARIABLE, help="A service that has the robot: http://host:8300. Token: DAQ_TOKEN."),
     ] = None,
+    robot: Annotated[
+        str | None, typer.Option("--robot", help="Name of one of several robots, of daq.toml or of the service.")
+    ] = None,
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
     ] = False,
@@ -86,7 +89,15 @@ def options(
         if not by_default:
             raise SpecError(f"--server: `daq {context.invoked_subcommand}` has nothing to do with a server's robot")
         server = None
-    context.obj = Invocation(config_file=config_file, port_option=port, server=server, server_by_default=by_default)
+    if robot is not None and context.invoked_subcommand in ALL_ROBOTS:
+        raise SpecError(f"--robot: `daq {context.invoked_subcommand}` is about all robots of the configuration")
+    context.obj = Invocation(
+        config_file=config_file,
+        port_option=port,
+        server=server,
+        server_by_default=by_default,
+        robot_option=robot,
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

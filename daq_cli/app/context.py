@@ -55,6 +55,8 @@ class Invocation:
     """URL of a service that has the robot; None for a robot at this computer."""
     server_by_default: bool = False
     """Whether `server` comes from DAQ_SERVER, and not from the command line."""
+    robot_option: str | None = None
+    """The name of one of several robots."""
     _mock_announced: bool = field(default=False, repr=False)
 
     @property
@@ -63,11 +65,16 @@ class Invocation:
         return self.server is None or self.server_by_default
 
     @cached_property
-    def settings(self) -> Settings:
-        """The settings. Raises SpecError."""
+    def configuration(self) -> Settings:
+        """The whole configuration, with all robots. Raises SpecError."""
         from daq.config.settings import load_settings
 
         return load_settings(self.config_file)[0]
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings of the robot that the command line names, or of the only one. Raises SpecError."""
+        return self.configuration.of_robot(self.robot_option)
 
     @property
     def port(self) -> str:
@@ -93,13 +100,15 @@ class Invocation:
 
     @property
     def trace_folder(self) -> Path:
-        """The configured folder of traces."""
+        """The configured folder of traces. That of a service's robot is here only if a robot has its name here."""
+        if self.server is not None and self.robot_option not in self.configuration.names:
+            return self.configuration.traces.folder
         return self.settings.traces.folder
 
     @property
     def trace_limits(self) -> TraceLimits:
         """The largest trace that is read."""
-        return self.settings.traces.limits
+        return self.configuration.traces.limits
 
 
 def invocation(context: typer.Context) -> Invocation:

@@ -69,6 +69,9 @@ HERE = frozenset(
 )
 """Subcommands about this computer alone: `--server` is refused, and DAQ_SERVER is ignored."""
 
+ALL_ROBOTS = frozenset(["serve", "token", "backup", "restore"])
+"""Subcommands about everything that one service has: `--robot` is refused."""
+
 
 class LazyGroup(typer.core.TyperGroup):
     """Lists subcommands by name and one line; imports the one that is called."""

@@ -24,7 +24,7 @@ def backup(
     from server.backup.write import back_up
     from server.clock import SystemClock
 
-    places = places_of(invocation(context).settings)
+    places = places_of(invocation(context).configuration)
     with shown_progress("backup") as progress:
         made = back_up(places, file, SystemClock().utc(), progress)
     if json:

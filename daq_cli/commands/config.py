@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -77,21 +77,32 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
-    port = call.port_option or settings.robot.port
-    machine = settings.machine()
-    memory_map = load_memory_map(settings.robot.memory_map)
-    parse_port_url(port or settings.port)
     parse_address(settings.server.database_url)
     parse_service_address(settings.server.executor)
     open_bucket(settings.archive)
-    unset = unchecked(machine, machine.limits)
+    found: dict[str, dict[str, Any]] = {}
+    titles: dict[str, str] = {}
+    for own in settings.each_robot() if call.robot_option is None else (settings.of_robot(call.robot_option),):
+        port = call.port_option or own.robot.port
+        machine, memory_map = own.machine(), load_memory_map(own.robot.memory_map)
+        parse_port_url(port or own.port)
+        found[own.robot.name] = {
+            "machine": machine.name,
+            "joints": len(machine.joints),
+            "memory_map": memory_map.name,
+            "assumed_addresses": len(memory_map.assumed),
+            "limits_not_set": list(unchecked(machine, machine.limits)),
+            "port": port,
+        }
+        titles[own.robot.name] = machine.title
     if json:
-        found = {"machine": machine.name, "joints": len(machine.joints), "memory_map": memory_map.name}
-        found |= {"assumed_addresses": len(memory_map.assumed), "limits_not_set": list(unset)}
-        print_json({"file": path, **found, "port": port})
+        print_json({"file": path, "robots": found} if settings.robots else {"file": path, **found[settings.robot.name]})
         return
     print(f"configuration: {path or 'none, defaults'}")
-    print(f"machine:       {machine.name}, {len(machine.joints)} joints ({machine.title})")
-    print(f"memory map:    {memory_map.name}; {len(memory_map.assumed)} addresses are assumed")
-    print(f"limits:        {'; '.join(unset) or 'all set'}")
-    print(f"port:          {port or 'none: the mock is used'}")
+    for name, told in found.items():
+        if settings.robots:
+            print(f"robot:         {name}")
+        print(f"machine:       {told['machine']}, {told['joints']} joints ({titles[name]})")
+        print(f"memory map:    {told['memory_map']}; {told['assumed_addresses']} addresses are assumed")
+        print(f"limits:        {'; '.join(told['limits_not_set']) or 'all set'}")
+        print(f"port:          {told['port'] or 'none: the mock is used'}")

@@ -38,7 +38,7 @@ def restore(
             found = verify(file, progress)
         what = "is as it was written"
     else:
-        places = places_of(invocation(context).settings)
+        places = places_of(invocation(context).configuration)
         with shown_progress("restore") as progress:
             done = bring_back(file, places, SystemClock().utc(), progress, overwrite=overwrite)
         put_aside = [str(folder) for folder in done.put_aside]

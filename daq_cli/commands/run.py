@@ -196,7 +196,7 @@ def _command(kind: type[BaseModel]) -> Callable[..., None]:
     """The function behind `daq run KIND`: typer reads its signature, which is made from the kind's fields."""
 
     def command(context: typer.Context, **values: Any) -> None:
-        operator = invocation(context).settings.operator
+        operator = invocation(context).configuration.operator
         spec = spec_from_options(_trajectory(kind, values), values, operator)
         options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
         computation = Computation(values["feedforward"], values["learn_from"], values["learn_share"])

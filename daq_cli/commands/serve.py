@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from daq.contracts.errors import SpecError
 from daq_cli.app.context import invocation
 
 app = typer.Typer(add_completion=False)
@@ -28,15 +29,19 @@ def serve(
     require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "alembic", "prometheus_client")
     logs.begin()  # first, so that errors of the configuration are lines of the log, too
     call = invocation(context)
-    settings = call.settings
+    settings = call.configuration
     section = settings.server.model_copy(
         update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
     )
-    parse_port_url(call.port)  # an invalid port is refused now, instead of being retried
+    if not settings.robots:
+        settings = settings.model_copy(update={"robot": settings.robot.model_copy(update={"port": call.port})})
+    elif call.port_option is not None:
+        raise SpecError("--port: several robots are configured, each with a port of its own: robots.NAME.port")
+    for own in settings.each_robot():  # an invalid port is refused now, instead of being retried
+        parse_port_url(own.port)
     from server.serve import serve as run
 
-    robot = settings.robot.model_copy(update={"port": call.port})
-    run(settings.model_copy(update={"server": section, "robot": robot}), _announce)
+    run(settings.model_copy(update={"server": section}), _announce)
 
 
 def _announce(address: str) -> None:

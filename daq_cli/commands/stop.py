@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sys
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from daq.contracts import exit_codes
-from daq_cli.app.context import JsonOption, invocation, print_json
+from daq.contracts.errors import DaqError
+from daq_cli.app.context import Invocation, JsonOption, invocation, print_json, printable
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -17,8 +19,14 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-def stop(context: typer.Context, json: JsonOption = False) -> None:
-    """Freeze every robot that is being moved, and the configured one: set points become the measured posture.
+def stop(
+    context: typer.Context,
+    robot: Annotated[
+        str | None, typer.Option("--robot", help="Stop this robot alone. A name that nobody has stops all.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Freeze every robot that is being moved, and the configured ones: set points become the measured posture.
 
     With --server this stops the robots of that service; with DAQ_SERVER, those and the ones that are moved from here.
 
@@ -27,8 +35,15 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
     """
     from daq_cli.app import early_stop
 
-    here = invocation(context).stops_here
-    answers = [_answer(attempt) for attempt in early_stop.attempts()] if here else []
+    call = invocation(context)
+    call.robot_option = robot or call.robot_option
+    attempts = early_stop.attempts(call.robot_option) if call.stops_here else []
+    if not attempts and call.server is None and _is_unknown(call):
+        line = f"no robot is called {call.robot_option}: every robot is stopped"
+        print(printable(line), file=sys.stderr, flush=True)
+        call.robot_option = None
+        attempts = early_stop.attempts()
+    answers = [_answer(attempt) for attempt in attempts]
     answers += robot_of(context).stop({answer.port for answer in answers})
     if json:
         print_json([answer.as_data() for answer in answers])
@@ -39,6 +54,16 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
             print(_line(answer))
     if not answers or not all(answer.confirmed for answer in answers):
         raise typer.Exit(exit_codes.NOT_REACHED)
+
+
+def _is_unknown(call: Invocation) -> bool:
+    """Whether the command line names a robot that is not configured. In doubt it is: then all are stopped."""
+    if call.robot_option is None or call.port_option is not None:
+        return False
+    try:
+        return call.robot_option not in call.configuration.names
+    except DaqError:
+        return True
 
 
 def _answer(attempt: StopAttempt) -> StopAnswer:

@@ -67,6 +67,6 @@ def _tokens(call: Invocation) -> TokenStore:
     from server.access.tokens import TokenStore
     from server.store.engine import Store
 
-    store = Store(call.settings.server.database_url)
+    store = Store(call.configuration.server.database_url)
     store.migrate()
     return TokenStore(store)

@@ -1,8 +1,9 @@
-"""A stop through the configured port, for which no process needs to own the port."""
+"""Stops through the configured ports, for which no process needs to own a port."""
 
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 from daq.acquisition.stop_socket import StopAnswer
 from daq.contracts.errors import DaqError
@@ -10,20 +11,32 @@ from daq_cli.app.context import Invocation
 
 
 def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
-    """Stops the robot of the command line or the configuration, unless the process that owns its port has been asked.
+    """Stops the robots of the command line or the configuration, all of them unless one is named, except those whose
+    processes have been asked.
 
     If the configuration cannot be read, the answer says so; other robots have been stopped by then.
     """
     try:
-        url = call.port_option or call.settings.robot.port
-        name = "robot" if call.port_option else call.settings.robot.name
+        ports = _ports(call)
     except DaqError as error:
         return [StopAnswer(robot="configured robot", delivered=False, confirmed=False, text=str(error))]
-    if url is None or url.startswith("mock://") or _device(url) in map(_device, reached):
+    asked = set(map(_device, reached))
+    left = [(name, url) for name, url in ports if not url.startswith("mock://") and _device(url) not in asked]
+    if not left:
         return []
     from daq.acquisition.port_stop import stop_at_port
 
-    return [stop_at_port(name, url)]
+    with ThreadPoolExecutor(len(left)) as pool:  # a line that does not answer delays no other arm's stop
+        return list(pool.map(lambda one: stop_at_port(*one), left))
+
+
+def _ports(call: Invocation) -> list[tuple[str, str]]:
+    """Names and ports of the robots to stop. Raises SpecError."""
+    if call.port_option:
+        return [("robot", call.port_option)]
+    wanted = call.robot_option
+    own = [one.robot for one in call.configuration.each_robot() if wanted in (None, one.robot.name)]
+    return [(robot.name, robot.port) for robot in own if robot.port is not None]
 
 
 def _device(url: str) -> object:

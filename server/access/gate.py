@@ -30,7 +30,7 @@ from server.access.turns import Turns
 from server.database_errors import DamagedError
 from server.problems import ProblemError, of_damage, of_database, response
 
-STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
+STOP = re.compile(r"/api/v1/(robots/[^/]+|fleet)/stop")
 """Addresses of the stop, which no rate limit delays."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
 """Addresses whose POST takes a file. Their routes limit its size themselves."""

@@ -25,6 +25,18 @@ from daq.contracts.service.experiments import (
     ScheduleChange,
     ScheduleRequest,
 )
+from daq.contracts.service.fleet import (
+    ArmComparison,
+    ArmFit,
+    FittedNumber,
+    FleetComparison,
+    FleetExperimentRequest,
+    FleetExperiments,
+    FleetRobot,
+    FleetStatus,
+    JointResidual,
+    NumberChange,
+)
 from daq.contracts.service.jobs import (
     BatchRequest,
     CompareRequest,
@@ -78,6 +90,7 @@ from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgre
 from model.comparison.difference import ParameterDifference
 from model.machine_model.model import base_model
 from server.jobs.results import ComparisonData, ComparisonJobResult, Overlay
+from server.stopping.arm import together
 from server.store.programs import StoredProgram
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
@@ -86,29 +99,34 @@ SPEC = ExperimentSpec(trajectory=Ramp(amplitude=0.377, duration=0.65), joints=(1
 PICK = Program(name="pick", instructions=(Absolute(angles={1: 3.14, 2: 1.4}), Gripper(closed=True), Wait(duration=1)))
 PROGRAM = ProgramEntry(name="pick", robot=ROBOT, revision=3, instructions=3, changed=NOON, changed_by="anna")
 COULOMB = ParameterWords(joint=2, group="joint 2", short="Coulomb friction torque", label="J2 Coulomb friction torque")
+COULOMB_NOW = {"name": "joint2.coulomb_friction.torque", "unit": "N m"}
 QUEUE = QueueStatus(paused=False, reason="resumed by anna", since=NOON, queued=2, running=EXPERIMENT)
 NOBODY = Control(holder="nobody")
 IDENTITY = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=3)
 
 
 def _experiments() -> list[BaseModel]:
+    request = ExperimentRequest(spec=SPEC, at=NOON, priority=10)
+    experiment = Experiment(
+        id=EXPERIMENT,
+        robot=ROBOT,
+        spec=SPEC,
+        state="running",
+        priority=10,
+        at=NOON,
+        submitted=NOON,
+        submitted_by="anna",
+        started=NOON,
+        progress=0.4,
+        progress_text="120 of 300 samples",
+        trace=TRACE,
+    )
     return [
-        ExperimentRequest(spec=SPEC, at=NOON, priority=10),
+        request,
+        FleetExperimentRequest(request=request, robots=(ROBOT,)),
+        FleetExperiments(experiments=(experiment,)),
         ExperimentChange(priority=5),
-        Experiment(
-            id=EXPERIMENT,
-            robot=ROBOT,
-            spec=SPEC,
-            state="running",
-            priority=10,
-            at=NOON,
-            submitted=NOON,
-            submitted_by="anna",
-            started=NOON,
-            progress=0.4,
-            progress_text="120 of 300 samples",
-            trace=TRACE,
-        ),
+        experiment,
         ExperimentPreset(name="ramp", description="the ramp of the 1991 thesis", spec=SPEC),
         ScheduleRequest(spec=SPEC, every=86400, starts=NOON, count=30),
         ScheduleChange(active=False),
@@ -178,6 +196,14 @@ def _robot() -> list[BaseModel]:
         limp=(),
         control=NOBODY,
     )
+    stopped = StopResult(
+        delivered=True,
+        confirmed=True,
+        tick=90211,
+        seconds=0.014,
+        detail="set points frozen at tick 90211.",
+        text="stopped, confirmed by the board: set points frozen at tick 90211.",
+    )
     return [
         RobotSummary(robot=ROBOT, machine="ma2000", connection="connected", arm="idle"),
         RobotStatus(
@@ -194,13 +220,58 @@ def _robot() -> list[BaseModel]:
             queue=QUEUE,
             utc=NOON,
         ),
-        StopResult(
-            delivered=True,
-            confirmed=True,
-            tick=90211,
-            seconds=0.014,
-            detail="set points frozen at tick 90211.",
-            text="stopped, confirmed by the board: set points frozen at tick 90211.",
+        stopped,
+        together({ROBOT: stopped}),
+        FleetStatus(
+            utc=NOON,
+            robots=(
+                FleetRobot(
+                    robot=ROBOT,
+                    machine="ma2000",
+                    simulated=True,
+                    connection="connected",
+                    arm="idle",
+                    activity="none",
+                    sample_age=0.011,
+                    unattended=False,
+                    control=NOBODY,
+                    queue=QUEUE,
+                ),
+            ),
+        ),
+        FleetComparison(
+            experiments=("morning-ramp",),
+            experiment="morning-ramp",
+            days=30,
+            robots=(
+                ArmComparison(
+                    robot=ROBOT,
+                    fits=(
+                        ArmFit(
+                            job="0f1e2d3c4b5a",
+                            at=NOON,
+                            traces=(TRACE,),
+                            converged=True,
+                            whitened_mean_square=1.1,
+                            residuals=(JointResidual(joint=2, unit="rad", after=0.0021, floor=0.0019),),
+                            numbers=(FittedNumber(**COULOMB_NOW, value=0.21, deviation=0.01, low=0.19, high=0.23),),
+                        ),
+                    ),
+                    reference="a5b4c3d2e1f0",
+                    changes=(
+                        NumberChange(
+                            **COULOMB_NOW,
+                            before=0.15,
+                            after=0.21,
+                            difference=0.06,
+                            low=0.032,
+                            high=0.088,
+                            changed=True,
+                        ),
+                    ),
+                ),
+            ),
+            words={COULOMB_NOW["name"]: COULOMB},
         ),
         ResetRequest(here=False),
         Done(text="released: the arm holds its posture and takes set points again"),

@@ -89,7 +89,9 @@ class StateMetrics(Collector):
 
     def _of_disks(self) -> Iterable[Metric]:
         free = GaugeMetricFamily("daq_disk_free_bytes", "Free on the disk of a folder.", labels=("folder",))
-        for name, folder in (("traces", self._services.settings.traces.folder), ("service", self._services.folder)):
+        rigs = self._services.robots()
+        folders = {f"traces/{rig.robot.name}" if len(rigs) > 1 else "traces": rig.catalogue.folder for rig in rigs}
+        for name, folder in (*folders.items(), ("service", self._services.folder)):
             with suppress(ProblemError):  # no figure for a folder that is not there
                 free.add_metric((name,), free_room(folder.absolute()))
         yield free

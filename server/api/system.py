@@ -38,14 +38,15 @@ async def healthz() -> Health:
 
 @plain.get("/readyz", responses={503: {"model": Health}})
 async def readyz(request: Request, services: ServicesDep, response: Response) -> Health:
-    """Answers 200 while database and traces' folder can be written; a robot need not be connected.
+    """Answers 200 while the database and the folder of a robot's traces can be written; none need be connected.
 
     Callers who may see the robot get the details. The answer is up to a second old.
     """
     problems = await services.readiness.check(lambda: _checks(services))
     if caller_of(request) is None:
         problems = {name: problem and NOT_WELL for name, problem in problems.items()}
-    if any(problems[name] for name in ("database", "traces")):
+    folders = [problem for name, problem in problems.items() if name.startswith("traces")]
+    if problems["database"] or all(folders):
         response.status_code = 503
         return Health(status="not ready", version=VERSION, checks=problems)
     return Health(status="ok", version=VERSION, checks=problems)
@@ -66,7 +67,6 @@ async def get_me(caller: Viewer) -> Me:
 @router.get("/system")
 def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     """Returns version, uptime, storage and live clients of the service."""
-    folder = services.settings.traces.folder.absolute()
     file = _database_file(services)
     with services.store.reading() as session:
         count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
@@ -74,10 +74,10 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         version=VERSION,
         uptime=services.clock.monotonic() - services.begun,
         storage=StorageStatus(
-            traces_folder=str(folder),
-            traces_free=free_room(folder),
+            traces_folder=", ".join(str(rig.catalogue.folder) for rig in services.robots()),
+            traces_free=min(free_room(rig.catalogue.folder) for rig in services.robots()),
             traces_reserve=RESERVE,
-            traces_size=disk_size(folder),
+            traces_size=sum(disk_size(rig.catalogue.folder) for rig in services.robots()),
             traces=count,
             database=make_url(services.store.url).get_backend_name(),
             database_size=file.stat().st_size if file is not None and file.is_file() else None,
@@ -87,13 +87,13 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         live_dropped=sum(rig.hub.dropped for rig in services.robots()),
         jobs_at_once=services.settings.server.jobs_at_once,
         short_jobs_at_once=SHORT_LANE_WORKERS,
-        unattended=services.settings.server.unattended,
+        unattended=any(rig.unattended for rig in services.robots()),
         stop_port=services.stop_port,
     )
 
 
 def _checks(services: Services) -> dict[str, str]:
-    checks = {"database": "", "traces": ""}
+    checks = {"database": ""}
     file = _database_file(services)
     try:
         if file is not None:
@@ -101,20 +101,25 @@ def _checks(services: Services) -> dict[str, str]:
         services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
-    try:
-        _require_writable(services.settings.traces.folder)
-        free = shutil.disk_usage(services.settings.traces.folder).free
-        if free < RESERVE:
-            checks["traces"] = f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free"
-    except OSError as error:
-        checks["traces"] = str(error)
     warnings = disk_warnings(services.settings.traces.folder, services.settings.traces.warn_at)
     checks["room"] = "; ".join(warnings)
     for rig in services.robots():
+        name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
+        checks[name] = _problem_of_folder(rig.catalogue.folder)
         if rig.archive is not None:
             checks[f"archive of {rig.robot.name}"] = "; ".join(rig.archive.warnings(services.settings.traces.warn_at))
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
     return checks
+
+
+def _problem_of_folder(folder: Path) -> str:
+    """Returns why no trace can be written to a folder; an empty text if it can."""
+    try:
+        _require_writable(folder)
+        free = shutil.disk_usage(folder).free
+    except OSError as error:
+        return str(error)
+    return f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free" if free < RESERVE else ""
 
 
 def _require_writable(folder: Path) -> None:

@@ -15,7 +15,7 @@ from server.store.lock import sqlite_file
 
 DATABASE = "database/service.sqlite"
 NAMES = re.compile(
-    r"database/service\.sqlite|traces/[^/\\]{1,250}\.mcap|models/[A-Za-z0-9_-]{1,64}\.json"
+    r"database/service\.sqlite|traces/([a-z0-9][a-z0-9_-]{0,31}/)?[^/\\]{1,250}\.mcap|models/[A-Za-z0-9_-]{1,64}\.json"
     r"|jobs/[0-9a-f]{12}/[A-Za-z0-9_-]{1,64}\.(json|html)"
     r"|jobs/[0-9a-f]{12}/batch/((rows|batch|table)\.(jsonl|json|csv|parquet)|answers/[A-Za-z0-9_-]{1,64}\.json)"
 )
@@ -30,25 +30,49 @@ class BackupError(DaqError):
 
 @dataclass(frozen=True)
 class Places:
-    """Places of one configuration's files. `url` is the database's address, `database` its file."""
+    """Places of one configuration's files. `url` is the database's address, `database` its file; `traces` are the
+    folders by the name of each robot."""
 
-    robot: str
     url: str
     database: Path
-    traces: Path
+    traces: dict[str, Path]
     service: Path
+
+    @property
+    def robot(self) -> str:
+        """The name of the robot; of several, all of their names."""
+        return ", ".join(sorted(self.traces))
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """All folders, without those in them."""
+        return (self.database.parent, *self.traces.values(), self.service)
+
+    def home(self, name: str) -> Path:
+        """Returns which of the folders the file that has this name in a backup goes to. Raises BackupError."""
+        if name == DATABASE:
+            return self.database.parent
+        kind, *rest = name.split("/")
+        if kind != "traces":
+            return self.service
+        robot = rest[0] if len(rest) > 1 else self.robot
+        if robot not in self.traces or (len(rest) > 1) != (len(self.traces) > 1):
+            raise BackupError(f"{name!r}: the backup has a trace of no robot of {self.robot}; nothing was changed")
+        return self.traces[robot]
 
     def target(self, name: str) -> Path:
         """Returns the place of the file that has this name in a backup."""
         if name == DATABASE:
             return self.database
-        kind, _, rest = name.partition("/")
-        return (self.traces if kind == "traces" else self.service / kind) / rest
+        home = self.home(name)
+        return home / name if home == self.service else home / name.rpartition("/")[2]
 
     def files(self) -> Iterator[tuple[str, Path]]:
         """Yields all files except the database, with their names in a backup. It skips those still being written."""
-        for path in sorted(self.traces.glob(f"*{SUFFIX}")):
-            yield f"traces/{path.name}", path
+        for robot, folder in self.traces.items():
+            prefix = f"traces/{robot}" if len(self.traces) > 1 else "traces"
+            for path in sorted(folder.glob(f"*{SUFFIX}")):
+                yield f"{prefix}/{path.name}", path
         for path in sorted((self.service / "models").glob("*.json")):
             yield f"models/{path.name}", path
         for path in sorted((self.service / "jobs").rglob("*")):
@@ -65,5 +89,5 @@ def places_of(settings: Settings) -> Places:
         raise BackupError(
             f"database {url.partition(':')[0]}: is not a file; back it up with its own tools, and copy the folders"
         )
-    traces, service = settings.traces.folder.absolute(), settings.server.folder.absolute()
-    return Places(settings.robot.name, url, database, traces, service)
+    traces = {own.robot.name: own.traces.folder.absolute() for own in settings.each_robot()}
+    return Places(url, database, traces, settings.server.folder.absolute())

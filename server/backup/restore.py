@@ -76,7 +76,8 @@ def restore(
 def occupied(places: Places) -> list[Path]:
     """Returns what a restore would replace: the database and its write-ahead log, traces, models, results of jobs."""
     beside = [places.database.with_name(places.database.name + end) for end in ("", "-wal", "-shm")]
-    traces = [path for path in _entries(places.traces) if path.name.endswith((SUFFIX, PART_SUFFIX))]
+    held = [path for folder in places.traces.values() for path in _entries(folder)]
+    traces = [path for path in held if path.name.endswith((SUFFIX, PART_SUFFIX))]
     folders = [folder for name in ("models", "jobs") if _entries(folder := places.service / name)]
     return [path for path in (*beside, *traces, *folders) if path.exists()]
 
@@ -90,7 +91,9 @@ class _Staged:
         self._places = places
         self._reserve = reserve
         self._moves: list[tuple[Path, Path]] = []
-        self._folders = {folder / STAGING for folder in (places.database.parent, places.traces, places.service)}
+        self._folders = {folder / STAGING for folder in places.folders}
+        self._traces: dict[str, Path] = {}
+        """Place of each trace, by the name of its file, which no two robots have in common."""
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
         """Extracts all files, and checks the digest of each once more. Raises BackupError, OSError."""
@@ -98,6 +101,8 @@ class _Staged:
         for folder in self._folders:
             folder.mkdir(parents=True)
         self._require_room(manifest)
+        names = [entry.name for entry in manifest.files if entry.name.startswith("traces/")]
+        self._traces = {Path(name).name: self._places.target(name) for name in names}
         done = 0
         with opened(self._archive) as (pack, _):
             for entry in manifest.files:
@@ -108,7 +113,8 @@ class _Staged:
             raise BackupError(f"{self._archive}: its database is not the one that its list names")
         if manifest.revision is not None:
             line = "restored from a backup: look at the arm, then resume the queue"
-            hold_queue(self._staged(DATABASE), manifest.robot, line, self._now)
+            for robot in self._places.traces:
+                hold_queue(self._staged(DATABASE), robot, line, self._now)
 
     def move_in(self) -> None:
         """Moves every file into its place, and writes the folders to the disk."""
@@ -124,10 +130,8 @@ class _Staged:
             shutil.rmtree(folder, ignore_errors=True)
 
     def _staged(self, name: str) -> Path:
-        target = self._places.target(name)
-        homes = (self._places.database.parent, self._places.traces, self._places.service)
-        home = homes[0] if name == DATABASE else homes[1] if name.startswith("traces/") else homes[2]
-        return home / STAGING / target.relative_to(home)
+        home = self._places.home(name)
+        return home / STAGING / self._places.target(name).relative_to(home)
 
     def _extract(self, pack: zipfile.ZipFile, entry: Entry) -> None:
         path = self._staged(entry.name)
@@ -146,8 +150,10 @@ class _Staged:
     def _lead_to_places(self, request: Path) -> None:
         """Changes the paths of traces, models and another job in a job's request to this configuration's folders."""
         task = json.loads(request.read_text("utf-8"))
-        for kind, folder in (("traces", self._places.traces), ("models", self._places.service / "models")):
-            task[kind] = {number: str(folder / Path(file).name) for number, file in task.get(kind, {}).items()}
+        first, models = next(iter(self._places.traces.values())), self._places.service / "models"
+        traces = {number: Path(file).name for number, file in task.get("traces", {}).items()}
+        task["traces"] = {number: str(self._traces.get(name, first / name)) for number, name in traces.items()}
+        task["models"] = {number: str(models / Path(file).name) for number, file in task.get("models", {}).items()}
         if before := task.get("continues"):
             task["continues"] = str(self._places.service / "jobs" / Path(before).name)
         with request.open("w", encoding="utf-8") as stream:

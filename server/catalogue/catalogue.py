@@ -88,9 +88,9 @@ class Catalogue:
                 else:
                     log.info("salvaged %s: %s samples", salvaged.path, salvaged.samples)
             there = {entry.name for entry in self.folder.iterdir() if entry.name.endswith(layout.SUFFIX)}
-            known = self._traces.files()
-            self._traces.mark_missing(known - there, missing=True)
-            self._traces.mark_missing(known & there, missing=False)
+            known = self._traces.files(self._robot)
+            self._traces.mark_missing(self._robot, known - there, missing=True)
+            self._traces.mark_missing(self._robot, known & there, missing=False)
             return sum(self._take_in(self.folder / name) is not None for name in sorted(there - known))
 
     def clear_uploads(self) -> None:
@@ -203,7 +203,7 @@ class Catalogue:
         with self._lock:
             if not target.exists():
                 disk.rename(source, target)
-            self._traces.mark_missing([target.name], missing=False)
+            self._traces.mark_missing(self._robot, [target.name], missing=False)
         self.is_here(identity, target)
         return target
 
@@ -215,7 +215,7 @@ class Catalogue:
             if time.monotonic() - self._opened.get(identity, -OPENED_STAYS) < OPENED_STAYS or not is_allowed():
                 return False
             # After a crash between the two, the next start finds the file and says so.
-            self._traces.mark_missing([path.name], missing=True)
+            self._traces.mark_missing(self._robot, [path.name], missing=True)
             path.unlink(missing_ok=True)
             disk.sync_folder(self.folder)
         return True

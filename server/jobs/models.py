@@ -107,7 +107,8 @@ class Models:
     def remove(self, identity: str) -> None:
         """Deletes a model's row and file. Raises a 404, 409."""
         file = self.store.remove(self._robot, identity)
-        (self.folder / file).unlink(missing_ok=True)
+        if file is not None:
+            (self.folder / file).unlink(missing_ok=True)
 
 
 def _effect(use: EffectUse) -> EffectInModel:

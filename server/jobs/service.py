@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
@@ -17,44 +18,30 @@ from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, FitRequest, Job, JobRequest
-from daq.executors import Workers, open_workers
+from daq.executors import Workers
 from daq.executors.address import LOCAL
-from daq.executors.local import LocalWorkers
 from daq.executors.program import OtherVersionError
 from daq.executors.workers import BlamedError
 from server.batches.folder import ASKED
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
-from server.jobs.lanes import BATCH_LANE_WORKERS, LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
+from server.jobs.lanes import LANES, Lane, lane_of, with_what_it_waits_for
 from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
+from server.jobs.shared_workers import SharedWorkers, job_workers, worker_processes
 from server.jobs.work import Ended, Task, carry_out
-from server.jobs.yielding import begin_worker
 from server.problems import ProblemError, conflict, not_found
 from server.store.jobs import JobStore, models_of, traces_of
 from server.store.labels import job_label
 
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
-SCHEDULER_PATIENCE = 5.0
-"""Time (s) within which a scheduler must answer, and have a worker; no other job is begun or ended meanwhile."""
 MOST_OF_A_BATCH = 2000
 """Largest number of traces of a batch."""
 MOST_TOLD = 50
 """Number of waiting jobs that are published again when a job before them has begun or ended."""
 log = logging.getLogger("server.jobs")
-
-
-def job_workers(url: str, count: int) -> Workers:
-    """Opens an executor for jobs; `count` is the number of processes where it is this computer. Raises SpecError,
-    ReachError, OtherVersionError."""
-    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker, SCHEDULER_PATIENCE)
-
-
-def worker_processes(count: int) -> LocalWorkers:
-    """Makes the executor of this computer, whose processes give way to everything else."""
-    return LocalWorkers(count, begin_worker)
 
 
 @dataclass(frozen=True)
@@ -74,6 +61,8 @@ class JobContext:
     at_once: int
     executor: str = LOCAL
     make_executor: Callable[[str, int], Workers] = job_workers
+    workers: SharedWorkers | None = None
+    """The workers that the robots of a service share; None for workers of its own."""
 
 
 class JobService:
@@ -83,7 +72,7 @@ class JobService:
         self._context = context
         self._wake = threading.Event()
         self._closing = False
-        self._executors: dict[Lane, Workers] = {}
+        self._workers = context.workers or SharedWorkers(context.executor, context.at_once, context.make_executor)
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._fetched: dict[str, Transfer] = {}
         """Waiting jobs whose traces are fetched from the archive, and how far these are."""
@@ -197,9 +186,8 @@ class JobService:
         for identity in list(self._running):
             with contextlib.suppress(OSError):
                 Mailbox(self._folder(identity)).cancel()  # it may run on another computer, which cannot be ended
-        for executor in self._executors.values():
-            executor.abandon()
-        self._executors.clear()
+        if self._context.workers is None:
+            self._workers.abandon()
 
     def _folder(self, identity: str) -> Path:
         return self._context.folder / identity
@@ -231,28 +219,35 @@ class JobService:
     def _begin(self) -> bool:
         """Hands waiting jobs to free workers of their lanes. Returns whether any has begun."""
         context = self._context
-        places = {"short": SHORT_LANE_WORKERS, "long": context.at_once, "batch": BATCH_LANE_WORKERS}
-        free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
         has_begun = False
         waiting = {job.id: job for job in context.jobs.waiting(context.robot)}
+        busy: set[Lane] = set()
         for job in waiting.values():
             lane = lane_of(job.request)
-            if free[lane] <= 0:
+            if lane in busy:
+                continue
+            if not self._workers.take_place(lane, self._wake.set):
+                busy.add(lane)
                 continue
             away = self._away(job)
             if away is not None and away.state != "failed":
+                self._workers.give_place_back(lane)
                 continue
             try:  # its state first: a job cancelled before that is never computed
                 begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
-            except ProblemError:  # it has just been cancelled
-                continue
-            future = self._handed_over(job.id, lane, places[lane]) if away is None else _refused(away.problem)
+            except BaseException as error:
+                self._workers.give_place_back(lane)
+                if isinstance(error, ProblemError):  # it has just been cancelled
+                    continue
+                raise
+            future = self._handed_over(job.id, lane) if away is None else _refused(away.problem)
             self._running[job.id] = begun, future
-            if not future.done():
-                free[lane] -= 1
+            future.add_done_callback(partial(self._leave, lane))
             has_begun = True
             self._tell(begun)
-            future.add_done_callback(lambda _future: self._wake.set())
+        for lane in LANES:
+            if lane not in busy:
+                self._workers.wait_no_more(lane, self._wake.set)
         self._fetched = {job: fetched for job, fetched in self._fetched.items() if job in waiting}
         return has_begun
 
@@ -273,19 +268,16 @@ class JobService:
         """Looks whether a waiting job can begin, since traces have been fetched."""
         self._wake.set()
 
-    def _at_work(self, lane: Lane) -> int:
-        running = list(self._running.values())
-        return sum(lane_of(job.request) == lane and not future.done() for job, future in running)
+    def _leave(self, lane: Lane, _future: Future[Ended]) -> None:
+        """Handles the end of a job's computation: its place is free."""
+        self._workers.give_place_back(lane)
+        self._wake.set()
 
-    def _handed_over(self, identity: str, lane: Lane, workers: int) -> Future[Ended]:
+    def _handed_over(self, identity: str, lane: Lane) -> Future[Ended]:
         """Hands a job to the executor of its lane, or to a new executor if the death of a worker has broken it."""
         for _ in range(2):
             try:
-                executor = self._executors.get(lane)
-                if executor is None:
-                    url = self._context.executor if lane == "long" else LOCAL
-                    executor = self._executors[lane] = self._context.make_executor(url, workers)
-                self._given_to[identity] = executor
+                executor = self._given_to[identity] = self._workers.executor(lane)
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
                 self._give_up(identity, lane)
@@ -295,12 +287,8 @@ class JobService:
         return _failed(BrokenExecutor())
 
     def _give_up(self, identity: str, lane: Lane) -> None:
-        """Ends the executor that a job was lost with, unless another has taken its place already."""
-        executor = self._executors.get(lane)
-        if executor is not None and executor is self._given_to.get(identity):
-            del self._executors[lane]
-            # A scheduler that is gone is not waited for.
-            threading.Thread(target=executor.abandon, name="executor-end", daemon=True).start()
+        """Ends the executor that a job was lost with."""
+        self._workers.give_up(lane, self._given_to.get(identity))
 
     def _collect(self) -> bool:
         """Records the end of finished jobs. A job whose end cannot be written delays no other. Returns whether any has

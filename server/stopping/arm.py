@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from daq.acquisition.port_stop import stop_at_port
 from daq.acquisition.stop_socket import StopAnswer, request_stop
-from daq.contracts.service.robot import StopResult
+from daq.contracts.service.robot import FleetStopResult, StopResult
 from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, require_same
 
 
@@ -41,6 +42,30 @@ def stop_arm(reach: Reach) -> StopResult:
         detail=detail,
         text=f"{head}: {detail}",
     )
+
+
+def together(results: Mapping[str, StopResult]) -> FleetStopResult:
+    """Returns the results of the stops of all robots as one, which is as good as the worst of them."""
+    every = list(results.values())
+    texts = [f"{name}: {result.text}" for name, result in results.items()]
+    return FleetStopResult(
+        delivered=all(result.delivered for result in every),
+        confirmed=all(result.confirmed for result in every),
+        seconds=max(result.seconds for result in every),
+        note=every[0].note if len(every) == 1 else "",
+        detail=every[0].detail if len(every) == 1 else _in_detail(results),
+        text=every[0].text if len(every) == 1 else "; ".join(texts),
+        robots=dict(results),
+    )
+
+
+def _in_detail(results: Mapping[str, StopResult]) -> str:
+    """Returns which arms are not known to be stopped, and which are."""
+    stopped = ", ".join(name for name, result in results.items() if result.confirmed)
+    others = ", ".join(f"{name} ({result.note})" for name, result in results.items() if not result.confirmed)
+    if not others:
+        return f"all {len(results)} arms hold their set points."
+    return f"not confirmed: {others}. Use the emergency stop. Confirmed: {stopped or 'none'}."
 
 
 def _ask(reach: Reach) -> StopAnswer:

@@ -1,5 +1,6 @@
-"""An HTTP server for the stop alone: `POST /api/v1/robots/{robot}/stop`, every request on a thread of its own, with the
-same names, tokens, origins and answers as the service's.
+"""An HTTP server for the stop alone: `POST /api/v1/robots/{robot}/stop`, and `POST /api/v1/fleet/stop` for all robots.
+
+Every request is carried out on a thread of its own, with the same names, tokens, origins and answers as the service's.
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ from daq.contracts.service.robot import StopResult
 from server.access.caller import Caller
 from server.access.stop_gate import StopGate
 from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
+from server.stopping.arm import together
 from server.stopping.tokens import TokensCannotBeReadError
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
+ALL = "/api/v1/fleet/stop"
 READ_WITHIN = 2.0
 """Time (s) in which a client must send its whole request, so that nobody occupies a connection by sending slowly."""
 MOST_AT_ONCE = 32
@@ -129,6 +132,26 @@ class _Bounded(io.RawIOBase):
         super().close()
 
 
+class _Asked(threading.Thread):
+    """A stop on a thread of its own, so that an arm that does not answer delays no other's."""
+
+    def __init__(self, stop: Stop) -> None:
+        super().__init__(name="stop", daemon=True)
+        self._stop_arm = stop
+        self._found: StopResult | None = None
+        self.start()
+
+    def run(self) -> None:
+        """Stops the arm."""
+        self._found = self._stop_arm()
+
+    def result(self) -> StopResult:
+        """Waits for the result."""
+        self.join()
+        assert self._found is not None  # a stop never raises
+        return self._found
+
+
 class _Handler(BaseHTTPRequestHandler):
     """Answers one request with what the server knows."""
 
@@ -147,7 +170,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Carries out the stop."""
         self._read_body()
         try:
-            robot, caller = self._admitted()
+            robots, caller = self._admitted()
         except TokensCannotBeReadError as error:
             problem = ProblemError(503, "database", f"the tokens cannot be read: {error}", "try again")
             self._answer(problem.status, details_of(problem), MEDIA_TYPE)
@@ -155,11 +178,13 @@ class _Handler(BaseHTTPRequestHandler):
         except ProblemError as problem:
             self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
             return
-        result = self.server.stops[robot]()
-        self.server.on_stop(
-            robot, result, caller
-        )  # before the answer: the client may be gone, and the stop has been made
-        self._answer(200, result, "application/json")
+        stops = self.server.stops
+        # The first is stopped on this thread, so that one stop needs no further thread.
+        others = {name: _Asked(stops[name]) for name in robots[1:]}
+        results = {robots[0]: stops[robots[0]](), **{name: asked.result() for name, asked in others.items()}}
+        for name, result in results.items():  # before the answer: the client may be gone, and the stop has been made
+            self.server.on_stop(name, result, caller)
+        self._answer(200, together(results) if self.path == ALL else results[robots[0]], "application/json")
 
     def do_OPTIONS(self) -> None:
         """Answers whether the service's page may ask. It is at another port, and so of another origin."""
@@ -177,12 +202,15 @@ class _Handler(BaseHTTPRequestHandler):
         """Writes to the service's log."""
         log.debug(format, *args)
 
-    def _admitted(self) -> tuple[str, Caller]:
+    def _admitted(self) -> tuple[tuple[str, ...], Caller]:
+        """Returns the robots to stop, and who asks. Raises a 401, 403 and 404."""
         found = ADDRESS.fullmatch(self.path)
         caller = self.server.gate.admit(self._headers())
+        if self.path == ALL:
+            return tuple(self.server.stops), caller
         if found is None or found[1] not in self.server.stops:
             raise not_found(f"address {self.path[:100]}", "this port takes POST /api/v1/robots/{robot}/stop alone")
-        return found[1], caller
+        return (found[1],), caller
 
     def _headers(self) -> dict[str, str]:
         return {name.lower(): value for name, value in self.headers.items()}

@@ -39,7 +39,7 @@ def user_label(session: Session, used_by: str) -> str:
     """The label of what uses a trace: `used_by` is `job ID` or `model ID`."""
     kind, _, identity = used_by.partition(" ")
     if kind == "model":
-        model = session.get(ModelRow, identity)
+        model = session.scalar(select(ModelRow).filter_by(id=identity))
         return used_by if model is None else f"model {model.name!r}"
     job = session.scalar(select(JobRow).filter_by(id=identity))
     return used_by if job is None else job_label(job.kind, job.submitted)

@@ -40,9 +40,9 @@ class ModelStore:
         self._store = store
 
     def insert(self, new: NewModel) -> bool:
-        """Adds a model; returns False if it exists already. Equal models have equal numbers."""
+        """Adds a model; returns False if the robot has it already. Equal models have equal numbers."""
         with self._store.writing() as session:
-            if session.get(ModelRow, new.id) is not None:
+            if session.get(ModelRow, (new.id, new.robot)) is not None:
                 return False
             fields = {name: value for name, value in vars(new).items() if name != "traces"}
             session.add(ModelRow(**fields, notes=""))
@@ -66,7 +66,7 @@ class ModelStore:
         with self._store.reading() as session:
             row: ModelRow | None = _row(session, robot, identity)
             while row is not None and row.parent is not None and len(found) < MOST_ANCESTORS:
-                row = session.get(ModelRow, row.parent)
+                row = session.get(ModelRow, (row.parent, robot))
                 if row is not None and row.id not in {one.id for one in found}:
                     found.append(_entry(session, row))
         return tuple(found)
@@ -100,16 +100,19 @@ class ModelStore:
             session.flush()
             return _entry(session, row)
 
-    def remove(self, robot: str, identity: str) -> str:
-        """Deletes a model, and returns its file's name. Raises a 404, and a 409 if another model was made from it."""
+    def remove(self, robot: str, identity: str) -> str | None:
+        """Deletes a model, and returns its file's name; None if another robot has the model, too, and needs the file.
+        Raises a 404, and a 409 if another model was made from it."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
-            child = session.scalar(select(ModelRow.name).filter_by(parent=identity))
+            child = session.scalar(select(ModelRow.name).filter_by(robot=robot, parent=identity))
             if child is not None:
                 raise conflict("model-in-use", f"model {child!r} was made from {row.name!r}", "delete that one first")
+            session.delete(row)
+            if session.scalar(select(ModelRow.robot).where(ModelRow.id == identity, ModelRow.robot != robot)):
+                return None
             for use in session.scalars(select(TraceUseRow).filter_by(used_by=f"model {identity}")):
                 session.delete(use)
-            session.delete(row)
             return row.file
 
 
@@ -129,7 +132,7 @@ def _entry(session: Session, row: ModelRow) -> ModelEntry:
 
 
 def _row(session: Session, robot: str, identity: str) -> ModelRow:
-    row = session.get(ModelRow, identity)
-    if row is None or row.robot != robot:
+    row = session.get(ModelRow, (identity, robot))
+    if row is None:
         raise not_found(f"model {identity!r}", "GET …/models lists those there are")
     return row

@@ -190,14 +190,15 @@ class JobRow(Submitted, Table):
 
 
 class ModelRow(Table):
-    """A model in the folder of models, and how it was made."""
+    """A model of one robot in the folder of models, and how it was made. Several robots may have the same model."""
 
     __tablename__ = "models"
+    __table_args__ = (UniqueConstraint("robot", "file"),)
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
-    robot: Mapped[str] = mapped_column(String(32), index=True)
+    robot: Mapped[str] = mapped_column(String(32), primary_key=True, index=True)
     name: Mapped[str] = mapped_column(String(64))
-    file: Mapped[str] = mapped_column(String(255), unique=True)
+    file: Mapped[str] = mapped_column(String(255))
     created: Mapped[datetime]
     created_by: Mapped[str]
     parent: Mapped[str | None] = mapped_column(String(64))

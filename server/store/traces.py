@@ -95,18 +95,19 @@ class TraceStore:
             row.searched = _searched(row, tags)
             session.add(row)
 
-    def files(self) -> set[str]:
-        """Returns the names of all files in the table."""
+    def files(self, robot: str) -> set[str]:
+        """Returns the names of all files of a robot in the table."""
         with self._store.reading() as session:
-            return set(session.scalars(select(TraceRow.file)))
+            return set(session.scalars(select(TraceRow.file).filter_by(robot=robot)))
 
-    def mark_missing(self, files: Iterable[str], *, missing: bool) -> None:
-        """Marks files as missing, or as existing again."""
+    def mark_missing(self, robot: str, files: Iterable[str], *, missing: bool) -> None:
+        """Marks files of a robot as missing, or as existing again."""
         names = list(files)
         with self._store.writing() as session:
             for first in range(0, len(names), 500):
                 part = names[first : first + 500]
-                query = update(TraceRow).where(TraceRow.file.in_(part), TraceRow.missing.is_(not missing))
+                query = update(TraceRow).where(TraceRow.robot == robot, TraceRow.file.in_(part))
+                query = query.where(TraceRow.missing.is_(not missing))
                 session.execute(query.values(missing=missing))
 
     def file_of(self, robot: str, identity: str) -> str:

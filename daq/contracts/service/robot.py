@@ -126,6 +126,13 @@ class StopResult(Wire):
     """The whole result in one line."""
 
 
+class FleetStopResult(StopResult):
+    """Result of a stop of all robots. It is `confirmed` only if every board has confirmed it, and the same holds for
+    `delivered`."""
+
+    robots: dict[str, StopResult]
+
+
 class ResetRequest(Wire):
     """Ends a stop. `here`: first make the measured posture the set points."""
 

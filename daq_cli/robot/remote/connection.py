@@ -20,12 +20,12 @@ TOKEN_VARIABLE = "DAQ_TOKEN"
 
 @contextmanager
 def remote_robot(call: Invocation) -> Iterator[Robot]:
-    """The client of the robot of `call.server`. Raises SpecError, ServiceError, ServiceNotReachedError."""
+    """The client of the named or only robot of the service. Raises SpecError, ServiceError, ServiceNotReachedError."""
     from daq.client import Client
 
     assert call.server is not None
     with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
-        yield client.robot()
+        yield client.robot(call.robot_option)
 
 
 def connected_status(robot: Robot) -> RobotStatus:

@@ -1,4 +1,4 @@
-"""A stop of a server's robot: it is requested under the robot's likely name, before any other request."""
+"""A stop of a server's robots: all of them, unless one is named. Nothing else is asked for before."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from daq.acquisition.stop_socket import StopAnswer
 from daq.client import Client
 from daq.client.stopping import NoSuchRobot
 from daq.contracts.errors import DaqError
-from daq.contracts.service.robot import StopResult
+from daq.contracts.service.robot import FleetStopResult, StopResult
 from daq_cli.app.context import Invocation
 from daq_cli.robot.remote.connection import TOKEN_VARIABLE
 
@@ -19,28 +19,45 @@ NAMES_WITHIN = 1.0
 
 
 def stop_at_server(call: Invocation) -> list[StopAnswer]:
-    """Stops the robot with the configured name; if the service has none of this name, stops all of its robots.
+    """Stops the robot that is named; without a name, or if the service has none of this name, stops all its robots.
 
     Never raises: the answers say what is not known.
     """
     assert call.server is not None
-    name = _likely_name(call)
+    name = call.robot_option
     try:
         with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
-            first = client.robot(name).stop()
-            others = _others(client, name, first) if isinstance(first, NoSuchRobot) else []
-            return [_answer(one, call.server, client.robot(one).stop()) for one in others] or [
-                _answer(name, call.server, first)
-            ]
+            if name is not None:
+                first = client.robot(name).stop()
+                if not isinstance(first, NoSuchRobot):
+                    return [_answer(name, call.server, first)]
+                print(f"{first.note}: {client.url} is asked to stop all of its robots", file=sys.stderr, flush=True)
+            found = client.stop()
+            if isinstance(found, FleetStopResult):
+                return [_answer(one, call.server, result) for one, result in found.robots.items()]
+            if isinstance(found, NoSuchRobot):
+                return _stop_by_name(call, client)
+            return [_answer(_likely_name(call), call.server, found)]
     except DaqError as error:
-        return [StopAnswer(robot=name, port=call.server, delivered=False, confirmed=False, text=str(error))]
+        return [StopAnswer(robot=name or "all", port=call.server, delivered=False, confirmed=False, text=str(error))]
+
+
+def _stop_by_name(call: Invocation, client: Client) -> list[StopAnswer]:
+    """Stops the robots of a service of version 0.1, which cannot stop all at once: first under the likely name."""
+    assert call.server is not None
+    name = _likely_name(call)
+    first = client.robot(name).stop()
+    others = _others(client, name, first) if isinstance(first, NoSuchRobot) else []
+    return [_answer(one, call.server, client.robot(one).stop()) for one in others] or [
+        _answer(name, call.server, first)
+    ]
 
 
 def _likely_name(call: Invocation) -> str:
     """Returns the configured name; the default name if the configuration cannot be read, so that the stop is sent
     nevertheless."""
     try:
-        return call.settings.robot.name
+        return call.configuration.names[0]
     except DaqError:
         return DEFAULT_ROBOT
 

@@ -132,7 +132,8 @@ def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
         assert service.robot.post("/reset", json={}, headers=headers).status_code == 200
         service.until_arm("idle")
     if path.endswith(("/experiments", "/gain")):
-        assert service.robot.post(f"/experiments/{answer.json()['id']}/cancel").status_code == 200
+        for one in answer.json().get("experiments", [answer.json()]):
+            assert service.robot.post(f"/experiments/{one['id']}/cancel").status_code == 200
     if path.endswith("/schedules"):
         assert service.robot.delete(f"/schedules/{answer.json()['id']}").status_code == 204
     lease = answer.json()["lease"] if path.endswith("/control") else headers["Control-Lease"]

@@ -60,7 +60,7 @@ def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
         "/metrics",
     }
     for path in described["paths"]:
-        assert path in of_no_robot or path.startswith("/api/v1/robots/{robot}"), path
+        assert path in of_no_robot or path.startswith(("/api/v1/robots/{robot}", "/api/v1/fleet")), path
 
 
 def test_every_address_of_the_guide_is_one(described: dict[str, Any]) -> None:

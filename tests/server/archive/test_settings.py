@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from daq.config.settings import load_settings
 from daq.config.archive import ArchiveSettings
+from daq.config.settings import load_settings
 from daq.contracts.errors import SpecError
 from server.archive.credentials import load_credentials
 from server.archive.health import pause_after

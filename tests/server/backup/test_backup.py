@@ -39,18 +39,19 @@ def quietly(_fraction: float, _text: str) -> None:
 
 def places_in(folder: Path, robot: str = "ma2000") -> Places:
     database = folder / "service" / "service.sqlite"
-    return Places(robot, f"sqlite:///{database}", database, folder / "traces", folder / "service")
+    return Places(f"sqlite:///{database}", database, {robot: folder / "traces"}, folder / "service")
 
 
-def add_trace(store: Store, places: Places, number: str) -> None:
+def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") -> None:
     """As a recorded one: the file first, then its row."""
-    places.traces.mkdir(parents=True, exist_ok=True)
-    part = places.traces / f"{number}.mcap.part"
+    folder = places.traces[robot]
+    folder.mkdir(parents=True, exist_ok=True)
+    part = folder / f"{number}.mcap.part"
     part.write_bytes(f"trace {number} ".encode() * 1000)
-    part.replace(places.traces / f"{number}.mcap")
+    part.replace(folder / f"{number}.mcap")
     new = NewTrace(
         id=number,
-        robot="ma2000",
+        robot=robot,
         file=f"{number}.mcap",
         created=NOW,
         source="mock",
@@ -77,7 +78,7 @@ def filled(folder: Path) -> Places:
     for number in ("aaa", "bbb"):
         add_trace(store, places, number)
     store.close()
-    (places.traces / "ccc.mcap.part").write_bytes(b"is being recorded")
+    (places.traces["ma2000"] / "ccc.mcap.part").write_bytes(b"is being recorded")
     (places.service / "models").mkdir()
     (places.service / "models" / "0123456789ab.json").write_text("{}")
     job = places.service / "jobs" / "0123456789ab"
@@ -86,7 +87,7 @@ def filled(folder: Path) -> Places:
     for name in ("rows.jsonl", "batch.json", "table.csv", "table.parquet", "answers/request.json"):
         (job / "batch" / name).parent.mkdir(exist_ok=True, parents=True)
         (job / "batch" / name).write_text('{"of": "a batch"}')
-    task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces / "aaa.mcap")}, "models": {}}
+    task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}, "models": {}}
     task["continues"] = str(places.service / "jobs" / "ba9876543210")
     (job / "request.json").write_text(json.dumps(task))
     (job / "cancel").touch()
@@ -126,7 +127,7 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     changed = {"service/service.sqlite", "service/jobs/0123456789ab/request.json"}
     assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
     task = json.loads(after["service/jobs/0123456789ab/request.json"])
-    assert task["traces"] == {"aaa": str(places.traces / "aaa.mcap")}
+    assert task["traces"] == {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}
     assert task["continues"] == str(places.service / "jobs" / "ba9876543210")
     store = Store(places.url)
     store.migrate()
@@ -182,12 +183,12 @@ def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path
         restore(tmp_path / f"{number}.zip", there, NOW, quietly)
         named = traces_in(there)
         assert len(named) >= 2
-        assert all((there.traces / name).is_file() for name in named)
+        assert all((there.traces["ma2000"] / name).is_file() for name in named)
 
 
 def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archive: Path, tmp_path: Path) -> None:
     places = filled(tmp_path / "there")
-    (places.traces / "aaa.mcap").write_bytes(b"another trace of this number")
+    (places.traces["ma2000"] / "aaa.mcap").write_bytes(b"another trace of this number")
     before = everything(tmp_path / "there")
     with pytest.raises(BackupError, match=r"exist already .*: with --overwrite they are moved aside"):
         restore(archive, places, NOW, quietly)
@@ -197,7 +198,7 @@ def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archi
     assert after["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
     assert after["traces/before-restore-2026-01-01T12-00-00Z/aaa.mcap"] == b"another trace of this number"
     assert set(restored.put_aside) == {
-        places.traces / "before-restore-2026-01-01T12-00-00Z",
+        places.traces["ma2000"] / "before-restore-2026-01-01T12-00-00Z",
         places.service / "before-restore-2026-01-01T12-00-00Z",
     }
     assert sorted(before.values()) == sorted(data for name, data in after.items() if "before-restore" in name)
@@ -367,3 +368,33 @@ def test_the_configured_places(tmp_path: Path) -> None:
     assert places.target("jobs/0123456789ab/result.json") == tmp_path / "jobs" / "0123456789ab" / "result.json"
     with pytest.raises(BackupError, match="is not a file"):
         places_of(Settings(server=ServiceSettings(database="postgresql://x/y")))
+
+
+def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> None:
+    def places_of_two(folder: Path) -> Places:
+        database = folder / "service" / "service.sqlite"
+        traces = {name: folder / "traces" / name for name in ("left", "right")}
+        return Places(f"sqlite:///{database}", database, traces, folder / "service")
+
+    here, there = places_of_two(tmp_path / "here"), places_of_two(tmp_path / "there")
+    store = Store(here.url)
+    store.migrate()
+    for number, robot in (("aaa", "left"), ("bbb", "right")):
+        add_trace(store, here, number, robot)
+    store.close()
+    job = here.service / "jobs" / "0123456789ab"
+    job.mkdir(parents=True)
+    task = {"request": {"kind": "fit"}, "traces": {"bbb": str(here.traces["right"] / "bbb.mcap")}, "models": {}}
+    (job / "request.json").write_text(json.dumps(task))
+    back_up(here, tmp_path / "arms.zip", NOW, quietly)
+    with pytest.raises(BackupError, match="is of robot 'left, right'; this configuration is for 'ma2000'"):
+        restore(tmp_path / "arms.zip", places_in(tmp_path / "one"), NOW, quietly)
+    restore(tmp_path / "arms.zip", there, NOW, quietly)
+    assert [path.name for path in there.traces["left"].glob("*.mcap")] == ["aaa.mcap"]
+    assert [path.name for path in there.traces["right"].glob("*.mcap")] == ["bbb.mcap"]
+    found = json.loads((there.service / "jobs" / "0123456789ab" / "request.json").read_text())
+    assert found["traces"] == {"bbb": str(there.traces["right"] / "bbb.mcap")}
+    store = Store(there.url)
+    states = [QueueStore(store).get(robot) for robot in ("left", "right")]
+    store.close()
+    assert all(state is not None and state.paused for state in states)

@@ -181,9 +181,9 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
 def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
     traces = TraceStore(store)
     traces.insert(new_trace(1))
-    traces.mark_missing(["1.mcap"], missing=True)
+    traces.mark_missing("ma2000", ["1.mcap"], missing=True)
     assert traces.get("ma2000", f"{1:012x}").missing
-    traces.mark_missing(["1.mcap"], missing=False)
+    traces.mark_missing("ma2000", ["1.mcap"], missing=False)
     assert not traces.get("ma2000", f"{1:012x}").missing
 
 

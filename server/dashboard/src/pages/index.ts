@@ -12,6 +12,10 @@ export interface PageEntry {
   load: () => Promise<{ default: Component }> | { default: Component };
 }
 
+/** The page over all arms, of a service that has several. */
+export const OVERVIEW: PageEntry = { path: 'arms', title: 'Arms', load: () => import('./Arms.svelte') };
+
+/** The pages of one arm, and of the service. */
 export const PAGES: readonly PageEntry[] = [
   { path: 'live', title: 'Live', load: () => ({ default: Live as Component }) },
   { path: 'experiments', title: 'Experiments', load: () => import('./Experiments.svelte') },

@@ -23,15 +23,40 @@ api.use({
 });
 
 let robot = '';
+let robots: readonly string[] = [];
 
 /** The robot that this page shows: the part `robot` of an address. */
 export function here(): { robot: string } {
   return { robot };
 }
 
-/** Chooses the robot; called once, before anything else is shown. */
-export function showRobot(name: string): void {
+/** The names of all robots of the service. */
+export function allRobots(): readonly string[] {
+  return robots;
+}
+
+/** Whether the service has several robots. */
+export function isFleet(): boolean {
+  return robots.length > 1;
+}
+
+/** Chooses the robot out of `all`; called once, before anything else is shown. Another one is another address. */
+export function showRobot(name: string, all: readonly string[] = [name]): void {
   robot = name;
+  robots = all;
+}
+
+/** The address of this page for another robot: the page is loaded anew, so that nothing of this one is left in it. */
+export function pageOf(name: string, page: string): string {
+  return `/?robot=${encodeURIComponent(name)}#/${page}`;
+}
+
+/** A key under which a request is carried out once. Not `randomUUID`: that one exists only on pages that came over TLS or
+ * from this computer. */
+export function newKey(): string {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) =>
+    byte.toString(16).padStart(2, '0'),
+  ).join('');
 }
 
 interface Answer<T> {

@@ -166,6 +166,91 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/fleet": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Fleet
+         * @description Returns the state of every robot at a glance, with the age of its newest sample.
+         */
+        get: operations["get_fleet"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/fleet/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop Fleet
+         * @description Freezes every arm of this service at once. Anybody who may see the robots may stop them, without control.
+         *
+         *     Unless the answer is `confirmed`, use the emergency stops. Only a reset of each arm ends its freeze.
+         */
+        post: operations["stop_fleet"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/fleet/experiments": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Submit Fleet Experiment
+         * @description Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
+         *
+         *     It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
+         *     gets it once.
+         */
+        post: operations["submit_fleet_experiment"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/fleet/comparison": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Fleet
+         * @description Compares the robots' fits to the same experiment over time, and says which numbers have changed.
+         */
+        get: operations["compare_fleet"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/gains": {
         parameters: {
             query?: never;
@@ -1366,7 +1451,7 @@ export interface paths {
         };
         /**
          * Readyz
-         * @description Answers 200 while database and traces' folder can be written; a robot need not be connected.
+         * @description Answers 200 while the database and the folder of a robot's traces can be written; none need be connected.
          *
          *     Callers who may see the robot get the details. The answer is up to a second old.
          */
@@ -1480,6 +1565,48 @@ export interface components {
             local_bytes: number;
             /** Local Limit */
             local_limit: number | null;
+        };
+        /**
+         * ArmComparison
+         * @description The fits of one robot to one experiment, the oldest first, and what has changed from `reference` to the newest.
+         *
+         *     `reference` is the newest fit that is older than the newest one by the time asked for; None if there is none.
+         */
+        ArmComparison: {
+            /** Robot */
+            robot: string;
+            /** Fits */
+            fits: components["schemas"]["ArmFit"][];
+            /** Reference */
+            reference?: string | null;
+            /**
+             * Changes
+             * @default []
+             */
+            changes?: components["schemas"]["NumberChange"][];
+        };
+        /**
+         * ArmFit
+         * @description One fit of one robot. `at`: when the newest of its traces was recorded.
+         */
+        ArmFit: {
+            /** Job */
+            job: string;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** Traces */
+            traces: string[];
+            /** Converged */
+            converged: boolean;
+            /** Whitened Mean Square */
+            whitened_mean_square: number;
+            /** Residuals */
+            residuals: components["schemas"]["daq__contracts__service__fleet__JointResidual"][];
+            /** Numbers */
+            numbers: components["schemas"]["FittedNumber"][];
         };
         /**
          * AwaitInput
@@ -2829,6 +2956,24 @@ export interface components {
             loop?: ("closed" | "open") | null;
         };
         /**
+         * FittedNumber
+         * @description A parameter that a fit has determined, with its 95 % interval.
+         */
+        FittedNumber: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number;
+            /** Deviation */
+            deviation: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
+        /**
          * FittedParameter
          * @description One parameter after a fit.
          *
@@ -2865,6 +3010,135 @@ export interface components {
             expected_deviation: number | null;
             /** At Bound */
             at_bound: ("low" | "high") | null;
+        };
+        /**
+         * FleetComparison
+         * @description The robots' fits to the same experiment, over time.
+         */
+        FleetComparison: {
+            /** Experiments */
+            experiments: string[];
+            /** Experiment */
+            experiment: string | null;
+            /** Days */
+            days: number;
+            /** Robots */
+            robots: components["schemas"]["ArmComparison"][];
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
+        };
+        /**
+         * FleetExperimentRequest
+         * @description The same experiment for several robots; None for all of them. Each gets it in its own queue.
+         */
+        FleetExperimentRequest: {
+            request: components["schemas"]["ExperimentRequest"];
+            /** Robots */
+            robots?: string[] | null;
+        };
+        /**
+         * FleetExperiments
+         * @description The experiments that were queued, one a robot.
+         */
+        FleetExperiments: {
+            /** Experiments */
+            experiments: components["schemas"]["Experiment"][];
+        };
+        /**
+         * FleetRobot
+         * @description One robot at a glance. Nothing here is from before the connection was lost, and the sample has its age.
+         */
+        FleetRobot: {
+            /** Robot */
+            robot: string;
+            /** Machine */
+            machine: string;
+            /** Simulated */
+            simulated?: boolean | null;
+            /**
+             * Connection
+             * @enum {string}
+             */
+            connection: "disconnected" | "connecting" | "connected" | "lost";
+            /**
+             * Connection Problem
+             * @default
+             */
+            connection_problem?: string;
+            /**
+             * Arm
+             * @enum {string}
+             */
+            arm: "disconnected" | "idle" | "armed" | "running" | "stopped" | "fault";
+            /**
+             * Cause
+             * @default
+             */
+            cause?: string;
+            /**
+             * Activity
+             * @enum {string}
+             */
+            activity: "none" | "experiment" | "jog" | "step" | "program" | "lead";
+            /**
+             * Limp
+             * @default []
+             */
+            limp?: number[];
+            /** Sample Age */
+            sample_age?: number | null;
+            /** Progress */
+            progress?: number | null;
+            /** Unattended */
+            unattended: boolean;
+            control: components["schemas"]["Control"];
+            queue: components["schemas"]["QueueStatus"];
+        };
+        /**
+         * FleetStatus
+         * @description All robots of the service at one moment, in the order of the configuration.
+         */
+        FleetStatus: {
+            /**
+             * Utc
+             * Format: date-time
+             */
+            utc: string;
+            /** Robots */
+            robots: components["schemas"]["FleetRobot"][];
+        };
+        /**
+         * FleetStopResult
+         * @description Result of a stop of all robots. It is `confirmed` only if every board has confirmed it, and the same holds for
+         *     `delivered`.
+         */
+        FleetStopResult: {
+            /** Delivered */
+            delivered: boolean;
+            /** Confirmed */
+            confirmed: boolean;
+            /** Tick */
+            tick?: number | null;
+            /** Seconds */
+            seconds: number;
+            /**
+             * Note
+             * @default
+             */
+            note?: string;
+            /**
+             * Detail
+             * @default
+             */
+            detail?: string;
+            /** Text */
+            text: string;
+            /** Robots */
+            robots: {
+                [key: string]: components["schemas"]["StopResult"];
+            };
         };
         /**
          * FoundValue
@@ -3291,24 +3565,6 @@ export interface components {
             high?: number | null;
             /** Speed */
             speed?: number | null;
-        };
-        /**
-         * JointResidual
-         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
-         *
-         *     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
-         */
-        JointResidual: {
-            /** Joint */
-            joint: number;
-            /** Values */
-            values: (number | null)[];
-            /** Noise */
-            noise: number;
-            /** Rms */
-            rms: number;
-            /** Against */
-            against: components["schemas"]["Correlation"][];
         };
         /**
          * KnownEffect
@@ -3887,6 +4143,28 @@ export interface components {
              * @default false
              */
             warning?: boolean;
+        };
+        /**
+         * NumberChange
+         * @description A number that two fits of one robot have determined. `low` to `high`: 95 % interval of the difference.
+         */
+        NumberChange: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /** Before */
+            before: number;
+            /** After */
+            after: number;
+            /** Difference */
+            difference: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+            /** Changed */
+            changed: boolean;
         };
         /**
          * OutputRequest
@@ -5499,7 +5777,7 @@ export interface components {
             /** Time */
             time: number[];
             /** Joints */
-            joints: components["schemas"]["JointResidual"][];
+            joints: components["schemas"]["model__validation__variation__JointResidual"][];
             /** Parameters */
             parameters: components["schemas"]["Variation"][];
             /**
@@ -6002,6 +6280,38 @@ export interface components {
              */
             whole_record?: boolean;
         };
+        /**
+         * JointResidual
+         * @description What a fit leaves of one joint: root mean square of simulated − measured, and of the measurement's own noise.
+         */
+        daq__contracts__service__fleet__JointResidual: {
+            /** Joint */
+            joint: number;
+            /** Unit */
+            unit: string;
+            /** After */
+            after: number;
+            /** Floor */
+            floor: number;
+        };
+        /**
+         * JointResidual
+         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
+         *
+         *     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
+         */
+        model__validation__variation__JointResidual: {
+            /** Joint */
+            joint: number;
+            /** Values */
+            values: (number | null)[];
+            /** Noise */
+            noise: number;
+            /** Rms */
+            rms: number;
+            /** Against */
+            against: components["schemas"]["Correlation"][];
+        };
     };
     responses: never;
     parameters: never;
@@ -6204,6 +6514,98 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_ServiceEvent_"];
+                };
+            };
+        };
+    };
+    get_fleet: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetStatus"];
+                };
+            };
+        };
+    };
+    stop_fleet: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The outcome of the stops: read `confirmed` */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetStopResult"];
+                };
+            };
+        };
+    };
+    submit_fleet_experiment: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description A request sent again with the same key is carried out once. */
+                "idempotency-key"?: string | null;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FleetExperimentRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetExperiments"];
+                };
+            };
+        };
+    };
+    compare_fleet: {
+        parameters: {
+            query?: {
+                /** @description Its name; else the most fitted one. */
+                experiment?: string | null;
+                /** @description Least time between the compared fits, in days. */
+                days?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetComparison"];
                 };
             };
         };

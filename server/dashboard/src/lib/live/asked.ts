@@ -40,7 +40,7 @@ export async function newTicket(): Promise<string> {
 }
 
 function askAll(): Asked {
-  const robot = firstRobot();
+  const robot = chosenRobot();
   const found: Asked = {
     robot,
     machine: robot.then(() => ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }))),
@@ -53,9 +53,14 @@ function askAll(): Asked {
   return found;
 }
 
-async function firstRobot(): Promise<string> {
-  const [first] = await ask(api.GET('/api/v1/robots'));
-  if (first === undefined) throw new Problem(404, 'not-found', 'this service has no robot');
-  showRobot(first.robot);
-  return first.robot;
+/** The robot that the address names (`?robot=left`), or the first one. */
+async function chosenRobot(): Promise<string> {
+  const all = (await ask(api.GET('/api/v1/robots'))).map((one) => one.robot);
+  const chosen = new URLSearchParams(location.search).get('robot') ?? all[0];
+  if (chosen === undefined) throw new Problem(404, 'not-found', 'this service has no robot');
+  if (!all.includes(chosen)) {
+    throw new Problem(404, 'not-found', `this service has no robot ${chosen}`, `it has ${all.join(', ')}`);
+  }
+  showRobot(chosen, all);
+  return chosen;
 }

@@ -5,7 +5,7 @@
  * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
  */
 
-import { here } from '../api/client';
+import { here, isFleet } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
 import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
 import type {
@@ -24,6 +24,7 @@ import type {
   SystemStatus,
 } from '../api/types';
 import { armNow } from '../stop/standing';
+import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, askSystem, newTicket } from './asked';
@@ -64,6 +65,8 @@ class Live {
   me = $state.raw<Me | null>(null);
   /** Whether a real arm may run while nobody says to be there. */
   isUnattended = $state(false);
+  /** Whether the service has other robots, too. */
+  isOfSeveral = $state(false);
   robot = $state.raw<RobotMessage | null>(null);
   link = $state.raw<LinkMessage | null>(null);
   queue = $state.raw<QueueStatus | null>(null);
@@ -148,6 +151,8 @@ class Live {
     const { robot, machine, me, system, ticket } = asked();
     try {
       await robot;
+      this.isOfSeveral = isFleet();
+      if (this.isOfSeveral) fleet.start();
       this.connection = this.connect(ticket);
       this.connection.start();
       const [known, caller] = await Promise.all([machine, me]);
@@ -169,7 +174,8 @@ class Live {
     try {
       const known = await system;
       stop.port = known.stop_port;
-      this.isUnattended = known.unattended;
+      // Of several arms some may: to say to be there does no harm then.
+      this.isUnattended = known.unattended && !isFleet();
     } catch {
       setTimeout(() => void this.learn(askSystem()), SYSTEM_AGAIN * 1000);
     }
@@ -294,6 +300,8 @@ class Live {
   private tellStop(): void {
     const at = seconds();
     const silence = this.clock.silence(at);
+    // With several arms, whoever looks at all of them follows the stop of another one, or of all.
+    if (isFleet() && stop.target !== here().robot) return;
     stop.heard(armNow(this.isOpen && silence !== null && silence < SILENT_AFTER, this.robot), at);
   }
 

@@ -1,6 +1,6 @@
 /** Stop, for the whole page: `stop.press()` from anywhere, `stop.words` tells what became of it, and if it still holds. */
 
-import { api, ask, here } from '../api/client';
+import { api, ask, here, isFleet } from '../api/client';
 import { currentToken } from '../api/token';
 import type { StopResult } from '../api/types';
 import { timeOfDay } from '../format';
@@ -19,18 +19,28 @@ class Stop {
   port: number | null = null;
   /** The last press. */
   call: StopCall | null = null;
+  /** The robot that the last press was for; empty for all. */
+  target = '';
   private followed = new StopStanding('none');
 
-  /** At once, and without a question. */
-  press(): void {
+  get isOfAll(): boolean {
+    return this.target === '';
+  }
+
+  /** At once, and without a question: for all arms of the service, unless one is named. */
+  press(robot = isFleet() ? '' : here().robot): void {
     this.call?.leave();
+    this.target = robot;
+    const address = robot === '' ? '/fleet/stop' : `/robots/${encodeURIComponent(robot)}/stop`;
+    const service = (): Promise<StopResult> => sendToService(robot);
+    const listener = (): Promise<StopResult> => sendToListener(this.port ?? 0, address);
     this.call = new StopCall({
-      doors: this.port === null ? [sendToService] : [sendToService, () => sendToListener(this.port ?? 0)],
+      doors: this.port === null ? [service] : [service, listener],
       after: (seconds, call) => {
         const timer = setTimeout(call, seconds * 1000);
         return () => clearTimeout(timer);
       },
-      told: (state) => this.tell(state),
+      told: (state) => this.tell(isFleet() && robot !== '' ? named(robot, state) : state),
     });
     this.call.begin();
   }
@@ -71,14 +81,20 @@ class Stop {
   }
 }
 
-function sendToService(): Promise<StopResult> {
-  return ask(api.POST('/api/v1/robots/{robot}/stop', { params: { path: here() } }));
+/** The same, saying which of several arms it is about. */
+function named(robot: string, state: StopState): StopState {
+  return 'text' in state ? { ...state, text: `${robot}: ${state.text}` } : state;
 }
 
-async function sendToListener(port: number): Promise<StopResult> {
+function sendToService(robot: string): Promise<StopResult> {
+  if (robot === '') return ask(api.POST('/api/v1/fleet/stop'));
+  return ask(api.POST('/api/v1/robots/{robot}/stop', { params: { path: { robot } } }));
+}
+
+async function sendToListener(port: number, path: string): Promise<StopResult> {
   const token = currentToken();
   const headers: HeadersInit = token === null ? {} : { Authorization: `Bearer ${token}` };
-  const address = `${location.protocol}//${location.hostname}:${port}/api/v1/robots/${here().robot}/stop`;
+  const address = `${location.protocol}//${location.hostname}:${port}/api/v1${path}`;
   const answer = await fetch(address, { method: 'POST', headers });
   if (!answer.ok) throw new Error(`the stop listener answered ${answer.status}`);
   return (await answer.json()) as StopResult;

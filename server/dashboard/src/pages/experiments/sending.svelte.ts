@@ -1,6 +1,6 @@
 /** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
 
-import { api, ask, asProblem, here, type ExperimentSpec, type Problem } from '../../lib/api';
+import { api, ask, asProblem, here, newKey, type ExperimentSpec, type Problem } from '../../lib/api';
 import { dayAndTime } from '../../lib/format';
 import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
 import { interval, localMoment, momentOf, UNITS, type Unit } from '../../lib/trajectory/when';
@@ -90,11 +90,4 @@ export class Sending {
     }
     return problems;
   }
-}
-
-/** Not `randomUUID`: that one exists only on pages that came over TLS or from this computer. */
-function newKey(): string {
-  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) =>
-    byte.toString(16).padStart(2, '0'),
-  ).join('');
 }

@@ -1,0 +1,100 @@
+"""The workers of all robots' jobs: each lane has so many places, which the robots take in turn."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from daq.executors import Workers, open_workers
+from daq.executors.address import LOCAL
+from daq.executors.local import LocalWorkers
+from server.jobs.lanes import BATCH_LANE_WORKERS, LANES, SHORT_LANE_WORKERS, Lane
+from server.jobs.yielding import begin_worker
+
+SCHEDULER_PATIENCE = 5.0
+"""Time (s) within which a scheduler must answer, and have a worker; no other job is begun or ended meanwhile."""
+Wake = Callable[[], None]
+
+
+def job_workers(url: str, count: int) -> Workers:
+    """Opens an executor for jobs; `count` is the number of processes where it is this computer. Raises SpecError,
+    ReachError, OtherVersionError."""
+    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker, SCHEDULER_PATIENCE)
+
+
+def worker_processes(count: int) -> LocalWorkers:
+    """Makes the executor of this computer, whose processes give way to everything else."""
+    return LocalWorkers(count, begin_worker)
+
+
+class SharedWorkers:
+    """Executors of the lanes, opened when they are first needed. Safe to use from any thread.
+
+    A robot is known by the function that wakes its job service. One that found no place is the next to get one, before
+    a robot that has had one since: a thousand jobs of one robot delay another's by the length of one.
+    """
+
+    def __init__(self, url: str, at_once: int, make_executor: Callable[[str, int], Workers] = job_workers) -> None:
+        self._url = url
+        self._make_executor = make_executor
+        self._places: dict[Lane, int] = {"short": SHORT_LANE_WORKERS, "long": at_once, "batch": BATCH_LANE_WORKERS}
+        self._lock = threading.Lock()
+        self._taken: dict[Lane, int] = dict.fromkeys(LANES, 0)
+        self._waiting: dict[Lane, list[Wake]] = {lane: [] for lane in LANES}
+        self._opening: dict[Lane, threading.Lock] = {lane: threading.Lock() for lane in LANES}
+        self._executors: dict[Lane, Workers] = {}
+
+    def take_place(self, lane: Lane, robot: Wake) -> bool:
+        """Takes a place for a job. If it is not this robot's turn, returns False; `robot` is called when it may be."""
+        with self._lock:
+            waiting = self._waiting[lane]
+            if self._taken[lane] < self._places[lane] and (not waiting or waiting[0] == robot):
+                self._taken[lane] += 1
+                del waiting[:1]
+                return True
+            if robot not in waiting:
+                waiting.append(robot)
+            return False
+
+    def give_place_back(self, lane: Lane) -> None:
+        """Gives a job's place to the robot that waits for one."""
+        with self._lock:
+            self._taken[lane] -= 1
+            following = self._waiting[lane][:1]
+        for wake in following:
+            wake()
+
+    def wait_no_more(self, lane: Lane, robot: Wake) -> None:
+        """Gives up the robot's turn, since it has no job for it any more."""
+        with self._lock:
+            waiting = self._waiting[lane]
+            was_first = waiting[:1] == [robot]
+            if robot in waiting:
+                waiting.remove(robot)
+            following = waiting[:1] if was_first else []
+        for wake in following:
+            wake()
+
+    def executor(self, lane: Lane) -> Workers:
+        """Returns the executor of a lane. Raises what opening it raises."""
+        with self._opening[lane]:  # a scheduler that does not answer holds up no other lane
+            found = self._executors.get(lane)
+            if found is None:
+                url = self._url if lane == "long" else LOCAL
+                found = self._executors[lane] = self._make_executor(url, self._places[lane])
+            return found
+
+    def give_up(self, lane: Lane, lost: Workers | None) -> None:
+        """Ends an executor that a job was lost with, unless another has taken its place already."""
+        with self._opening[lane]:
+            if lost is None or self._executors.get(lane) is not lost:
+                return
+            del self._executors[lane]
+        # A scheduler that is gone is not waited for.
+        threading.Thread(target=lost.abandon, name="executor-end", daemon=True).start()
+
+    def abandon(self) -> None:
+        """Ends all executors at once."""
+        for executor in list(self._executors.values()):
+            executor.abandon()
+        self._executors.clear()

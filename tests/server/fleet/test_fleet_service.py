@@ -1,0 +1,132 @@
+"""Several robots in one service: each has its own queue, stop, lease, traces and stream."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from daq.client import Client
+from daq.contracts.errors import SpecError
+from daq.traces.reader import read_trace
+from tests.server.fleet_service import FleetService, fleet_service
+
+pytestmark = pytest.mark.slow
+
+RAMP = {"spec": {"trajectory": {"kind": "ramp", "amplitude": 0.1}, "joints": [1, 2]}}
+LONG = {"spec": {"trajectory": {"kind": "sine", "duration": 60.0}, "joints": [1]}}
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
+    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=3)}
+    with fleet_service(tmp_path_factory.mktemp("fleet"), ports) as service:
+        for name in ports:  # here, so that no mock is left running by a test
+            service.post(f"robots/{name}/connect")
+        yield service
+        for name in ports:
+            service.post(f"robots/{name}/disconnect")
+
+
+@pytest.fixture
+def fleet(running: FleetService) -> FleetService:
+    """The same, with both arms connected, not stopped, and open queues."""
+    for name in ("left", "right"):
+        for one in running.get(f"robots/{name}/queue/experiments"):
+            running.post(f"robots/{name}/experiments/{one['id']}/cancel")
+        running.post(f"robots/{name}/reset", {})
+        running.post(f"robots/{name}/queue/resume", {})
+    return running
+
+
+def by_name(fleet: FleetService) -> dict[str, Any]:
+    return {one["robot"]: one for one in fleet.get("fleet")["robots"]}
+
+
+def test_the_same_experiment_runs_on_both_and_each_trace_names_its_robot(fleet: FleetService) -> None:
+    made = fleet.post("fleet/experiments", {"request": RAMP})["experiments"]
+    assert [one["robot"] for one in made] == ["left", "right"]
+    for one in made:
+        ended = fleet.end_of(one["robot"], one["id"])
+        assert ended["state"] == "done", ended
+        files = list((fleet.folder / "traces" / one["robot"]).glob("*.mcap"))
+        names = {trace.record.trace_id: trace.record.robot for trace in map(read_trace, files)}
+        assert names[ended["trace"]] == one["robot"]
+        listed = fleet.get(f"robots/{one['robot']}/traces")["items"]
+        assert ended["trace"] in {entry["id"] for entry in listed}
+        other = "right" if one["robot"] == "left" else "left"
+        assert fleet.client.get(f"robots/{other}/traces/{ended['trace']}").status_code == 404
+
+
+def test_a_stop_of_one_leaves_the_other_alone(fleet: FleetService) -> None:
+    waiting = fleet.post("robots/right/experiments", {**RAMP, "at": "2100-01-01T00:00:00Z"})
+    stopped = fleet.post("robots/left/stop")
+    assert stopped["confirmed"], stopped
+    found = by_name(fleet)
+    assert found["left"]["arm"] == "stopped"
+    assert found["left"]["queue"]["paused"]
+    assert (found["right"]["arm"], found["right"]["queue"]["paused"]) == ("idle", False)
+    assert found["right"]["queue"]["queued"] == 1
+    fleet.post(f"robots/right/experiments/{waiting['id']}/cancel")
+
+
+def test_a_stop_of_all_stops_every_arm_at_both_doors(fleet: FleetService) -> None:
+    with Client(fleet.url) as client:
+        found = client.stop()
+        assert found.confirmed, found
+        # The listener may have been quicker than the service, which hears of the stops then.
+        while any(one.arm != "stopped" or not one.queue.paused for one in client.fleet().robots):
+            assert fleet.process.poll() is None
+    port = fleet.get("system")["stop_port"]
+    answer = fleet.client.post(f"http://127.0.0.1:{port}/api/v1/fleet/stop")
+    assert answer.json()["confirmed"], answer.text
+    assert set(answer.json()["robots"]) == {"left", "right"}
+
+
+def test_a_lease_of_one_arm_that_lapses_pauses_only_its_queue(fleet: FleetService) -> None:
+    fleet.post("robots/left/experiments", {**RAMP, "at": "2100-01-01T00:00:00Z"})
+    lease = fleet.post("robots/left/control", {})["lease"]
+    refused = fleet.client.post("robots/right/jog", json={"velocities": {"1": 0.1}}, headers={"Control-Lease": lease})
+    assert refused.status_code >= 400
+    while not by_name(fleet)["left"]["queue"]["paused"]:  # no heartbeat is sent
+        assert fleet.process.poll() is None
+    found = by_name(fleet)
+    assert "lapsed" in found["left"]["queue"]["reason"]
+    assert not found["right"]["queue"]["paused"]
+
+
+def test_an_experiment_that_one_arm_cannot_run_is_queued_on_none(fleet: FleetService) -> None:
+    far = {"spec": {"trajectory": {"kind": "ramp", "amplitude": 3.0}, "joints": [1]}}
+    answer = fleet.client.post("fleet/experiments", json={"request": far})
+    assert answer.status_code == 422
+    assert answer.json()["detail"].startswith("robot left: ")
+    assert "nothing was queued" in answer.json()["detail"]
+    assert all(one["queue"]["queued"] == 0 for one in fleet.get("fleet")["robots"])
+
+
+@pytest.mark.parametrize(
+    ("robots", "status", "said"),
+    [(["left", "middle"], 404, "middle"), (["left", "left"], 422, "named twice"), ([], 422, "robots")],
+)
+def test_a_wrong_choice_of_robots_is_one_clear_line(
+    fleet: FleetService, robots: list[str], status: int, said: str
+) -> None:
+    answer = fleet.client.post("fleet/experiments", json={"request": RAMP, "robots": robots})
+    assert answer.status_code == status
+    assert said in answer.text
+
+
+def test_a_client_that_names_no_robot_is_told_the_names(fleet: FleetService) -> None:
+    with Client(fleet.url) as client:
+        with pytest.raises(SpecError, match="left, right"):
+            client.robot()
+        assert client.robot("right").status().robot == "right"
+
+
+def test_metrics_tell_the_robots_apart(fleet: FleetService) -> None:
+    told = fleet.client.get(f"{fleet.url}/metrics").text
+    for name in ("left", "right"):
+        assert f'daq_connected{{robot="{name}"}} 1.0' in told
+        assert f'daq_samples_total{{robot="{name}"}}' in told
+        assert f'daq_disk_free_bytes{{folder="traces/{name}"}}' in told

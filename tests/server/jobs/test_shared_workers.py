@@ -1,0 +1,90 @@
+"""The places of workers, which the robots of a service take in turn."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from typing import Any
+
+from daq.executors import Workers
+from server.jobs.shared_workers import SharedWorkers
+
+
+class Robot:
+    """A robot's job service: how often it was woken."""
+
+    def __init__(self) -> None:
+        self.woken = 0
+
+    def wake(self) -> None:
+        self.woken += 1
+
+
+class Idle(Workers):
+    """An executor that only ends."""
+
+    ended = False
+
+    def submit(self, _function: Any, /, *args: Any, **_named: Any) -> Future[Any]:
+        raise AssertionError(args)
+
+    def count(self) -> int:
+        return 1
+
+    def abandon(self) -> None:
+        self.ended = True
+
+
+def test_robots_take_turns_however_many_jobs_one_of_them_has() -> None:
+    workers = SharedWorkers("local://", 1)
+    many, few = Robot(), Robot()
+    assert workers.take_place("long", many.wake)
+    assert not workers.take_place("long", many.wake)  # it has a second one
+    assert not workers.take_place("long", few.wake)
+    workers.give_place_back("long")
+    assert (many.woken, few.woken) == (1, 0)
+    assert not workers.take_place("long", few.wake)  # it is not its turn
+    assert workers.take_place("long", many.wake)
+    assert not workers.take_place("long", many.wake)  # and a third
+    workers.give_place_back("long")
+    assert few.woken == 1
+    assert not workers.take_place("long", many.wake)
+    assert workers.take_place("long", few.wake)
+
+
+def test_a_turn_that_is_given_up_passes_to_the_next() -> None:
+    workers = SharedWorkers("local://", 1)
+    first, second, third = Robot(), Robot(), Robot()
+    assert workers.take_place("short", first.wake)
+    assert not workers.take_place("short", second.wake)
+    assert not workers.take_place("short", third.wake)
+    workers.wait_no_more("short", second.wake)  # its job was cancelled
+    assert third.woken == 1
+    workers.give_place_back("short")
+    assert workers.take_place("short", third.wake)
+
+
+def test_lanes_do_not_wait_for_each_other() -> None:
+    workers = SharedWorkers("local://", 2)
+    robot = Robot()
+    assert [workers.take_place("long", robot.wake) for _ in range(3)] == [True, True, False]
+    assert workers.take_place("short", robot.wake)
+    assert workers.take_place("batch", robot.wake)
+
+
+def test_an_executor_is_opened_once_and_given_up_once() -> None:
+    opened: list[Idle] = []
+
+    def make(_url: str, _count: int) -> Workers:
+        opened.append(Idle())
+        return opened[-1]
+
+    workers = SharedWorkers("local://", 1, make)
+    first = workers.executor("long")
+    assert workers.executor("long") is first
+    workers.give_up("long", first)
+    second = workers.executor("long")
+    assert second is not first
+    workers.give_up("long", first)  # another robot's job was lost with it, too
+    assert workers.executor("long") is second
+    workers.abandon()
+    assert opened[1].ended
