@@ -1,7 +1,7 @@
 """A progress bar of rich, in a terminal or a notebook, that is gone when the work ends, however it ends.
 
-rich is what the commands print with. In a notebook it would need ipywidgets, and warn where they are missing; there, the
-bar is drawn as HTML, and IPython, in which every notebook runs, replaces it in place.
+rich is what the commands print with. In a notebook it would need ipywidgets, and warn where they are missing; there,
+the bar is drawn as HTML, and IPython, in which every notebook runs, replaces it in place.
 """
 
 from __future__ import annotations
