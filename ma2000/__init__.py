@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from ma2000.files import write_trace as write_trace
     from ma2000.fitting import fit as fit
     from ma2000.fitting import fit_torques as fit_torques
+    from ma2000.fitting import profile as profile
     from ma2000.local_service import LocalService as LocalService
     from ma2000.pictures import plot as plot
     from ma2000.robot_files import save_machine as save_machine
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
     from model.feedforward.tracking import Followed as Followed
     from model.fitting.options import FitOptions as FitOptions
+    from model.fitting.profile import Profile as Profile
     from model.fitting.result import FitResult as FitResult
     from model.inverse_dynamics.fit import TorqueFit as TorqueFit
     from model.machine_model.model import Model as Model
@@ -99,6 +101,7 @@ _HOME = {
     "Machine": "daq.contracts.machine",
     "Model": "model.machine_model.model",
     "PRESETS": "daq.trajectories.presets",
+    "Profile": "model.fitting.profile",
     "Reproduction": "model.thesis.reproduction",
     "Run": "ma2000.running",
     "RunError": "ma2000.running",
@@ -122,6 +125,7 @@ _HOME = {
     "load_model": "model.machine_model.model_file",
     "machine_from_urdf": "model.robot_files.machine_of_arm",
     "plot": "ma2000.pictures",
+    "profile": "ma2000.fitting",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
     "reproduce_thesis": "ma2000.thesis",

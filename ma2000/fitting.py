@@ -8,7 +8,9 @@ from daq.contracts.progress import Cancel
 from daq.contracts.trace import Trace
 from ma2000.progress import Shown, told
 from model.fitting import fit as motion
+from model.fitting import profile as profiles
 from model.fitting.options import FitOptions
+from model.fitting.profile import Profile
 from model.fitting.result import FitResult
 from model.inverse_dynamics import fit as torques
 from model.inverse_dynamics.fit import TorqueFit
@@ -48,3 +50,23 @@ def fit_torques(
     """
     with told(progress, "fitting torques") as tell:
         return torques.fit_torques(model, traces, holdout, options, progress=tell, cancel=cancel)
+
+
+def profile(
+    fitted: FitResult,
+    traces: Sequence[Trace],
+    name: str,
+    *,
+    progress: Shown = True,
+    cancel: Cancel | None = None,
+) -> Profile:
+    """The profile likelihood of a fitted parameter: how much worse the fit becomes when it is moved, and all others are
+    fitted again. It shows what the data bound on one side alone, or not at all.
+
+    Args:
+        traces: those that were fitted to.
+
+    Raises SpecError for a parameter that was not fitted, or other traces; CancelledError when asked to end.
+    """
+    with told(progress, name) as tell:
+        return profiles.profile(fitted, traces, name, tell, cancel)
