@@ -10,7 +10,7 @@ import io
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -80,7 +80,7 @@ def _notebook_place() -> Iterator[Callable[[str], None]]:
     """A place in the output of a notebook's cell, which is made when something is first shown in it."""
     from IPython.display import DisplayHandle
 
-    handle = DisplayHandle()
+    handle: Any = cast("Any", DisplayHandle)()  # IPython states no types here
     begun = False
 
     def show(html: str) -> None:

@@ -7,6 +7,7 @@ less than 3.84, the quantile of χ² with one degree of freedom (Wilks 1938; Rau
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -174,11 +175,11 @@ def _end(
 
     Returns where it has risen by `rise`; None where it does not as far as the bound, or as POINTS steps reach.
     """
-    (inside, others), step = begin, np.copysign(size, bound - begin[0])
+    (inside, others), step = begin, math.copysign(size, bound - begin[0])
     for number in range(POINTS):
         if inside == bound:
             return None
-        value = float(np.clip(inside + step, *sorted((inside, bound))))
+        value = min(inside + step, bound) if step > 0 else max(inside + step, bound)
         points[value], others = risen(value, others)
         tell(number)
         if points[value] >= rise:

@@ -72,11 +72,11 @@ def test_a_pipe_or_a_log_gets_nothing_even_where_colours_are_forced(forced: bool
 
 def test_a_notebook_is_shown_few_pictures_and_in_the_end_none() -> None:
     pages: list[str] = []
-    moments = count(0.0, SHOWN_EVERY / 4)
+    moments = count(0.0, 0.6 * SHOWN_EVERY)
     with in_notebook("fitting", pages.append, lambda: next(moments)) as told:
         for step in range(9):
             told(step / 8, f"<round {step}>")
-    assert len(pages) == 4
+    assert len(pages) == 6, "every second one, and nothing at the end"
     assert "&lt;round 0&gt;" in pages[0]
     assert "&lt;round 8&gt;" in pages[-2]
     assert pages[-1] == ""

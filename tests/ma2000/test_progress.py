@@ -61,7 +61,11 @@ def test_false_is_silence_and_a_function_is_told_itself() -> None:
 
 def test_a_program_whose_output_is_a_log_says_nothing(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", f"import ma2000; {CALL})"],
+        [
+            sys.executable,
+            "-c",
+            "from ma2000.progress import told\nwith told(True, 'fitting') as tell: tell(0.5, 'half')",
+        ],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": str(ROOT), "FORCE_COLOR": "1"},
         capture_output=True,
