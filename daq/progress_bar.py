@@ -55,7 +55,9 @@ def in_notebook(what: str, show: Callable[[str], None], clock: Callable[[], floa
     """Shows the bar as HTML by `show`, at most every SHOWN_EVERY s, and as nothing at the end."""
     from rich.console import Console
 
-    page = Console(file=io.StringIO(), record=True, width=WIDTH, force_terminal=True, color_system="truecolor")
+    page = Console(
+        file=io.StringIO(), record=True, width=WIDTH, force_terminal=True, force_jupyter=False, color_system="truecolor"
+    )
     bar = _bar(page)
     tell = _teller(bar, what)
     last = float("-inf")

@@ -49,7 +49,9 @@ class LocalService:
         LocalServiceError when it does not start.
         """
         if not isinstance(parse_port_url(port), MockPort):
-            raise SpecError(f"port {port!r}: a program's own service runs on mock:// alone; for an arm, `daq serve`")
+            raise SpecError(
+                f"port {port!r}: a program's own service runs on mock:// alone; for an arm, start `daq serve`"
+            )
         self.folder = Path(folder)
         self._process = _started(self.folder, port)
         assert self._process.stdout is not None

@@ -64,7 +64,7 @@ def test_a_program_whose_output_is_a_log_says_nothing(tmp_path: Path) -> None:
         [
             sys.executable,
             "-c",
-            "from ma2000.progress import told\nwith told(True, 'fitting') as tell: tell(0.5, 'half')",
+            "from ma2000.progress import told\nwith told(True, 'fit') as tell: tell(0.5, 'half')",
         ],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": str(ROOT), "FORCE_COLOR": "1"},
