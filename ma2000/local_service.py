@@ -50,7 +50,7 @@ class LocalService:
         """
         if not isinstance(parse_port_url(port), MockPort):
             raise SpecError(
-                f"port {port!r}: a program's own service runs on mock:// alone; for an arm, start `daq serve`"
+                f"port {port!r}: a program's own service runs on mock:// alone; for an arm, use `daq serve`"
             )
         self.folder = Path(folder)
         self._process = _started(self.folder, port)

@@ -18,7 +18,7 @@ FIGURES = {
     "reading-traces": (1, r"the same table: True"),
     "fit-and-identifiability": (1, r"not determined: together joint2\.motor\.back_emf_constant"),
     "design-of-experiments": (1, r"experiment 2: .* nats of information"),
-    "hidden-effect": (1, r"named\n"),
+    "hidden-effect": (1, r"^named\n"),
     "thesis-chapters-6-and-7": (2, r"viscous \+ Coulomb +0\.9313 +0\.9295 +1\.3270"),
     "real-rig": (0, r"The records are not here: double_pendulum has 0 of 10"),
     "day-with-the-service": (1, r"tones: done, trace [0-9a-f]{12}"),
@@ -40,6 +40,11 @@ def test_a_notebook_runs_and_shows_figures_and_no_noise(name: str, tmp_path: Pat
         assert len(output.get("text", "")) <= LONGEST_OUTPUT
         assert len(output.get("data", {}).get("text/plain", "")) <= LONGEST_OUTPUT
         assert "Warning" not in output.get("text", "")
+        shown = output.get("data", {})
+        if "image/png" not in shown:
+            assert not re.match(r"<matplotlib|Text\(|\[Text|<.*Figure", shown.get("text/plain", "")), shown[
+                "text/plain"
+            ]
 
 
 @pytest.mark.slow
