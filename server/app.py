@@ -29,6 +29,7 @@ from server.api import (
 from server.api.state_metrics import StateMetrics
 from server.page import page_router
 from server.services import Services
+from server.site import serve_site, site_index
 
 API = "/api/v1"
 DESCRIPTION = """Experiments on a robot arm are queued, run one at a time, recorded and kept.
@@ -78,6 +79,7 @@ def bare_app(services: Services | None) -> FastAPI:
     app.include_router(api)
     app.include_router(system.plain)
     app.include_router(page_router())
+    serve_site(app, site_index())
     description.install(app)
     description.serve(app, f"{API}/openapi.json")
     return app

@@ -1,0 +1,113 @@
+"""The page of the public Python interface, and the check that it is whole."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from pydantic import BaseModel
+from sphinx import addnodes
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+from sphinx.util import logging
+
+import ma2000
+
+GUIDE = Path(__file__).parents[1] / "python.md"
+BEGIN = """# The public Python interface
+
+Made from the docstrings. [From Python](../python.md) shows programs that use it, and says what public means.
+"""
+HOME: dict[str, str] = ma2000._HOME
+log = logging.getLogger(__name__)
+
+
+def page() -> str:
+    """Every public name below the line of docs/python.md that says what it is."""
+    rows = re.findall(
+        r"^\| (`.+`) \| (.+) \|$", GUIDE.read_text("utf-8").partition("## The public names")[2], re.MULTILINE
+    )
+    parts = [BEGIN]
+    for names, meaning in rows:
+        title = re.sub(r"\s*\(?\[([^\]]*)\]\([^)]*\)\)?", "", meaning).strip()
+        parts.append(f"## {title[0].upper()}{title[1:]}\n")
+        parts += [_entry(name) for name in re.findall(r"`(\w+)`", names)]
+    return "\n".join(parts)
+
+
+def _entry(name: str) -> str:
+    if name == "__version__":
+        lines = [".. py:data:: ma2000.__version__", "   :type: str", "", "   The version of the package."]
+    elif name == "PRESETS":
+        lines = [".. py:data:: ma2000.PRESETS", "   :type: dict[str, ExperimentSpec]", ""]
+        lines += ["   The experiments that have a name, by it: `run` and `Client` take the name alone."]
+    elif inspect.isclass(found := getattr(ma2000, name)):
+        lines = [f".. autoclass:: ma2000.{name}", "   :members:", "   :undoc-members:"]
+        hidden = [one for one in ("model_config", *_of_pydantic(found)) if one in vars(found)]
+        lines += [f"   :exclude-members: {', '.join(hidden)}"] if hidden else []
+    else:
+        lines = [f".. autofunction:: ma2000.{name}"]
+    return "\n".join(["```{eval-rst}", *lines, "```", ""])
+
+
+def _of_pydantic(kind: type) -> list[str]:
+    return [one for one in dir(BaseModel) if not one.startswith("__")] if issubclass(kind, BaseModel) else []
+
+
+def undocumented(name: str) -> list[str]:
+    """What of a public name has no docstring: itself, its methods and its properties."""
+    found = getattr(ma2000, name)
+    if name in ("PRESETS", "__version__"):
+        return []
+    missing = [] if (found.__doc__ or "").strip() else [name]
+    for key, member in vars(found).items() if inspect.isclass(found) else ():
+        function = getattr(member, "fget", None) or getattr(member, "__func__", member)
+        if key.startswith("_") or not inspect.isroutine(function):
+            continue
+        if not (function.__doc__ or "").strip():
+            missing.append(f"{name}.{key}")
+    return missing
+
+
+def _check(app: Sphinx, env: BuildEnvironment) -> None:
+    """Warns of public names that the reference lacks, or that say nothing of themselves."""
+    del app
+    known = env.domains.python_domain.objects
+    for name in ma2000.__all__:
+        if f"ma2000.{name}" not in known:
+            log.warning("ma2000.%s is public and not in the reference", name)
+        for missing in undocumented(name):
+            log.warning("ma2000.%s is public and has no docstring", missing)
+
+
+def _signature(
+    app: Sphinx, what: str, name: str, found: Any, options: Any, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None] | None:
+    """A record of many fields lists them below, and not in its signature a second time."""
+    del app, name, options, returned
+    if what == "class" and issubclass(found, BaseModel):
+        return "", None
+    return None if signature is None else (signature, None) if what == "class" else None
+
+
+def _public(app: Sphinx, env: BuildEnvironment, node: addnodes.pending_xref, text: nodes.Element) -> Any:
+    """Leads a type that is named by its place in the code to its public name."""
+    target = node.get("reftarget", "")
+    public = {f"{module}.{name}": name for name, module in HOME.items()}
+    name = public.get(target, target if target in HOME else "")
+    if not name or node.get("refdomain") != "py":
+        return None
+    return env.domains.python_domain.resolve_xref(
+        env, node["refdoc"], app.builder, "class" if name[0].isupper() else "func", f"ma2000.{name}", node, text
+    )
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Registers the handlers."""
+    app.connect("env-check-consistency", _check)
+    app.connect("missing-reference", _public)
+    app.connect("autodoc-process-signature", _signature)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
