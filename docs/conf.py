@@ -25,28 +25,21 @@ extensions = [
 ]
 exclude_patterns = ["_site", "extensions", "**/.ipynb_checkpoints"]
 nitpicky = True
-nitpick_ignore_regex = [
-    # Types of other projects: their documents lie on the network.
-    (
-        "py:.*",
-        r"(collections|concurrent|datetime|enum|matplotlib|np|numpy|pandas|pathlib|pydantic|threading|typing|xarray)\..*",
-    ),
-    ("py:.*", r"(Any|Callable|Iterable|Iterator|Literal|Mapping|Path|Self|Sequence|datetime|optional|NDArray|ndarray)"),
-    # Types that public signatures mention, and that are internal: see docs/python.md for what is public.
-    ("py:.*", r"(daq|firmware_protocol|ma2000|model|server)\.[a-z].*"),
-]
 
 myst_enable_extensions = ["deflist", "dollarmath", "html_image"]
 myst_heading_anchors = 5
+highlight_language = "text"
+suppress_warnings = ["misc.highlighting_failure"]  # an ellipsis in C or JSON
 smartquotes = False  # they would make one dash of the two of an option
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True  # a default by its name in the source
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 add_module_names = False
 default_role = "code"  # one pair of backticks in a docstring is code, as in Markdown
-napoleon_use_ivar = True
+napoleon_google_docstring = napoleon_numpy_docstring = False  # extensions/public_api.py asks it where it applies
 
 nb_execution_mode = "cache"  # `make docs` runs a notebook again only when it has changed
 nb_execution_cache_path = str(DOCS.parent / "build" / "docs" / "notebooks")

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from docutils import nodes
 from sphinx.application import Sphinx
 
 from . import command_line, configuration, public_api, rest
@@ -28,10 +29,12 @@ BROUGHT = {
     "reference/changes": "CHANGELOG.md",
     "explanation/contributing": "CONTRIBUTING.md",
 }
+LONGEST_WHOLE = 28
+"""Most characters of code that a phone shows in one line beside a bullet."""
 BELOW = {"decisions/README": "0*", "trial": "trial/*"}
 """Pages that have others below them, by pattern."""
-LINK = re.compile(r"(\]\(<?)([^)\s>]+)")
-CODE = re.compile(r"(```.*?^\s*```|`[^`\n]+`)", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"(\[[^\]]*)(\]\(<?)([^)\s>]+)(>?\))")
+CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)
 
 
 def brought(docname: str, text: str) -> str:
@@ -42,15 +45,16 @@ def brought(docname: str, text: str) -> str:
     home[(ROOT / "README.md").resolve()] = "index"
 
     def link(found: re.Match[str]) -> str:
-        target, hash_sign, anchor = found[2].partition("#")
+        text, between, whole, end = found.groups()
+        target, hash_sign, anchor = whole.partition("#")
         if not target or re.match(r"[a-z][a-z+.-]*:", target):
             return found[0]
         path = (origin / target).resolve()
         if path.is_dir():
-            path /= "README.md"
+            return f"`{path.relative_to(ROOT)}/`" if text.startswith("[`") else text[1:]
         if path in home:
             path = ROOT / "docs" / f"{home[path]}.md"
-        return f"{found[1]}{os.path.relpath(path, place)}{hash_sign}{anchor}"
+        return f"{text}{between}{os.path.relpath(path, place)}{hash_sign}{anchor}{end}"
 
     parts = CODE.split(text)
     return "".join(part if number % 2 else LINK.sub(link, part) for number, part in enumerate(parts))
@@ -69,6 +73,14 @@ def _read(app: Sphinx, docname: str, source: list[str]) -> None:
         source[0] += f"\n\n```{{toctree}}\n:hidden:\n:glob:\n\n{BELOW[docname]}\n```\n"
 
 
+def _short_code(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Marks code that is to stay in one line: an option would be broken after its dashes."""
+    del app, docname
+    for code in doctree.findall(nodes.literal):
+        if len(code.astext()) <= LONGEST_WHOLE and " " not in code.astext():
+            code["classes"].append("whole")
+
+
 def _changed(app: Sphinx, *_: object) -> list[str]:
     """Pages whose source is not the file in docs/ are read at every build."""
     return [name for name in (*GENERATED, *BROUGHT) if name in app.env.found_docs]
@@ -85,4 +97,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", _outputs, priority=900)
     app.connect("source-read", _read)
     app.connect("env-get-outdated", _changed)
+    app.connect("doctree-resolved", _short_code)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

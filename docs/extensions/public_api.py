@@ -5,13 +5,14 @@ from __future__ import annotations
 import inspect
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from docutils import nodes
 from pydantic import BaseModel
 from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
+from sphinx.ext.napoleon import GoogleDocstring
 from sphinx.util import logging
 
 import ma2000
@@ -22,6 +23,7 @@ BEGIN = """# The public Python interface
 Made from the docstrings. [From Python](../python.md) shows programs that use it, and says what public means.
 """
 HOME: dict[str, str] = ma2000._HOME
+PAGE = "reference/python-api"
 log = logging.getLogger(__name__)
 
 
@@ -93,13 +95,57 @@ def _signature(
     return None if signature is None else (signature, None) if what == "class" else None
 
 
+def _docstring(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Sections such as `Raises:`, and lines that each tell of one field, become lists. The docstring of a field has
+    neither: its first colon is prose."""
+    if what in ("class", "exception", "function", "method"):
+        fields = get_fields(found) if inspect.isclass(found) else set()
+        lines[:] = GoogleDocstring(as_list(lines, fields), app.config, app, what, name, found, options).lines()
+
+
+def get_fields(kind: type) -> set[str]:
+    """Names of the fields of a class."""
+    return {name for one in kind.__mro__ for name in getattr(one, "__annotations__", {})}
+
+
+def as_list(lines: list[str], fields: set[str]) -> list[str]:
+    """Lines of a docstring, in which `field: text`, with what is indented below it, has become an item of a list."""
+    found: list[str] = []
+    inside = False
+    for line in lines:
+        names, colon, text = line.partition(":")
+        if colon and names and {name.strip() for name in names.split(",")} <= fields:
+            found += [] if inside else [""]
+            found.append(f"* ``{names}``: {text.strip()}")
+            inside = True
+        elif inside and line.startswith(" "):
+            found.append(f"  {line.strip()}")
+        else:
+            inside = False
+            found.append(line)
+    return found
+
+
+def _plain_types(app: Sphinx) -> None:
+    """Takes from the types of fields what only validation reads (`Annotated`), so that they can be read."""
+    del app
+    for name in HOME:
+        kind = getattr(ma2000, name)
+        if inspect.isclass(kind) and "__annotations__" in vars(kind):
+            hints = get_type_hints(kind)
+            kind.__annotations__ = {field: hints[field] for field in kind.__annotations__}
+
+
 def _public(app: Sphinx, env: BuildEnvironment, node: addnodes.pending_xref, text: nodes.Element) -> Any:
-    """Leads a type that is named by its place in the code to its public name."""
+    """Leads a type that is named by its place in the code to its public name. A type that is not public, or another
+    project's, stays text: only signatures name such types."""
+    if node.get("refdomain") != "py":
+        return None
     target = node.get("reftarget", "")
     public = {f"{module}.{name}": name for name, module in HOME.items()}
     name = public.get(target, target if target in HOME else "")
-    if not name or node.get("refdomain") != "py":
-        return None
+    if not name:
+        return text if node["refdoc"] == PAGE else None
     return env.domains.python_domain.resolve_xref(
         env, node["refdoc"], app.builder, "class" if name[0].isupper() else "func", f"ma2000.{name}", node, text
     )
@@ -107,7 +153,9 @@ def _public(app: Sphinx, env: BuildEnvironment, node: addnodes.pending_xref, tex
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Registers the handlers."""
+    app.connect("builder-inited", _plain_types)
     app.connect("env-check-consistency", _check)
     app.connect("missing-reference", _public)
     app.connect("autodoc-process-signature", _signature)
+    app.connect("autodoc-process-docstring", _docstring)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
