@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from sphinx.application import Sphinx
-from sphinx.environment import BuildEnvironment
-from sphinx.util import logging
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+    from sphinx.environment import BuildEnvironment
 
 DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
@@ -29,7 +30,6 @@ NOT_RUN: Mapping[tuple[str, str], str] = {
     ("thesis.md", "python"): "takes minutes; tests/model/thesis/test_page.py makes the same calls",
 }
 """Why a page's blocks of a language are not run. That what they import exists is checked all the same."""
-log = logging.getLogger(__name__)
 
 
 def blocks(docs: Path = DOCS) -> Iterator[tuple[str, str, str]]:
@@ -58,9 +58,11 @@ def wrong(docs: Path = DOCS) -> list[str]:
 
 
 def _check(app: Sphinx, env: BuildEnvironment) -> None:
+    from sphinx.util import logging  # not above: the tests of the repository read these tables without Sphinx
+
     del app, env
     for line in wrong():
-        log.warning(line)
+        logging.getLogger(__name__).warning(line)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -17,7 +17,6 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 import ma2000
-from docs.extensions import configuration, policy, public_api
 from server.access.headers import secure
 from server.site import serve_site
 from tests.repository.tracked import ROOT
@@ -49,12 +48,16 @@ class Inside(HTMLParser):
 
 
 def test_every_public_name_says_what_it_is_and_is_on_the_page_of_the_reference() -> None:
+    from docs.extensions import public_api  # here: what collects the tests need not wait for Sphinx
+
     assert [one for name in ma2000.__all__ for one in public_api.undocumented(name)] == []
     page = public_api.page()
     assert [name for name in ma2000.__all__ if f":: ma2000.{name}\n" not in page] == []
 
 
 def test_every_key_of_the_configuration_has_a_meaning() -> None:
+    from docs.extensions import configuration
+
     page = configuration.page()
     assert "## `[robot.limits]`" in page
     assert "`following_error_time`\n: Time (s)" in page
@@ -62,6 +65,8 @@ def test_every_key_of_the_configuration_has_a_meaning() -> None:
 
 
 def test_what_is_inside_a_page_becomes_files_beside_it(tmp_path: Path) -> None:
+    from docs.extensions import policy
+
     page = tmp_path / "how-to" / "page.html"
     page.parent.mkdir()
     page.write_text(INSIDE)

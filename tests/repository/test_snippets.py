@@ -31,6 +31,7 @@ def test_a_block_that_nobody_runs_is_named(tmp_path: Path) -> None:
     assert "thesis.md: has no python blocks any more" in found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "program"), PROGRAMS, ids=[page for page, _ in PROGRAMS])
 def test_what_a_program_imports_exists(page: str, program: str) -> None:
     for node in ast.walk(ast.parse(program)):
