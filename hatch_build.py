@@ -54,7 +54,7 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
                 raise
             self.app.display_warning(f"the dashboard's page was not built: {error}")
         if version != "editable" and (SITE / "index.html").is_file():
-            build_data["force_include"][str(SITE)] = "server/docs_site"
+            build_data["force_include"][str(SITE)] = "ma2000/docs_site"
 
 
 def build_page() -> None:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, FastAPI
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
+from daq.config.documents import site_index
 from server import problems
 from server.access.gate import Gate
 from server.api import (
@@ -29,7 +30,7 @@ from server.api import (
 from server.api.state_metrics import StateMetrics
 from server.page import page_router
 from server.services import Services
-from server.site import serve_site, site_index
+from server.site import serve_site
 
 API = "/api/v1"
 DESCRIPTION = """Experiments on a robot arm are queued, run one at a time, recorded and kept.

@@ -1,4 +1,4 @@
-"""The site of the documents, which Sphinx has built (`make docs`): where it lies, and how it is served at `/docs/`."""
+"""The site of the documents, which Sphinx has built (`make docs`), as the service has it at `/docs/`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from fastapi import FastAPI, Response
 from fastapi.responses import PlainTextResponse, RedirectResponse
 from starlette.staticfiles import StaticFiles
 
+from daq.config.documents import NOT_BUILT
 from server.access.headers import POLICY, SECURITY
 
 if TYPE_CHECKING:
@@ -16,17 +17,8 @@ if TYPE_CHECKING:
 
     from starlette.types import Scope
 
-PLACES = (Path(__file__).parents[1] / "docs" / "_site", Path(__file__).parent / "docs_site")
-"""Where the site lies: in the source tree, and in an installed package (hatch_build.py)."""
-INDEX = "index.html"
-NOT_BUILT = "the documents' site is not here: run `make docs` in the source tree, which builds it into docs/_site"
 SITE_POLICY = SECURITY[POLICY].replace("form-action 'none'", "form-action 'self'")
 """The service's policy, but for the form of the site's search. The build keeps scripts and styles out of the pages."""
-
-
-def site_index() -> Path | None:
-    """First page of the site; None where it is not built."""
-    return next((place / INDEX for place in PLACES if (place / INDEX).is_file()), None)
 
 
 class Site(StaticFiles):

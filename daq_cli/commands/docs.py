@@ -19,7 +19,7 @@ def docs(
     """Open the documents in the browser: guides, reference, gallery, glossary; without a network."""
     import webbrowser
 
-    from server.site import NOT_BUILT, site_index
+    from daq.config.documents import NOT_BUILT, site_index
 
     index = site_index()
     if index is None:

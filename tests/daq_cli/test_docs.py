@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-import server.site
-from server.site import NOT_BUILT
+from daq.config import documents
+from daq.config.documents import NOT_BUILT
 from tests.daq_cli.invoke import CommandLine
 
 
@@ -17,7 +17,7 @@ def index(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The first page of a site in a folder whose name has a space."""
     site = tmp_path / "built site"
     site.mkdir()
-    monkeypatch.setattr(server.site, "PLACES", (tmp_path / "nowhere", site))
+    monkeypatch.setattr(documents, "PLACES", (tmp_path / "nowhere", site))
     return site / "index.html"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import threading
@@ -22,6 +23,7 @@ from server.site import serve_site
 from tests.repository.tracked import ROOT
 from tests.server.dashboard.browser import WITHOUT_3D, chromium, playwright
 
+DOCS = ROOT / "docs"
 INSIDE = """<html><head><style>p { color: red }</style></head><body class="old">
 <script>document.body.dataset.theme = "dark";</script><script type="application/json">{"a": 1}</script>
 <p style="color: blue" title="a > b">x</p><p class="y" style="color: blue">x &lt;p style="no"&gt;</p></body></html>"""
@@ -53,6 +55,17 @@ def test_every_public_name_says_what_it_is_and_is_on_the_page_of_the_reference()
     assert [one for name in ma2000.__all__ for one in public_api.undocumented(name)] == []
     page = public_api.page()
     assert [name for name in ma2000.__all__ if f":: ma2000.{name}\n" not in page] == []
+
+
+def test_every_page_has_a_place_in_the_site() -> None:
+    named = set()
+    for index in (*DOCS.glob("*/index.md"), DOCS / "index.md", DOCS / "gallery" / "index.md"):
+        if index.is_file():
+            (tree,) = re.findall(r"^```{toctree}\n(.*?)^```", index.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+            entries = [line for line in tree.splitlines() if line and not line.startswith(":")]
+            named |= {(index.parent / f"{entry}.md").resolve() for entry in entries}
+    pages = {page for page in DOCS.rglob("*.md") if page.parent.name not in ("decisions", "trial", "_site")}
+    assert pages - named == {DOCS / "index.md"}
 
 
 def test_every_key_of_the_configuration_has_a_meaning() -> None:

@@ -32,3 +32,5 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     for form in (".js.gz", ".js.br"):
         assert any(name.startswith("dist/assets/") and name.endswith(form) for name in page)
     assert not any("node_modules" in name or name.startswith("src/") for name in page)
+    built = (ROOT / "docs" / "_site" / "index.html").is_file()
+    assert ("ma2000/docs_site/index.html" in packed) == built

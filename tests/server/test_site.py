@@ -10,9 +10,10 @@ import pytest
 from fastapi import FastAPI
 from starlette.datastructures import MutableHeaders
 
+from daq.config.documents import NOT_BUILT
 from server.access.headers import SECURITY, secure
 from server.app import bare_app
-from server.site import NOT_BUILT, SITE_POLICY, serve_site
+from server.site import SITE_POLICY, serve_site
 
 POLICY = "Content-Security-Policy"
 
