@@ -34,7 +34,6 @@ smartquotes = False  # they would make one dash of the two of an option
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
-autodoc_preserve_defaults = True  # a default by its name in the source
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 add_module_names = False

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import inspect
 import re
+import types
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
 from docutils import nodes
 from pydantic import BaseModel
 from sphinx import addnodes
@@ -24,6 +26,7 @@ Made from the docstrings. [From Python](../python.md) shows programs that use it
 """
 HOME: dict[str, str] = ma2000._HOME
 PAGE = "reference/python-api"
+ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[.*?\], ~?numpy\.dtype\[[\w.~]+\]\]")
 log = logging.getLogger(__name__)
 
 
@@ -48,7 +51,7 @@ def _entry(name: str) -> str:
         lines += ["   The experiments that have a name, by it: `run` and `Client` take the name alone."]
     elif inspect.isclass(found := getattr(ma2000, name)):
         lines = [f".. autoclass:: ma2000.{name}", "   :members:", "   :undoc-members:"]
-        hidden = [one for one in ("model_config", *_of_pydantic(found)) if one in vars(found)]
+        hidden = [one for one in ("model_config", "shown", *_of_pydantic(found)) if one in vars(found)]
         lines += [f"   :exclude-members: {', '.join(hidden)}"] if hidden else []
     else:
         lines = [f".. autofunction:: ma2000.{name}"]
@@ -88,16 +91,24 @@ def _check(app: Sphinx, env: BuildEnvironment) -> None:
 def _signature(
     app: Sphinx, what: str, name: str, found: Any, options: Any, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None] | None:
-    """A record of many fields lists them below, and not in its signature a second time."""
-    del app, name, options, returned
+    """A record of many fields lists them below, and not in its signature a second time. What Python would not read
+    again, or nobody, is said by its name: functions as defaults, arrays with their type of number."""
+    del app, name, options
     if what == "class" and issubclass(found, BaseModel):
         return "", None
-    return None if signature is None else (signature, None) if what == "class" else None
+    if signature is None:
+        return None
+    return _readable(signature), None if returned is None or what == "class" else _readable(returned)
+
+
+def _readable(signature: str) -> str:
+    return ARRAY.sub("~numpy.ndarray", re.sub(r"<function (\w+)(?: at 0x\w+)?>", r"\1", signature))
 
 
 def _docstring(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
     """Sections such as `Raises:`, and lines that each tell of one field, become lists. The docstring of a field has
     neither: its first colon is prose."""
+    lines[:] = [re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", line) for line in lines]  # links, as pages have them
     if what in ("class", "exception", "function", "method"):
         fields = get_fields(found) if inspect.isclass(found) else set()
         lines[:] = GoogleDocstring(as_list(lines, fields), app.config, app, what, name, found, options).lines()
@@ -133,7 +144,15 @@ def _plain_types(app: Sphinx) -> None:
         kind = getattr(ma2000, name)
         if inspect.isclass(kind) and "__annotations__" in vars(kind):
             hints = get_type_hints(kind)
-            kind.__annotations__ = {field: hints[field] for field in kind.__annotations__}
+            kind.__annotations__ = {field: _without_dtype(hints[field]) for field in kind.__annotations__}
+
+
+def _without_dtype(kind: Any) -> Any:
+    if get_origin(kind) is np.ndarray:
+        return np.ndarray
+    if get_origin(kind) in (Union, types.UnionType):
+        return Union[tuple(_without_dtype(one) for one in get_args(kind))]  # noqa: UP007
+    return kind
 
 
 def _public(app: Sphinx, env: BuildEnvironment, node: addnodes.pending_xref, text: nodes.Element) -> Any:
