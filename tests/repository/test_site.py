@@ -17,7 +17,6 @@ from playwright.sync_api import ConsoleMessage, expect
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-import ma2000
 from server.access.headers import secure
 from server.site import serve_site
 from tests.repository.tracked import ROOT
@@ -47,14 +46,6 @@ class Inside(HTMLParser):
         address = (given.get("src") or (given.get("href") if tag == "link" else None)) or ""
         if address.startswith(("http:", "https:", "//")):
             self.found.append(address)
-
-
-def test_every_public_name_says_what_it_is_and_is_on_the_page_of_the_reference() -> None:
-    from docs.extensions import public_api  # here: what collects the tests need not wait for Sphinx
-
-    assert [one for name in ma2000.__all__ for one in public_api.undocumented(name)] == []
-    page = public_api.page()
-    assert [name for name in ma2000.__all__ if f":: ma2000.{name}\n" not in page] == []
 
 
 def test_every_page_has_a_place_in_the_site() -> None:
