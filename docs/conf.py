@@ -26,7 +26,7 @@ extensions = [
 exclude_patterns = ["_site", "extensions", "**/.ipynb_checkpoints"]
 nitpicky = True
 
-myst_enable_extensions = ["deflist", "dollarmath", "html_image"]
+myst_enable_extensions = ["deflist", "html_image"]
 myst_heading_anchors = 5
 highlight_language = "text"
 suppress_warnings = ["misc.highlighting_failure"]  # an ellipsis in C or JSON
@@ -46,7 +46,7 @@ nb_execution_in_temp = True  # a notebook's traces do not stay beside it
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
-nb_mime_priority_overrides = [("html", "image/svg+xml", 5)]
+
 
 html_theme = "furo"
 html_title = "MA2000 DAQ"

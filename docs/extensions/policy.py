@@ -30,7 +30,10 @@ class Files:
         self.site = site
         self.folder = site / FOLDER
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.rules: dict[str, str] = {}
+        self.sheet = self.folder / SHEET
+        # A build writes only pages that have changed: the others were mended before, and keep their classes.
+        known = self.sheet.read_text("utf-8").splitlines() if self.sheet.is_file() else []
+        self.rules = {line[1:].partition(".")[0]: line.partition("{ ")[2].removesuffix(" }") for line in known}
 
     def mend(self, page: Path) -> None:
         """Moves what is inside a page out of it."""
@@ -48,7 +51,9 @@ class Files:
             return f'<link rel="stylesheet" href="{root}/{name}">'
 
         text = TAG.sub(self._tag, BLOCK.sub(block, text))
-        text = text.replace("</head>", f'<link rel="stylesheet" href="{root}/{SHEET}"></head>', 1)
+        link = f'<link rel="stylesheet" href="{root}/{SHEET}">'
+        if link not in text:
+            text = text.replace("</head>", f"{link}</head>", 1)
         page.write_text(text, "utf-8")
 
     def _tag(self, found: re.Match[str]) -> str:
@@ -58,7 +63,7 @@ class Files:
             return tag
         rule = style[1] or style[2] or ""
         name = f"s{_name(rule)}"
-        self.rules[name] = rule
+        self.rules[name] = " ".join(rule.replace("&quot;", '"').split())
         tag = STYLE.sub("", tag)
         if CLASS.search(tag):
             return CLASS.sub(rf"\1{name} ", tag, count=1)
@@ -67,23 +72,26 @@ class Files:
     def write_sheet(self) -> None:
         """Writes the classes. A class that is named three times prevails over other rules, as the attribute did."""
         rules = (f".{name}.{name}.{name} {{ {rule} }}\n" for name, rule in sorted(self.rules.items()))
-        (self.folder / SHEET).write_text("".join(rules).replace("&quot;", '"'), "utf-8")
+        self.sheet.write_text("".join(rules), "utf-8")
 
 
 def _name(content: str) -> str:
     return sha256(content.encode()).hexdigest()[:16]
 
 
-def _built(app: Sphinx, error: Exception | None) -> None:
-    if error is not None or app.builder.format != "html":
-        return
-    site = Path(app.outdir)
+def mend(site: Path) -> None:
+    """Moves what is inside the pages of a site out of them."""
     files = Files(site)
     for page in sorted(site.rglob("*.html")):
         files.mend(page)
     files.write_sheet()
-    for path in site.rglob("*.map"):
-        path.unlink()  # for whoever changes the theme
+
+
+def _built(app: Sphinx, error: Exception | None) -> None:
+    if error is None and app.builder.format == "html":
+        mend(Path(app.outdir))
+        for path in Path(app.outdir).rglob("*.map"):
+            path.unlink()  # for whoever changes the theme
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
