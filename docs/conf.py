@@ -47,7 +47,6 @@ nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 
-
 html_theme = "furo"
 html_title = "MA2000 DAQ"
 html_static_path = ["static"]

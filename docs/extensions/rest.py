@@ -102,7 +102,7 @@ def _plain_kind(schema: dict[str, Any]) -> str:
         values = schema.get("additionalProperties")
         return f"object of {_kind(values)} by name" if isinstance(values, dict) and values else "object"
     limits = [
-        f"{words} {schema[key]}"
+        f"{words} {schema[key]:.6g}" if isinstance(schema[key], float) else f"{words} {schema[key]}"
         for key, words in (
             ("minimum", "from"),
             ("exclusiveMinimum", "over"),
