@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
-from sphinx.ext.napoleon import GoogleDocstring
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 from sphinx.util import logging
 
 import ma2000
@@ -105,7 +105,7 @@ def _readable(signature: str) -> str:
     return ARRAY.sub("~numpy.ndarray", re.sub(r"<function (\w+)(?: at 0x\w+)?>", r"\1", signature))
 
 
-def _docstring(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+def _docstring(app: Sphinx, what: Any, name: str, found: Any, options: Any, lines: list[str]) -> None:
     """Sections such as `Raises:`, and lines that each tell of one field, become lists. The docstring of a field has
     neither: its first colon is prose."""
     lines[:] = [re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", line) for line in lines]  # links, as pages have them
