@@ -38,7 +38,8 @@ CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)
 
 
 def brought(docname: str, text: str) -> str:
-    """The text of a page with its links as they are from the place of `docname` in the site."""
+    """The text of a page with its links as they are from the place of `docname` in the site, and titles of pages where
+    the text has names of files."""
     origin = (ROOT / BROUGHT.get(docname, f"docs/{docname}.md")).parent
     place = (ROOT / "docs" / docname).parent
     home = {(ROOT / path).resolve(): name for name, path in BROUGHT.items()}
@@ -52,6 +53,8 @@ def brought(docname: str, text: str) -> str:
         path = (origin / target).resolve()
         if path.is_dir():
             return f"`{path.relative_to(ROOT)}/`" if text.startswith("[`") else text[1:]
+        if text == f"[{path.name}":
+            text = "["  # MyST puts the title of the page or heading here
         if path in home:
             path = ROOT / "docs" / f"{home[path]}.md"
         return f"{text}{between}{os.path.relpath(path, place)}{hash_sign}{anchor}{end}"
