@@ -25,15 +25,27 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec as ExperimentSpec
     from daq.contracts.machine import Machine as Machine
     from daq.contracts.machine import load_machine as load_machine
+    from daq.contracts.service.jobs import BatchRequest as BatchRequest
+    from daq.contracts.service.jobs import CompareRequest as CompareRequest
+    from daq.contracts.service.jobs import DiagnoseRequest as DiagnoseRequest
+    from daq.contracts.service.jobs import FitRequest as FitRequest
+    from daq.contracts.service.jobs import ValidateRequest as ValidateRequest
     from daq.contracts.trace import Trace as Trace
+    from daq.traces.catalogue import TraceSummary as TraceSummary
     from daq.trajectories.presets import PRESETS as PRESETS
     from ma2000.arm import Arm as Arm
     from ma2000.arm import connect as connect
     from ma2000.batches import Batch as Batch
     from ma2000.batches import batch as batch
+    from ma2000.files import list_traces as list_traces
     from ma2000.files import read_trace as read_trace
     from ma2000.files import read_traces as read_traces
+    from ma2000.files import write_table as write_table
     from ma2000.files import write_trace as write_trace
+    from ma2000.fitting import fit as fit
+    from ma2000.fitting import fit_torques as fit_torques
+    from ma2000.fitting import profile as profile
+    from ma2000.local_service import LocalService as LocalService
     from ma2000.pictures import plot as plot
     from ma2000.robot_files import save_machine as save_machine
     from ma2000.robot_files import write_mjcf as write_mjcf
@@ -47,14 +59,16 @@ if TYPE_CHECKING:
     from ma2000.studies import followed as followed
     from ma2000.studies import learn as learn
     from ma2000.studies import validate as validate
+    from ma2000.thesis import reproduce_thesis as reproduce_thesis
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
     from model.feedforward.tracking import Followed as Followed
-    from model.fitting.fit import fit as fit
     from model.fitting.options import FitOptions as FitOptions
+    from model.fitting.profile import Profile as Profile
     from model.fitting.result import FitResult as FitResult
+    from model.inverse_dynamics.fit import TorqueFit as TorqueFit
     from model.machine_model.model import Model as Model
     from model.machine_model.model import base_model as base_model
     from model.machine_model.model_file import load_model as load_model
@@ -62,50 +76,66 @@ if TYPE_CHECKING:
     from model.robot_files.machine_of_arm import machine_from_urdf as machine_from_urdf
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
+    from model.thesis.reproduction import Reproduction as Reproduction
     from model.validation.criterion import Fidelity as Fidelity
 
 _HOME = {
-    "PRESETS": "daq.trajectories.presets",
     "Arm": "ma2000.arm",
     "Batch": "ma2000.batches",
+    "BatchRequest": "daq.contracts.service.jobs",
     "Client": "daq.client",
+    "CompareRequest": "daq.contracts.service.jobs",
     "DaqError": "daq.contracts.errors",
     "DesignOptions": "model.design.search",
     "DesignedExperiments": "model.design.search",
+    "DiagnoseRequest": "daq.contracts.service.jobs",
     "Diagnosis": "model.discrepancy.diagnosis",
     "DiagnosisOptions": "model.discrepancy.options",
     "ExperimentSpec": "daq.contracts.experiment",
-    "Followed": "model.feedforward.tracking",
     "Fidelity": "model.validation.criterion",
     "FitOptions": "model.fitting.options",
+    "FitRequest": "daq.contracts.service.jobs",
     "FitResult": "model.fitting.result",
+    "Followed": "model.feedforward.tracking",
+    "LocalService": "ma2000.local_service",
     "Machine": "daq.contracts.machine",
     "Model": "model.machine_model.model",
+    "PRESETS": "daq.trajectories.presets",
+    "Profile": "model.fitting.profile",
+    "Reproduction": "model.thesis.reproduction",
     "Run": "ma2000.running",
     "RunError": "ma2000.running",
     "Simulation": "model.simulation.simulate",
+    "TorqueFit": "model.inverse_dynamics.fit",
     "Trace": "daq.contracts.trace",
-    "batch": "ma2000.batches",
+    "TraceSummary": "daq.traces.catalogue",
+    "ValidateRequest": "daq.contracts.service.jobs",
     "base_model": "model.machine_model.model",
+    "batch": "ma2000.batches",
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
     "feedforward": "ma2000.studies",
-    "fit": "model.fitting.fit",
+    "fit": "ma2000.fitting",
+    "fit_torques": "ma2000.fitting",
     "followed": "ma2000.studies",
     "learn": "ma2000.studies",
+    "list_traces": "ma2000.files",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
     "machine_from_urdf": "model.robot_files.machine_of_arm",
     "plot": "ma2000.pictures",
+    "profile": "ma2000.fitting",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
+    "reproduce_thesis": "ma2000.thesis",
     "run": "ma2000.running",
     "save_machine": "ma2000.robot_files",
     "save_model": "model.machine_model.model_file",
     "simulate": "model.simulation.simulate",
     "validate": "ma2000.studies",
     "write_mjcf": "ma2000.robot_files",
+    "write_table": "ma2000.files",
     "write_trace": "ma2000.files",
     "write_urdf": "ma2000.robot_files",
 }

@@ -10,12 +10,12 @@ from pathlib import Path
 from daq.config.robot_files import load_memory_map
 from daq.contracts.experiment import ExperimentSpec, Gain
 from daq.contracts.machine import Machine, load_machine
-from daq.contracts.progress import Progress, silent
 from daq.driver import Controller
 from daq.driver.stop import StopConfirmation
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import start_mock
 from firmware_protocol.commands import StatusFlag
+from ma2000.progress import Shown
 from ma2000.running import MOCK, Run, run
 
 
@@ -60,7 +60,7 @@ class Arm:
         *,
         folder: Path | str = "traces",
         moves_real_arm: bool = False,
-        progress: Progress = silent,
+        progress: Shown = True,
     ) -> Run:
         """Runs an experiment on this arm: `ma2000.run` with this port, machine and memory map."""
         return run(

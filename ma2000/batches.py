@@ -11,13 +11,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine
-from daq.contracts.progress import Cancel, Progress, silent
+from daq.contracts.progress import Cancel
 from daq.contracts.service.jobs import Study
 from daq.executors import open_workers
 from daq.executors.workers import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import parse_query
 from firmware_protocol.invalid import first_invalid
+from ma2000.progress import Shown, told
 from model.machine_model.model import Model
 from server.batches.choice import chosen_traces, require_any
 from server.batches.folder import asked_of, opened
@@ -50,7 +51,7 @@ def batch(
     model: Model | None = None,
     machine: Machine | None = None,
     effect_files: Iterable[Path | str] = (),
-    progress: Progress = silent,
+    progress: Shown = True,
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Batch:
@@ -74,13 +75,17 @@ def batch(
     )
     chosen, _ = chosen_traces(list_traces(Path(traces)), parse_query(query))
     require_any(chosen, str(traces))
-    with opened(Path(folder), asked_of(common)) as kept, ending(open_workers(executor)) as workers:
+    with (
+        told(progress, kind) as tell,
+        opened(Path(folder), asked_of(common)) as kept,
+        ending(open_workers(executor)) as workers,
+    ):
         run_batch(
             kept,
             common,
             chosen,
             workers,
-            lambda standing, _row: progress(1 - standing.left / standing.total, str(standing)),
+            lambda standing, _row: tell(1 - standing.left / standing.total, str(standing)),
             cancel,
         )
         rows = kept.rows

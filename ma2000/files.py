@@ -7,9 +7,10 @@ from pathlib import Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
-from daq.traces import reader, store
+from daq.traces import catalogue, reader, store
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.csv_table import import_csv
+from daq.traces.tables import export_table
 
 
 def read_trace(path: Path | str) -> Trace:
@@ -34,6 +35,22 @@ def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) ->
     if query:
         paths = [path for path in paths if all(getattr(summary_of(path), key) == query[key] for key in query)]
     return tuple(map(read_trace, paths))
+
+
+def list_traces(folder: Path | str) -> tuple[TraceSummary, ...]:
+    """What each trace of a folder says of itself, the oldest first; samples are not read.
+
+    `pandas.DataFrame(one.model_dump() for one in list_traces(folder))` is the folder as a table. Raises TraceError.
+    """
+    return catalogue.list_traces(Path(folder))
+
+
+def write_table(trace: Trace, path: Path | str) -> Path:
+    """Writes the table of `Trace.to_pandas` as .parquet, or the arrays of `Trace.to_xarray` as .nc. Returns the path.
+
+    Raises TraceError for another suffix or a file that cannot be written, MissingExtraError.
+    """
+    return export_table(trace, Path(path))
 
 
 def write_trace(trace: Trace, path: Path | str) -> Path:

@@ -21,6 +21,7 @@ from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
 from daq.trajectories.presets import preset
 from daq.transport import parse_port_url
+from ma2000.progress import Shown, told
 
 MOCK = "mock://?lock_step=1"
 """The port where none is named: a mock that runs as fast as this computer can, and moves nothing."""
@@ -58,7 +59,7 @@ def run(
     machine: Machine | None = None,
     memory_map: Path | None = None,
     moves_real_arm: bool = False,
-    progress: ToldProgress = silent,
+    progress: Shown = True,
 ) -> Run:
     """Runs an experiment, or the preset of that name, and records its trace in `folder`.
 
@@ -70,7 +71,7 @@ def run(
         machine: the machine that the limits and angles are of; None for the MA2000.
         memory_map: file of the controller's addresses; None for the one that ships.
         moves_real_arm: the operator's consent. Without it, a controller that is not simulated is refused.
-        progress: is told the fraction done and one line.
+        progress: whether a bar shows how far it is; or a function that is told the fraction done and one line.
 
     Raises:
         SpecError: for an unknown preset, a port or a file that is not valid.
@@ -90,9 +91,9 @@ def run(
         memory_map=None if memory_map is None else read_text(memory_map, f"memory map {memory_map}"),
         moves_real_arm=require_word(moves_real_arm),
     )
-    with Acquisition(job) as process:
+    with told(progress, spec.trajectory.kind) as tell, Acquisition(job) as process:
         try:
-            end = _end_of(process, progress)
+            end = _end_of(process, tell)
         except KeyboardInterrupt as interrupt:
             process.stop()
             stopped = _end_of(process, silent)

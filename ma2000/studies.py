@@ -1,4 +1,7 @@
-"""Design, validation, diagnosis and feedforward with the defaults of the commands of the same names."""
+"""Design, validation, diagnosis and feedforward with the defaults of the commands of the same names.
+
+`progress` of each says whether a bar shows how far it is: docs/python.md.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,11 @@ from collections.abc import Sequence
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine, load_machine
-from daq.contracts.progress import Cancel, Progress, silent
+from daq.contracts.progress import Cancel
 from daq.contracts.trace import Trace
 from daq.safety.planned import motion_of, planned
 from daq.trajectories.presets import preset
+from ma2000.progress import Shown, told
 from model.design import search
 from model.design.search import DesignedExperiments, DesignOptions
 from model.discrepancy import workflow
@@ -32,7 +36,7 @@ def validate(
     traces: Sequence[Trace],
     parameters: Sequence[str] | None = None,
     *,
-    progress: Progress = silent,
+    progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Fidelity:
     """Whether expected deviations of the parameters explain the model's errors, by distortion: Σλ² (thesis, chapter 4).
@@ -44,7 +48,8 @@ def validate(
     """
     names = names_to_validate(model, parameters)
     options = Options(quantise=False)
-    return validate_by_distortion(model, traces, names, options=options, progress=progress, cancel=cancel)
+    with told(progress, "validating") as tell:
+        return validate_by_distortion(model, traces, names, options=options, progress=tell, cancel=cancel)
 
 
 def diagnose(
@@ -54,7 +59,7 @@ def diagnose(
     options: DiagnosisOptions | None = None,
     *,
     design: bool = False,
-    progress: Progress = silent,
+    progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Diagnosis:
     """Where a model and traces disagree, which effects are missing, and what to measure next.
@@ -65,7 +70,8 @@ def diagnose(
     Raises TraceError, SpecError for input that cannot give an answer; CancelledError when asked to end.
     """
     chooser = experiment_chooser(model.machine, design=design)
-    return workflow.diagnose(model, traces, holdout, options, progress, cancel, chooser)
+    with told(progress, "diagnosing") as tell:
+        return workflow.diagnose(model, traces, holdout, options, tell, cancel, chooser)
 
 
 def design(
@@ -73,14 +79,15 @@ def design(
     options: DesignOptions | None = None,
     fit_options: FitOptions | None = None,
     *,
-    progress: Progress = silent,
+    progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> DesignedExperiments:
     """Experiments within the machine's limits that make the parameters of `fit_options` best known together.
 
     Raises SpecError when no candidate is within the limits; CancelledError when asked to end.
     """
-    return search.design(model, lambda spec: planned(spec, model.machine), options, fit_options, progress, cancel)
+    with told(progress, "designing") as tell:
+        return search.design(model, lambda spec: planned(spec, model.machine), options, fit_options, tell, cancel)
 
 
 def feedforward(
@@ -88,7 +95,7 @@ def feedforward(
     experiment: ExperimentSpec | str = "ramp",
     machine: Machine | None = None,
     *,
-    progress: Progress = silent,
+    progress: Shown = True,
 ) -> ExperimentSpec:
     """The experiment whose set points make the arm follow the motion of `experiment`, as the model knows the arm.
 
@@ -100,7 +107,8 @@ def feedforward(
     SafetyError.
     """
     machine = machine or load_machine("ma2000")
-    return inverse.feedforward(model, _spec(experiment), machine, lambda spec: planned(spec, machine), progress)
+    with told(progress, "computing set points") as tell:
+        return inverse.feedforward(model, _spec(experiment), machine, lambda spec: planned(spec, machine), tell)
 
 
 def learn(

@@ -111,14 +111,14 @@ def html_page(trace: Trace, joints: tuple[int, ...] | None = None) -> bytes:
 
 def figure_of(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
     """The figure: one row per signal, one column per joint, marks at events."""
-    from matplotlib.figure import Figure
+    from daq.traces.notebook_figure import NotebookFigure
 
     recorded = trace.joints
     trace = _only(trace, joints)
     rows = _rows(trace)
     columns = min(len(trace.joints), JOINTS_ABREAST)
     bands = math.ceil(len(trace.joints) / columns)
-    figure = Figure(figsize=(max(6.3, 3.1 * columns + 0.6), bands * (1.9 * len(rows) + 0.6) + 0.8))
+    figure = NotebookFigure(figsize=(max(6.3, 3.1 * columns + 0.6), bands * (1.9 * len(rows) + 0.6) + 0.8))
     figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.05, hspace=0.03)
     axes = figure.subplots(len(rows) * bands, columns, sharex=True, squeeze=False)
     for column, joint in enumerate(trace.joints):

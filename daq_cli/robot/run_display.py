@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from daq.progress_bar import terminal_bar
 from daq_cli.app.context import console
 
 if TYPE_CHECKING:
@@ -42,11 +43,8 @@ class RunDisplay:
 @contextmanager
 def run_display(spec: ExperimentSpec) -> Iterator[RunDisplay]:
     """Shows a run within the block; the bar vanishes at its end, and is absent where no terminal shows it."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     kind = spec.trajectory.kind
     # A sequence has dozens of marks; they are in the trace.
     marks = {"note", "ramp_start", "ramp_end", "reversal"} if kind == "sequence" else set()
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
-    with Progress(*columns, console=console(), transient=True, disable=not console().is_terminal) as bar:
+    with terminal_bar(console()) as bar:
         yield RunDisplay(bar, kind, frozenset({"start", "end"} | marks))

@@ -70,7 +70,7 @@ def fit(
         if number + 1 < options.rounds:
             most = min(most, ROUND_EVALUATIONS)
         progress(0.5 + 0.4 * number / options.rounds, f"round {number + 1}: noise and whitening")
-        problem, whiteners = _with_noise(problem, solution.values, options)
+        problem, whiteners = with_noise(problem, solution.values, options)
         if options.method == "nelder_mead":
             break
         search = Search(options.robust, options.tolerance, most)
@@ -160,7 +160,7 @@ def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
     return found
 
 
-def _with_noise(
+def with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
 ) -> tuple[SimulatedProblem, list[Whitener]]:
     """The problem with the mean effect of the noise subtracted, and whiteners fitted to its residual."""
@@ -297,4 +297,4 @@ def _errors(
     return tuple(found)
 
 
-__all__ = ["CancelledError", "FitOptions", "FitResult", "fit", "fit_problem"]
+__all__ = ["CancelledError", "FitOptions", "FitResult", "fit", "fit_problem", "with_noise"]

@@ -1,0 +1,72 @@
+"""Parameters from traces: of motion, and of recorded torques."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from daq.contracts.progress import Cancel
+from daq.contracts.trace import Trace
+from ma2000.progress import Shown, told
+from model.fitting import fit as motion
+from model.fitting import profile as profiles
+from model.fitting.options import FitOptions
+from model.fitting.profile import Profile
+from model.fitting.result import FitResult
+from model.inverse_dynamics import fit as torques
+from model.inverse_dynamics.fit import TorqueFit
+from model.machine_model.model import Model
+
+
+def fit(
+    model: Model,
+    traces: Sequence[Trace],
+    options: FitOptions | None = None,
+    progress: Shown = True,
+    cancel: Cancel | None = None,
+) -> FitResult:
+    """The parameters with which the model best repeats the traces, and how far each can be trusted.
+
+    The model's own loop follows the recorded set points, and its readings are compared with the recorded ones.
+
+    Raises TraceError, SpecError for input that cannot give a result; CancelledError when asked to end.
+    """
+    with told(progress, "fitting") as tell:
+        return motion.fit(model, traces, options, tell, cancel)
+
+
+def fit_torques(
+    model: Model,
+    traces: Sequence[Trace],
+    holdout: Sequence[Trace] = (),
+    options: FitOptions | None = None,
+    *,
+    progress: Shown = True,
+    cancel: Cancel | None = None,
+) -> TorqueFit:
+    """The parameters with which the torque that the motion needs is the recorded one. Nothing is simulated, so that a
+    machine without a controller can be fitted.
+
+    `result.held_out` is the share of torque that is left on `holdout`. Raises as `fit`.
+    """
+    with told(progress, "fitting torques") as tell:
+        return torques.fit_torques(model, traces, holdout, options, progress=tell, cancel=cancel)
+
+
+def profile(
+    fitted: FitResult,
+    traces: Sequence[Trace],
+    name: str,
+    *,
+    progress: Shown = True,
+    cancel: Cancel | None = None,
+) -> Profile:
+    """The profile likelihood of a fitted parameter: how much worse the fit becomes when it is moved, and all others are
+    fitted again. It shows what the data bound on one side alone, or not at all.
+
+    Args:
+        traces: those that were fitted to.
+
+    Raises SpecError for a parameter that was not fitted, or other traces; CancelledError when asked to end.
+    """
+    with told(progress, name) as tell:
+        return profiles.profile(fitted, traces, name, tell, cancel)

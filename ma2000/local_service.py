@@ -1,0 +1,112 @@
+"""A service of one's own on this computer, for programs and notebooks."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from daq.contracts.errors import DaqError, SpecError
+from daq.transport import MockPort, parse_port_url
+from ma2000.running import MOCK
+
+ENDS_WITHIN = 20.0
+"""Time (s) in which a service ends in order, with the run under way; after it, it is killed."""
+LOG = "service.log"
+_OWNED = """
+import os, signal, sys, threading
+
+def end_with_owner():
+    sys.stdin.read()
+    os.kill(os.getpid(), signal.SIGTERM)
+
+threading.Thread(target=end_with_owner, daemon=True).start()
+from daq_cli import main
+main()
+"""
+"""`daq` that ends in order when its standard input does, that is, with the program that started it, however that
+ends."""
+
+
+class LocalServiceError(DaqError):
+    """The service did not start. The message has the last line of its log."""
+
+
+class LocalService:
+    """`daq serve` on a mock, for this computer alone. `url` is what `ma2000.Client` takes.
+
+    It ends with the `with` block, by `close()`, or with this program. Its configuration is that of `daq` without any;
+    its database, traces and log lie in `folder`.
+    """
+
+    def __init__(self, folder: Path | str = "lab", port: str = MOCK) -> None:
+        """Starts it and waits until it answers.
+
+        Raises SpecError for a port that is no mock: a service that moves an arm is started by its operator.
+        LocalServiceError when it does not start.
+        """
+        if not isinstance(parse_port_url(port), MockPort):
+            raise SpecError(
+                f"port {port!r}: a program's own service runs on mock:// alone; for an arm, use `daq serve`"
+            )
+        self.folder = Path(folder)
+        self._process = _started(self.folder, port)
+        assert self._process.stdout is not None
+        self.url = self._process.stdout.readline().strip()
+        if not self.url:
+            code = self._process.wait()
+            self.close()
+            raise LocalServiceError(f"the service did not start (exit code {code}): {_last_line(self.folder / LOG)}")
+
+    def __repr__(self) -> str:
+        state = "ended" if self._process.poll() is not None else self.url
+        return f"<LocalService {state}, in {self.folder}>"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the service in order. May be called twice."""
+        self._process.terminate()
+        try:
+            self._process.wait(ENDS_WITHIN)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+
+
+def _started(folder: Path, port: str) -> subprocess.Popen[str]:
+    """Raises SpecError for a folder that cannot be made."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("DAQ_")}
+    environment |= {"DAQ_SERVER__STOP_PORT": "0", "XDG_CONFIG_HOME": str(folder.absolute())}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / LOG).open("ab") as log:
+            return subprocess.Popen(
+                [sys.executable, "-c", _OWNED, "--port", port, "serve", "--port", "0"],
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                start_new_session=True,  # Ctrl-C ends the cell of a notebook, not the service
+            )
+    except OSError as error:
+        raise SpecError(f"{folder}: no folder for a service: {error.strerror}") from error
+
+
+def _last_line(log: Path) -> str:
+    lines = log.read_text("utf-8", errors="replace").strip().splitlines()
+    return lines[-1] if lines else "it said nothing"
