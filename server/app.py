@@ -10,6 +10,7 @@ from fastapi import APIRouter, FastAPI
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
+from daq.config.documents import site_index
 from server import problems
 from server.access.gate import Gate
 from server.api import (
@@ -31,6 +32,7 @@ from server.api import (
 from server.api.state_metrics import StateMetrics
 from server.page import page_router
 from server.services import Services
+from server.site import serve_site
 
 API = "/api/v1"
 DESCRIPTION = """Experiments on a robot arm are queued, run one at a time, recorded and kept.
@@ -94,6 +96,7 @@ def bare_app(services: Services | None) -> FastAPI:
     app.include_router(api)
     app.include_router(system.plain)
     app.include_router(page_router())
+    serve_site(app, site_index())
     description.install(app)
     description.serve(app, f"{API}/openapi.json")
     return app

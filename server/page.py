@@ -12,7 +12,7 @@ from fastapi.responses import PlainTextResponse
 FOLDER = Path(__file__).parent / "dashboard" / "dist"
 INDEX = "index.html"
 REFERENCE = "reference.html"
-"""The reference of the API, served at `/docs`."""
+"""The reference of the API, served at `/api/docs`."""
 NOT_BUILT = "the dashboard's page is not built: run `make page` in the source tree (it needs no Node of your own)"
 TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -70,8 +70,8 @@ def is_built(folder: Path = FOLDER) -> bool:
 
 
 def page_router(folder: Path = FOLDER) -> APIRouter:
-    """Returns the routes of all files of the page; `/` is its index, `/docs` the reference of the API. If the page is
-    not built, both say how to build it."""
+    """Returns the routes of all files of the page; `/` is its index, `/api/docs` the reference of the API. If the page
+    is not built, both say how to build it."""
     router = APIRouter(include_in_schema=False)
     files = _files(folder) if is_built(folder) else {}
 
@@ -81,7 +81,7 @@ def page_router(folder: Path = FOLDER) -> APIRouter:
             return PlainTextResponse(NOT_BUILT + "\n", 503)
         return files[INDEX].response(request)
 
-    @router.get("/docs")
+    @router.get("/api/docs")
     async def reference(request: Request) -> Response:
         if REFERENCE not in files:
             return PlainTextResponse(NOT_BUILT + "\n", 503)

@@ -43,9 +43,13 @@ class RobotSettings(FrozenRecord):
     """The arm: its name in files and addresses, its machine file, its port."""
 
     name: RobotName = "ma2000"
+    """Name of the arm in files and addresses."""
     machine: str = "ma2000"
+    """A machine of the package, or a machine file."""
     port: str | None = None
+    """URL of the port; without one, runs use a mock."""
     memory_map: Path | None = None
+    """File of the memory map; without one, that of the package, whose addresses are mostly assumed."""
     limits: Limits | None = None
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
 
@@ -73,6 +77,7 @@ class TraceSettings(FrozenRecord):
     """Where traces are kept, and how large they may be."""
 
     folder: Path = Path("traces")
+    """Folder that runs write to, and that commands read."""
     limits: TraceLimits = TraceLimits()
     """Limits for files that are read, whatever their origin."""
     warn_at: Annotated[float, Field(gt=0, le=1)] = 0.9
@@ -103,6 +108,7 @@ class Settings(BaseSettings):
     server: ServiceSettings = ServiceSettings()
     archive: ArchiveSettings = ArchiveSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
+    """Who runs the experiments; recorded in every trace."""
 
     @classmethod
     def settings_customise_sources(

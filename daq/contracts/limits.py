@@ -15,8 +15,11 @@ class JointLimits(FrozenRecord):
     """Limits of one joint, in rad and s (m and s on a prismatic joint)."""
 
     low: FiniteFloat | None = None
+    """Least angle."""
     high: FiniteFloat | None = None
+    """Largest angle."""
     speed: Positive | None = None
+    """Largest speed of set points."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -26,18 +29,18 @@ class JointLimits(FrozenRecord):
 
 
 class Limits(FrozenRecord):
-    """Limits of the whole arm; `joints[i]` belongs to joint i+1.
-
-    `floor_height` is the lowest z (m, in the base frame) that any link's end may reach; `following_error_counts` is
-    the magnitude of positional error (ADC counts) at which set points pause (127 in the source, section 6.5), and
-    `following_error_time` how long (s) it may last before the run ends in a fault.
-    """
+    """Limits of the whole arm."""
 
     joints: tuple[JointLimits, ...] = ()
+    """Limits of each joint: `joints[i]` belongs to joint i+1."""
     floor_height: FiniteFloat | None = None
+    """Lowest z (m, in the base frame) that any link's end may reach."""
     reach: Positive | None = None
+    """Largest distance (m) of any link's end from the base's origin."""
     following_error_counts: Annotated[int, Field(ge=1, le=4095)] | None = None
+    """Magnitude of positional error (ADC counts) at which set points pause (127 in the source, section 6.5)."""
     following_error_time: Positive | None = None
+    """Time (s) that such an error may last before the run ends in a fault."""
 
     def joint(self, number: int) -> JointLimits:
         """Limits of joint `number` (from 1); all None where none are set."""

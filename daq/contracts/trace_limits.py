@@ -27,12 +27,15 @@ class TraceLimits(FrozenRecord):
     records: Annotated[int, Field(ge=1)] = 20_000_000
     """Records of a file, its messages among them. One sample takes one message per joint and one more."""
     events: Annotated[int, Field(ge=0)] = 1_000_000
+    """Events of a file."""
     attachments: Annotated[int, Field(ge=0)] = 100
+    """Attachments of a file."""
     attachment_bytes: Annotated[int, Field(ge=0)] = 64 * MIB
     """Size of all attachments of a file."""
     metadata_bytes: Annotated[int, Field(ge=1)] = 8 * MIB
     """Size of one metadata record; that at the start holds experiment, machine and memory map."""
     joints: Annotated[int, Field(ge=1, le=100)] = 6
+    """Joints of a file."""
 
 
 DEFAULT_TRACE_LIMITS = TraceLimits()

@@ -43,6 +43,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "design": ("daq_cli.commands.design", "Propose experiments that determine parameters best."),
     "thesis": ("daq_cli.commands.thesis", "Reproduce the 1991 source beside its published results."),
     "blind": ("daq_cli.commands.blind", "Hide effects in the mock, diagnose blindly, and score."),
+    "docs": ("daq_cli.commands.docs", "Open the documents in the browser."),
     "demo": ("daq_cli.commands.demo", "Run the ramp step on the mock, from command to plot."),
 }
 
@@ -64,6 +65,7 @@ HERE = frozenset(
         "design",
         "thesis",
         "blind",
+        "docs",
         "demo",
     ]
 )

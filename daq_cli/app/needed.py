@@ -10,7 +10,7 @@ MODEL = frozenset(
     ["batch", "blind", "compare", "design", "diagnose", "fit", "sensitivity", "simulate", "thesis", "validate"]
 )
 SERVER = frozenset(["backup", "restore", "serve", "token"])
-WITH_A_VALUE = frozenset(["--config", "--port", "--server"])
+WITH_A_VALUE = frozenset(["--config", "--port", "--robot", "--server"])
 """Options before the subcommand that are followed by their value."""
 
 

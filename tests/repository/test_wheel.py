@@ -37,3 +37,5 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     _, _, description = metadata.partition("\n\n")
     assert description.startswith("# MA2000 DAQ\n")
     assert re.findall(r"\]\((?!https?:)[^)]*\)|<img", description) == [], "an index shows no file of the repository"
+    built = (ROOT / "docs" / "_site" / "index.html").is_file()
+    assert ("ma2000/docs_site/index.html" in packed) == built

@@ -70,7 +70,7 @@ def test_nothing_else_is_served(folder: Path, name: str) -> None:
 
 
 def test_a_page_that_is_not_built_says_how_to_build_it(tmp_path: Path) -> None:
-    for address in ("/", "/docs"):
+    for address in ("/", "/api/docs"):
         answer = get(tmp_path, address)
         assert (answer.status_code, answer.text) == (503, NOT_BUILT + "\n")
 

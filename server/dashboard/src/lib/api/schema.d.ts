@@ -3603,11 +3603,7 @@ export interface components {
         };
         /**
          * Limits
-         * @description Limits of the whole arm; `joints[i]` belongs to joint i+1.
-         *
-         *     `floor_height` is the lowest z (m, in the base frame) that any link's end may reach; `following_error_counts` is
-         *     the magnitude of positional error (ADC counts) at which set points pause (127 in the source, section 6.5), and
-         *     `following_error_time` how long (s) it may last before the run ends in a fault.
+         * @description Limits of the whole arm.
          */
         Limits: {
             /**

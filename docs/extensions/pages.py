@@ -1,0 +1,104 @@
+"""Pages that are made while the site is built, and links that are mended for it.
+
+A page of GENERATED has its text made from the code; one of BROUGHT is a page that lies elsewhere in the repository.
+The files that stand for them in docs/ say in one line where to look without the site.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from docutils import nodes
+from sphinx.application import Sphinx
+
+from . import command_line, configuration, public_api, rest
+
+ROOT = Path(__file__).parents[2]
+GENERATED: dict[str, Callable[[], str]] = {
+    "reference/options": command_line.page,
+    "reference/configuration": configuration.page,
+    "reference/rest": rest.operations_page,
+    "reference/rest-schemas": rest.schemas_page,
+    "reference/python-api": public_api.page,
+}
+BROUGHT = {
+    "reference/protocol": "firmware_protocol/PROTOCOL.md",
+    "reference/changes": "CHANGELOG.md",
+    "explanation/contributing": "CONTRIBUTING.md",
+}
+LONGEST_WHOLE = 28
+"""Most characters of code that a phone shows in one line beside a bullet."""
+BELOW = {"decisions/README": "0*", "trial": "trial/*"}
+"""Pages that have others below them, by pattern."""
+LINK = re.compile(r"(\[[^\]]*)(\]\(<?)([^)\s>]+)(>?\))")
+CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)
+
+
+def brought(docname: str, text: str) -> str:
+    """The text of a page with its links as they are from the place of `docname` in the site, and titles of pages where
+    the text has names of files."""
+    origin = (ROOT / BROUGHT.get(docname, f"docs/{docname}.md")).parent
+    place = (ROOT / "docs" / docname).parent
+    home = {(ROOT / path).resolve(): name for name, path in BROUGHT.items()}
+    home[(ROOT / "README.md").resolve()] = "index"
+
+    def link(found: re.Match[str]) -> str:
+        text, between, whole, end = found.groups()
+        target, hash_sign, anchor = whole.partition("#")
+        if not target or re.match(r"[a-z][a-z+.-]*:", target):
+            return found[0]
+        path = (origin / target).resolve()
+        if path.is_dir():
+            return f"`{path.relative_to(ROOT)}/`" if text.startswith("[`") else text[1:]
+        if text == f"[{path.name}":
+            text = "["  # MyST puts the title of the page or heading here
+        if path in home:
+            path = ROOT / "docs" / f"{home[path]}.md"
+        return f"{text}{between}{os.path.relpath(path, place)}{hash_sign}{anchor}{end}"
+
+    parts = CODE.split(text)
+    return "".join(part if number % 2 else LINK.sub(link, part) for number, part in enumerate(parts))
+
+
+def _read(app: Sphinx, docname: str, source: list[str]) -> None:
+    del app
+    if docname in GENERATED:
+        source[0] = GENERATED[docname]()
+    else:
+        text = (ROOT / BROUGHT[docname]).read_text("utf-8") if docname in BROUGHT else source[0]
+        if not docname.startswith("gallery/"):
+            text = brought(docname, text)
+        source[0] = text
+    if docname in BELOW:
+        source[0] += f"\n\n```{{toctree}}\n:hidden:\n:glob:\n\n{BELOW[docname]}\n```\n"
+
+
+def _short_code(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Marks code that is to stay in one line: an option would be broken after its dashes."""
+    del app, docname
+    for code in doctree.findall(nodes.literal):
+        if len(code.astext()) <= LONGEST_WHOLE and " " not in code.astext():
+            code["classes"].append("whole")
+
+
+def _changed(app: Sphinx, *_: object) -> list[str]:
+    """Pages whose source is not the file in docs/ are read at every build."""
+    return [name for name in (*GENERATED, *BROUGHT) if name in app.env.found_docs]
+
+
+def _outputs(app: Sphinx) -> None:
+    """Keeps what notebooks draw out of the folder of the pages, where myst-nb would write it beside the site."""
+    folder = str(Path(app.doctreedir).parent / "outputs")
+    app.env.mystnb_config = app.env.mystnb_config.copy(output_folder=folder)  # type: ignore[attr-defined]
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Registers the handlers."""
+    app.connect("builder-inited", _outputs, priority=900)
+    app.connect("source-read", _read)
+    app.connect("env-get-outdated", _changed)
+    app.connect("doctree-resolved", _short_code)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,52 @@
+"""The site of the documents, which Sphinx has built (`make docs`), as the service has it at `/docs/`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fastapi import FastAPI, Response
+from fastapi.responses import PlainTextResponse, RedirectResponse
+from starlette.staticfiles import StaticFiles
+
+from daq.config.documents import NOT_BUILT
+from server.access.headers import POLICY, SECURITY
+
+if TYPE_CHECKING:
+    import os
+
+    from starlette.types import Scope
+
+SITE_POLICY = SECURITY[POLICY].replace("form-action 'none'", "form-action 'self'")
+"""The service's policy, but for the form of the site's search. The build keeps scripts and styles out of the pages."""
+
+
+class Site(StaticFiles):
+    """Files of the site. A browser asks each time whether one has changed."""
+
+    def file_response(
+        self, full_path: str | os.PathLike[str], stat_result: os.stat_result, scope: Scope, status_code: int = 200
+    ) -> Response:
+        """The file, with the site's own policy."""
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        response.headers["Cache-Control"] = "no-cache"
+        response.headers[POLICY] = SITE_POLICY
+        return response
+
+
+def serve_site(app: FastAPI, index: Path | None) -> None:
+    """Serves the site at `/docs/`, from its first page on. Where it is not built (None), every address below says how
+    to build it."""
+
+    @app.get("/docs", include_in_schema=False)
+    async def documents() -> Response:
+        return RedirectResponse("docs/")  # relative: a proxy may serve all this below a path of its own
+
+    if index is not None:
+        app.mount("/docs", Site(directory=index.parent, html=True), "documents")
+        return
+
+    @app.get("/docs/{path:path}", include_in_schema=False)
+    async def not_built(path: str) -> Response:
+        del path
+        return PlainTextResponse(f"{NOT_BUILT}. The API's page is at /api/docs.\n", 503)
