@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from model import layout as at
 from model.drives.magnet import back_emf_constant
 from model.drives.piecewise import clamped, outside
-from model.dynamics.compilation import internal
+from model.dynamics.compilation import borrowing
 
 
-@internal
+@borrowing
 def motor_volts(command: complex, joint: NDArray[Any]) -> Any:
     """Volts at the motor for commanded volts: dead zone, then the supply's limit."""
     return clamped(outside(command, joint[at.DEAD_ZONE]), joint[at.SUPPLY])
 
 
-@internal
+@borrowing
 def warmed(
     rise: Any, hot: Any, volts: Any, begun: Any, ended: Any, mean: Any, duration: Any, joint: NDArray[Any]
 ) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from model import layout as at
 from model.drives.piecewise import clamped, rounded_half_up
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import compiled_borrowing
 
 POWER_MAX = 127.0
 """Largest magnitude of the 8-bit DAC's signed input."""
@@ -26,7 +26,7 @@ P, I, D, INNER_P, INNER_I, INNER_D, SCALE, RESOLUTION = range(8)  # noqa: E741
 GAINS = 8
 
 
-@compiled
+@compiled_borrowing
 def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise: bool, memory: NDArray[Any]) -> Any:
     """Power (DAC counts, ±127) for an error in ADC counts, as the board's integer arithmetic forms it (section 6.2).
 
@@ -47,7 +47,7 @@ def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise
     return clamped(power, POWER_MAX + 0.0 * power)
 
 
-@compiled
+@compiled_borrowing
 def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
     """The same without rounding, limit and wrong gain."""
     power = gains[SCALE] * (gains[P] * error + memory[SUM] / INTEGRAL_SHARE + gains[D] * (error - memory[LAST_ERROR]))
@@ -56,7 +56,7 @@ def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) 
     return power
 
 
-@compiled
+@compiled_borrowing
 def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
     """P e + I ∫e dt + D de/dt in SI units, rectangles for the integral and a backward difference."""
     memory[SUM] += error * period
@@ -65,7 +65,7 @@ def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: ND
     return gains[P] * error + gains[I] * memory[SUM] + gains[D] * slope
 
 
-@compiled
+@compiled_borrowing
 def cascade(error: complex, speed: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
     """Outer PID on position gives a speed set point, inner PID on speed gives the drive; SI units."""
     inner_error = sampled_pid(error, period, gains, memory) - speed
@@ -75,7 +75,7 @@ def cascade(error: complex, speed: complex, period: complex, gains: NDArray[Any]
     return gains[INNER_P] * inner_error + gains[INNER_I] * memory[INNER_SUM] + gains[INNER_D] * slope
 
 
-@compiled
+@compiled_borrowing
 def given_out(
     output: complex,
     error: complex,

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from model import layout as at
 from model.drives.piecewise import rounded_half_up
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import compiled_borrowing
 from model.dynamics.dual import sin_cos
 
 
-@compiled
+@compiled_borrowing
 def sensed_angle(angle: complex, joint: NDArray[Any]) -> Any:
     """Angle (rad) that the potentiometer reports: scale, shift and bend about the middle of its range."""
     middle = joint[at.AT_ZERO] + 0.5 * joint[at.RANGE]
@@ -31,7 +31,7 @@ def sensed_angle(angle: complex, joint: NDArray[Any]) -> Any:
     return sensed
 
 
-@compiled
+@compiled_borrowing
 def reading(angle: complex, noise: float, quantise: bool, joint: NDArray[Any]) -> Any:
     """Reading in counts (12 bits on the MA2000), or rad where the joint has no converter.
 

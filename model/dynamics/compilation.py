@@ -168,9 +168,23 @@ def compiled(function: Callable[..., Any], *, nogil: bool = False) -> Any:
     return _compile(function, cached=True, nogil=nogil)
 
 
+def compiled_borrowing(function: Callable[..., Any]) -> Any:
+    """Compiles, like `compiled`, a function that neither makes nor returns an array; see `borrowing`."""
+    return _compile(function, cached=True, _nrt=False)
+
+
 def internal(function: Callable[..., Any]) -> Any:
     """Compiles a function that only compiled code calls: no entry from Python, and kept only within its callers."""
     return _compile(function, cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def borrowing(function: Callable[..., Any]) -> Any:
+    """Compiles, like `internal`, a function that neither makes nor returns an array.
+
+    It borrows its caller's arrays and counts no references to them. Counting took longer than the arithmetic of a
+    control period, which is handed some twenty arrays. numba refuses to compile one that makes an array after all.
+    """
+    return _compile(function, cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

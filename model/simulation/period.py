@@ -20,7 +20,7 @@ from model.drives.controller import (
     sampled_pid,
 )
 from model.drives.sensor import reading
-from model.dynamics.compilation import internal
+from model.dynamics.compilation import borrowing, internal
 from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR_SPEED, SPEED
 from model.simulation.run_arrays import Arm, RecordRow
 
@@ -44,7 +44,7 @@ OUT_POSITION, OUT_SPEED, OUT_READING, OUT_ERROR, OUT_POWER, OUT_DRIVE = range(6)
 OUTPUTS = 6
 
 
-@internal
+@borrowing
 def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Array, out: Array) -> Any:
     """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts.
 
@@ -98,7 +98,7 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
     return drive
 
 
-@internal
+@borrowing
 def corrected(
     k: int,
     apart: complex,
@@ -151,7 +151,7 @@ def switching_times(shared: Array, joints: Array, order: Array, times: Array) ->
     return periods
 
 
-@internal
+@borrowing
 def step_count(duration: complex, step: float) -> int:
     """Equal steps of at most `step` s in a stretch of time; at least one."""
     return max(1, int(np.ceil(duration.real / step - 1e-9)))
@@ -162,7 +162,7 @@ BEGUN_POSITION, BEGUN_SPEED, BEGUN_RISE = range(3)
 BEGUN = 3
 
 
-@internal
+@borrowing
 def warms(joints: Array) -> bool:
     """Whether any winding warms: then each step of integration has its own resistance, and the steps stay the same."""
     found = False
@@ -171,7 +171,7 @@ def warms(joints: Array) -> bool:
     return found
 
 
-@internal
+@borrowing
 def begin_stretch(state: Array, volts: Array, duration: complex, joints: Array, flags: Array, begun: Array) -> None:
     """Remembers in `begun` (BEGUN, n) where each motor is; gives windings the resistance of the stretch's middle."""
     for j in range(joints.shape[0]):
@@ -184,7 +184,7 @@ def begin_stretch(state: Array, volts: Array, duration: complex, joints: Array, 
             state[j, RISE] = warmed(rise, rise, volts[j], speed, speed, speed, 0.5 * duration, joints[j])
 
 
-@internal
+@borrowing
 def end_stretch(state: Array, volts: Array, duration: complex, joints: Array, flags: Array, begun: Array) -> None:
     """Resistance of each winding after the stretch, from the motion that it had."""
     for j in range(joints.shape[0]):
