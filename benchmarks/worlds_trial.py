@@ -224,21 +224,16 @@ def _text(value: Any) -> str:
 
 def read_rows(file: Path) -> list[Row]:
     """Rows as they were written."""
-    questions = ("strict", "in_answer", "joints", "both", "honest", "alarm", "sharp")
-    numbers = ("d_prime", "excess_removed", "seconds")
     with file.open(newline="", encoding="utf-8") as lines:
-        return [
-            Row(
-                **{
-                    **line,
-                    "number": int(line["number"]),
-                    "seed": int(line["seed"]),
-                    **{name: bool(int(line[name])) if line[name] else None for name in questions},
-                    **{name: float(line[name]) if line[name] else None for name in numbers},
-                }
-            )
-            for line in csv.DictReader(lines)
-        ]
+        return [Row(**{name: _value(name, text) for name, text in line.items()}) for line in csv.DictReader(lines)]
+
+
+def _value(name: str, text: str) -> Any:
+    if name in ("strict", "in_answer", "joints", "both", "honest", "alarm", "sharp"):
+        return bool(int(text)) if text else None
+    if name in ("d_prime", "excess_removed", "seconds"):
+        return float(text) if text else None
+    return int(text) if name in ("number", "seed") else text
 
 
 def table(rows: Sequence[Row]) -> list[str]:

@@ -18,7 +18,7 @@ REGISTRATION = trial.WorldsRegistration(
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, str]]:
     """Arms that were made, without their computation: planar ones take three times as long."""
-    asked = []
+    asked: list[tuple[str, int, str]] = []
 
     def make(place: Path, kind: str, seed: int, case: str, longest: float) -> None:
         asked.append((kind, seed, case))
