@@ -28,7 +28,9 @@ from tests.worlds.world import CASES, case_of
 Json = dict[str, Any]
 
 LONGEST = 900.0
-"""s that a diagnosis may take; one that takes longer is wrong in every question."""
+"""s that a diagnosis may take; one that takes longer gives no answer."""
+HONEST = ("unknown-effect", "suspected", "ambiguous")
+"""Verdicts that are right of an effect outside the library, if no step gives it one name."""
 TOLD_APART = 5.0
 """Least d′ at which a rival, or the sound arm, is told apart."""
 
@@ -72,7 +74,8 @@ def score(truth: Json, answer: Json | None) -> Score:
     if case == "sound":
         return Score(alarm=verdict != "nothing-significant")
     if case == "open":
-        return Score(honest=verdict in ("unknown-effect", "ambiguous"))
+        named = any(len(names) == 1 for names in steps) and verdict != "suspected"
+        return Score(honest=verdict in HONEST and not named)
     known = [{hidden["name"]} for hidden in truth["hidden"]]
     if case == "pair":
         single = [names for names in steps if len(names) == 1]
@@ -104,8 +107,8 @@ def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) 
     return strict or (answered and all(names <= untold | right for names in steps))
 
 
-def diagnose(lab: Path) -> Json | None:
-    """The answer of the command in a rig's folder, from its own records alone; None when it fails."""
+def diagnose(lab: Path, longest: float = LONGEST) -> Json | None:
+    """The answer of the command in a rig's folder, from its own records alone; None when it fails or is too late."""
     command = [str(Path(sys.executable).parent / "daq"), "diagnose", "training.csv", "--holdout", "held_out.csv"]
     environment = {name: value for name, value in os.environ.items() if not name.upper().startswith("DAQ_")}
     try:
@@ -116,10 +119,10 @@ def diagnose(lab: Path) -> Json | None:
             capture_output=True,
             text=True,
             check=False,
-            timeout=LONGEST,
+            timeout=longest,
         )
     except subprocess.TimeoutExpired:
-        print(f"{lab}: no answer within {LONGEST:.0f} s", file=sys.stderr)
+        print(f"{lab}: no answer within {longest:.0f} s", file=sys.stderr)
         return None
     if run.returncode:
         print(f"{lab}: exit code {run.returncode}: {run.stderr.strip()[-300:]}", file=sys.stderr)

@@ -47,6 +47,10 @@ def blind(
     until: Annotated[
         Literal["detect", "record", "diagnose", "score"], typer.Option(help="Last stage to carry out.")
     ] = "score",
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0, help="Begin nothing more after this time, in s; the same command continues. 0: the table."),
+    ] = None,
     hashes: Annotated[
         bool,
         typer.Option("--hashes", help="Print the hashes and versions that a registration must hold, and run nothing."),
@@ -83,7 +87,7 @@ def blind(
     campaign = Campaign(kept, load_machine("ma2000"), until=until)
     count = len(set(chosen))
     with ending(open_workers(executor)) as workers:
-        left = campaign.run(chosen, workers, lambda number, said: console().print(f"{number}/{count}  {said}"))
+        left = campaign.run(chosen, workers, lambda number, said: console().print(f"{number}/{count}  {said}"), seconds)
     _show(campaign, folder, as_json=json)
     if left:
         console().print(f"{left} cases are not done; the same command continues with them")

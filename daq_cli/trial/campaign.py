@@ -4,6 +4,7 @@ result kept."""
 from __future__ import annotations
 
 import fcntl
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +12,7 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -66,12 +68,13 @@ class Campaign:
     """The experiment of a name."""
     recorder: Callable[[int, str, ExperimentSpec, Machine, Path], Recorded] = record
 
-    def run(self, seeds: Sequence[int], workers: Workers, progress: Progress) -> int:
+    def run(self, seeds: Sequence[int], workers: Workers, progress: Progress, seconds: float | None = None) -> int:
         """Carries out the stages that are left of all cases; `progress` is called after every case. This process alone
-        writes the lines; the workers must see the folder.
+        writes the lines; the workers must see the folder. After `seconds` no further stage is begun.
 
         Returns how many are not done, because a process of theirs failed; they are tried again next time.
         """
+        end = math.inf if seconds is None else time.monotonic() + seconds
         write_set_points(self.experiment(self._seen_by), self.machine, self._set_points)
         ended, failed = 0, 0
         left = deque[CaseStage]()
@@ -88,7 +91,8 @@ class Campaign:
         for seed in self.folder.in_order(seeds):
             go_on(seed, first=True)
         anywhere = replace(self, folder=TrialFolder(self.folder.path, self.folder.asked))
-        for task, future in done_in_any_order(workers, anywhere._carry_out, growing(left)):
+        in_time = takewhile(lambda _: time.monotonic() < end, growing(left))
+        for task, future in done_in_any_order(workers, anywhere._carry_out, in_time):
             try:
                 self.folder.add(task.stage, future.result())
             except (TrialStageError, BrokenExecutor) as error:

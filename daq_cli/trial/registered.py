@@ -108,10 +108,11 @@ def read_registration(path: Path, run: str) -> tuple[Registration, str]:
         raise SpecError(f"{table}: this run has been made; another one needs a registration of its own, with new seeds")
     paths = dict.fromkeys((*REGISTERED, *registration.hashes))
     registration.check_code(tree_hashes(paths), library_versions(), str(path))
-    return registration, _commit(path)
+    return registration, registering_commit(path)
 
 
-def _commit(path: Path) -> str:
+def registering_commit(path: Path) -> str:
+    """The commit that last changed a registration. Raises SpecError unless it is committed as it stands."""
     if _git(path, "status", "--porcelain", "--", path.name):
         raise SpecError(f"registration {path}: is not committed as it stands; the commit's hash draws the seeds")
     commit = _git(path, "log", "-1", "--format=%H", "--", path.name)

@@ -23,6 +23,7 @@ class JointScale:
         strongest, highest: bounds of torque (N·m, N) and drive: those two for a motor; infinite for a plain gain, of
             which a machine file does not say how far it is driven.
         speed: speed without load at that voltage, rad/s (m/s); 1 where the drive has no back-EMF.
+        fastest: bound of speed: that one, or infinite where the drive has no back-EMF.
         resolution: one count of its sensor, rad (m); a 4096th of a turn where it has none.
         range: of its sensor, rad (m); one turn where it has none.
         gear: motor turns per joint turn. viscous: motor-side damping from the machine file, N·m·s/rad.
@@ -35,6 +36,7 @@ class JointScale:
     strongest: float
     highest: float
     speed: float
+    fastest: float
     resolution: float
     range: float
     viscous: float

@@ -51,7 +51,7 @@ FRICTION = (
                 null=None,
                 start=lambda s: 0.03 * s.speed,
                 low=1e-3,
-                high=lambda s: s.speed,
+                high=lambda s: s.fastest,
                 deviation=lambda s: 0.02 * s.speed,
             ),
         ),

@@ -75,4 +75,5 @@ def as_driven(model: Model, column: int, drive: Floats, speed: float) -> JointSc
         strongest=math.inf,
         highest=math.inf,
         speed=speed,
+        fastest=speed,
     )

@@ -253,6 +253,7 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
         strongest=torque if bounded else math.inf,
         highest=volts if bounded else math.inf,
         speed=speed or 1.0,
+        fastest=speed or math.inf,
         resolution=range_ / counts,
         range=range_,
         viscous=0.0 if friction is None else friction.value,

@@ -32,8 +32,8 @@ class Run(FrozenRecord):
         return cases
 
 
-class Registration(FrozenRecord):
-    """A registration file.
+class RegisteredCode(FrozenRecord):
+    """The part of every registration that says which code and libraries it is of.
 
     `hashes`: SHA-256 of files and folders of the source tree, by path. `versions`: of libraries; the first
     registrations have none.
@@ -41,11 +41,36 @@ class Registration(FrozenRecord):
 
     version: Literal[1]
     title: str
+    hashes: dict[str, str]
+    versions: dict[str, str] = {}
+
+    def check_code(self, hashes: dict[str, str], versions: dict[str, str], origin: str) -> None:
+        """Raises SpecError when part of the present code is not registered, or differs from what was registered.
+
+        Args:
+            hashes, versions: of all that decides the outcome, as they are found. origin: the file, for the message.
+        """
+        found, registered = {**hashes, **versions}, {**self.hashes, **self.versions}
+        missing = [name for name in found if name not in registered]
+        if missing:
+            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+            raise SpecError(
+                f"registration {origin}: lacks {', '.join(missing[:3])}{more}, which decide the outcome; "
+                "`daq blind --folder trial --hashes` prints all that it has to hold"
+            )
+        changed = [name for name, value in registered.items() if found.get(name) != value]
+        if changed:
+            raise SpecError(
+                f"{', '.join(changed)}: not as registered; a trial of other code needs a registration of its own"
+            )
+
+
+class Registration(RegisteredCode):
+    """A registration file of arms of the mock."""
+
     detectable: float
     loads: tuple[str, ...] = LOAD_CYCLE
     runs: dict[str, Run]
-    hashes: dict[str, str]
-    versions: dict[str, str] = {}
 
     @field_validator("detectable")
     @classmethod
@@ -71,26 +96,6 @@ class Registration(FrozenRecord):
     def arms(self, name: str, commit: str) -> list[int]:
         """Seeds of a run, drawn from the commit that registered it."""
         return drawn_arms(commit, self.run(name).cases, self.loads)
-
-    def check_code(self, hashes: dict[str, str], versions: dict[str, str], origin: str) -> None:
-        """Raises SpecError when part of the present code is not registered, or differs from what was registered.
-
-        Args:
-            hashes, versions: of all that decides the outcome, as they are found. origin: the file, for the message.
-        """
-        found, registered = {**hashes, **versions}, {**self.hashes, **self.versions}
-        missing = [name for name in found if name not in registered]
-        if missing:
-            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
-            raise SpecError(
-                f"registration {origin}: lacks {', '.join(missing[:3])}{more}, which decide the outcome; "
-                "`daq blind --folder trial --hashes` prints all that it has to hold"
-            )
-        changed = [name for name, value in registered.items() if found.get(name) != value]
-        if changed:
-            raise SpecError(
-                f"{', '.join(changed)}: not as registered; a trial of other code needs a registration of its own"
-            )
 
 
 def parse_registration(text: str, origin: str) -> Registration:

@@ -194,6 +194,13 @@ def test_a_resumed_trial_repeats_no_stage(done: Campaign) -> None:
     assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
 
 
+def test_nothing_is_begun_once_the_time_is_over(tmp_path: Path) -> None:
+    stopped = trial(tmp_path, until="detect")
+    assert stopped.run(SECRETS, WorkersByHand(), lambda _number, _said: None, seconds=0.0) == 0
+    assert stopped.folder.rows("detect") == []
+    assert stopped.table().cases == 0
+
+
 def test_a_trial_can_be_resumed_from_its_lines_in_another_folder(done: Campaign, tmp_path: Path) -> None:
     for name in ("trial.json", *(f"{stage}.jsonl" for stage in STAGES)):
         (tmp_path / name).write_bytes((done.folder.path / name).read_bytes())

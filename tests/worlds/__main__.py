@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from tests.worlds.folder import write_world
-from tests.worlds.kinds import KINDS, TUNING
+from tests.worlds.kinds import KINDS, REPORTING
 from tests.worlds.world import CASES
 
 
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     asked = parser.parse_args(arguments)
     if asked.list:
         for name, kind in KINDS.items():
-            print(f"{name:<18} {'tuning' if name in TUNING else 'reporting':<10} {kind.joints} joints")
+            print(f"{name:<18} {'reporting' if name in REPORTING else 'tuning':<10} {kind.joints} joints")
         return 0
     if asked.folder is None or asked.kind is None:
         parser.error("FOLDER and --kind are needed")

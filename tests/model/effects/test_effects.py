@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, simulate
 from tests.model.simulation.records import ramp_inputs
 
+EXAMPLES = Path(__file__).parents[3] / "examples"
 SMOOTH = Options(quantise=False)
 ADDS_STATE_AT_NULL = {"backlash", "joint_compliance", "motor_inductance"}
 """Their state stays, at its null value, as a stiff contact, or a fast current."""
@@ -204,3 +207,15 @@ def test_shared_effects_have_one_parameter_for_all_their_joints(model: Model) ->
     shared = model.with_effect("coulomb_friction", (1, 3), {"torque": 0.7}, shared=True)
     assert shared.parameter("joints1+3.coulomb_friction.torque").value == 0.7
     assert [shared.vector[at.slot(j, at.COULOMB)] for j in (1, 2, 3)] == [0.7, 0.0, 0.7]
+
+
+def test_friction_may_fade_at_any_speed_where_no_file_says_how_fast_a_joint_gets() -> None:
+    """A plain gain has no speed without load; the records of its motion say how fast it gets."""
+    machine = load_machine(str(EXAMPLES / "linear_axis.toml"))
+    model = base_model(machine).with_effect("stribeck_friction", (1,), {"torque": 1.0, "speed": 2.8})
+    assert model.values["joint1.stribeck_friction.speed"] == 2.8
+    motor = base_model(load_machine("ma2000")).with_effect("stribeck_friction", (1,))
+    fastest = motor.parameter("joint1.stribeck_friction.speed").high
+    with pytest.raises(SpecError, match=r"speed = 99\.0 rad/s: allowed are"):
+        motor.with_values({"joint1.stribeck_friction.speed": 99.0})
+    assert 0.5 < fastest < 10.0

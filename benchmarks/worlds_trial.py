@@ -1,0 +1,317 @@
+"""A registered trial in worlds that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
+
+    python -m benchmarks worlds_trial --hashes                                                      # for a registration
+    python -m benchmarks worlds_trial --registration docs/trial/worlds-1.toml --folder FOLDER --seconds 500
+    python -m benchmarks worlds_trial --folder FOLDER --detectability|--sharpness --seconds 500
+    python -m benchmarks worlds_trial --table docs/trial/worlds-1.csv
+
+The second is given again until there are enough arms: each goes on where the last one stopped. Seeds are drawn from the
+commit that registered the file, cases take turns, and the kind on which the least time was spent comes next. The third
+works out from the truth which effects a sound arm can imitate, and for those not named strictly which rivals can.
+Every arm is a line of FOLDER/cases.csv; the last prints the table of such lines. docs/worlds.md has the rules.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from hashlib import sha256
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from benchmarks.worlds import QUESTIONS, TOLD_APART, diagnose, names_of, score
+from daq.contracts.documents import parse_toml, read_text
+from daq_cli.trial.registered import (
+    REGISTERED,
+    library_versions,
+    registering_commit,
+    tree_hashes,
+)
+from model.discrepancy.diagnosis import Diagnosis
+from model.trial.rates import rate
+from model.trial.registration import RegisteredCode
+from model.trial.score import excess_removed_whole
+from tests.worlds.folder import write_world
+from tests.worlds.kinds import KINDS
+from tests.worlds.world import hidden_rig
+
+DECIDES = (*REGISTERED, "daq_cli", "tests/worlds", "benchmarks/worlds.py", "benchmarks/worlds_trial.py")
+"""Parts of the source tree that decide the outcome."""
+FIRST_DRAWN = 10**6
+"""Smallest seed that a commit draws; smaller ones are for tuning and tests."""
+TO_REACH = {
+    "strict": "≥ 85 %",
+    "sharp": "≥ 95 %",
+    "both": "≥ 88 %",
+    "honest": "≥ 92 %",
+    "alarm": "≤ 1 %",
+}
+LEAST_CASES = {"strict": 200, "sharp": 200, "alarm": 200, "both": 60}
+"""Arms with fewer of which a rate is said to have too few."""
+
+
+class WorldsRegistration(RegisteredCode):
+    """Arms of kinds of world. `cases` take turns; an answer that takes more than `longest` s is none."""
+
+    kinds: tuple[str, ...]
+    cases: tuple[str, ...]
+    longest: float
+
+    def seed(self, commit: str, kind: str, number: int) -> int:
+        """The seed of an arm, drawn from the commit that registered it."""
+        return FIRST_DRAWN + int(sha256(f"{commit} {kind} {number}".encode()).hexdigest()[:12], 16)
+
+
+@dataclass(frozen=True)
+class Row:
+    """An arm, what was answered, and what that is worth; None where a question is not asked."""
+
+    kind: str
+    number: int
+    seed: int
+    case: str
+    hidden: str
+    verdict: str
+    answered: str
+    strict: bool | None
+    in_answer: bool | None
+    joints: bool | None
+    both: bool | None
+    honest: bool | None
+    alarm: bool | None
+    d_prime: float | None
+    """Between the arm with and without its effect; None where it was not computed."""
+    sharp: bool | None
+    """None where it was not worked out, and where the sound arm can imitate the effect."""
+    excess_removed: float | None
+    seconds: float
+
+    @property
+    def resolved(self) -> bool:
+        """Whether it is known if the answer was as sharp as the record allows, or that the effect is not detectable."""
+        return self.sharp is not None or (self.d_prime is not None and self.d_prime < TOLD_APART)
+
+
+def place_of(folder: Path, kind: str, number: int) -> Path:
+    return folder / f"{kind}-{number}"
+
+
+def make_arm(place: Path, kind: str, seed: int, case: str, longest: float) -> None:
+    """Writes a rig's folder and asks for the answer. A rig whose loop does not bear its effect has neither."""
+    begun = monotonic()
+    kept: dict[str, Any] = {"kind": kind, "seed": seed, "case": case, "late": False, "answer": None, "seconds": 0.0}
+    try:
+        write_world(place, kind, seed, case)
+    except ValueError as error:
+        kept |= {"void": str(error)}
+        place.mkdir(parents=True, exist_ok=True)
+    else:
+        asked = monotonic()
+        kept["answer"] = diagnose(place / "lab", longest)
+        kept["seconds"] = monotonic() - asked
+        kept["late"] = kept["answer"] is None and kept["seconds"] >= longest
+    kept["spent"] = monotonic() - begun
+    (place / "answer.json").write_text(json.dumps(kept), "utf-8")
+
+
+def kept_in(folder: Path, kind: str, number: int) -> dict[str, Any] | None:
+    """What an arm's folder keeps; None where the arm has not been run to its end."""
+    file = place_of(folder, kind, number) / "answer.json"
+    if not file.exists():
+        return None
+    found: dict[str, Any] = json.loads(file.read_text("utf-8"))
+    return found
+
+
+def numbers(folder: Path, kind: str) -> list[int]:
+    """Numbers of a kind's arms that have been run, from 0 on without a gap."""
+    found = 0
+    while kept_in(folder, kind, found) is not None:
+        found += 1
+    return list(range(found))
+
+
+def run(registration: WorldsRegistration, commit: str, folder: Path, seconds: float) -> None:
+    """Runs arm after arm, the kind on which the least time was spent first, and begins none after `seconds`."""
+    end = monotonic() + seconds
+    done = {kind: len(numbers(folder, kind)) for kind in registration.kinds}
+    spent = {kind: sum((kept_in(folder, kind, n) or {})["spent"] for n in range(count)) for kind, count in done.items()}
+    while monotonic() < end:
+        kind = min(registration.kinds, key=lambda kind: spent[kind])
+        number = done[kind]
+        case = registration.cases[number % len(registration.cases)]
+        make_arm(
+            place_of(folder, kind, number), kind, registration.seed(commit, kind, number), case, registration.longest
+        )
+        kept = kept_in(folder, kind, number) or {}
+        done[kind], spent[kind] = number + 1, spent[kind] + kept["spent"]
+        made = row_of(folder, kind, number)
+        said = f"{made.hidden or made.case} -> {made.verdict}: {made.answered}" if made else kept["void"]
+        print(f"{kind} {number}: {said} ({kept['seconds']:.0f} of {kept['spent']:.0f} s)", flush=True)
+
+
+def row_of(folder: Path, kind: str, number: int) -> Row | None:
+    """An arm's row; None where its loop does not bear its effect."""
+    kept = kept_in(folder, kind, number)
+    if kept is None or "void" in kept:
+        return None
+    truth, answer = json.loads((place_of(folder, kind, number) / "truth.json").read_text("utf-8")), kept["answer"]
+    worth = score(truth, answer)
+    names = [" | ".join(sorted(names)) for names in names_of(answer or {"steps": []})]
+    rivals = truth.get("sharpness", [])
+    none = [rival["d_prime"] for rival in rivals if rival["name"] == "none"]
+    known = worth.strict or any(rival["name"] not in ("none", "own") for rival in rivals)
+    return Row(
+        *(kind, number, kept["seed"], kept["case"]),
+        hidden="; ".join(f"{one['name']} {one['joint'] or ''}".strip() for one in truth["hidden"]),
+        verdict=answer["verdict"] if answer else ("late" if kept["late"] else "failed"),
+        answered="; ".join(names),
+        strict=worth.strict,
+        in_answer=worth.answered,
+        joints=worth.joints,
+        both=worth.both,
+        honest=worth.honest,
+        alarm=None if kept["late"] else worth.alarm,
+        d_prime=none[0] if none else None,
+        sharp=worth.sharp if known else None,
+        excess_removed=excess_removed_whole(Diagnosis.model_validate(answer)) if answer else None,
+        seconds=kept["seconds"],
+    )
+
+
+def add_sharpness(folder: Path, seconds: float, *, rivals_too: bool) -> None:
+    """Adds d′ against the sound arm to single effects of arms of one and two joints; with `rivals_too`, d′ against
+    every rival to those of them that were not named strictly."""
+    from tests.worlds.sharpness import sharpness
+
+    end = monotonic() + seconds
+    for kind in (kind for kind in KINDS if KINDS[kind].joints <= 2):
+        for row in filter(None, (row_of(folder, kind, number) for number in numbers(folder, kind))):
+            if row.case != "single" or (row.d_prime is not None if not rivals_too else row.strict or row.resolved):
+                continue
+            if monotonic() > end:
+                return
+            rivals = sharpness(hidden_rig(kind, row.seed, row.case), None if rivals_too else ())
+            file = place_of(folder, kind, row.number) / "truth.json"
+            truth = json.loads(file.read_text("utf-8")) | {"sharpness": [asdict(rival) for rival in rivals]}
+            file.write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
+            untold = [rival.name for rival in rivals if rival.d_prime < TOLD_APART and rival.name != "own"]
+            print(f"{kind} {row.number}: d′ {rivals[0].d_prime:.1f}; not told apart: {untold}", flush=True)
+
+
+def rows_of(folder: Path) -> list[Row]:
+    """The rows of all arms that were run; they are written to cases.csv."""
+    found = [row for kind in KINDS for n in numbers(folder, kind) if (row := row_of(folder, kind, n)) is not None]
+    with (folder / "cases.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, [field.name for field in fields(Row)])
+        table.writeheader()
+        table.writerows({key: _text(value) for key, value in asdict(row).items()} for row in found)
+    return found
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(int(value) if isinstance(value, bool) else value)
+
+
+def read_rows(file: Path) -> list[Row]:
+    """Rows as they were written."""
+    with file.open(newline="", encoding="utf-8") as lines:
+        return [Row(**{name: _value(name, text) for name, text in line.items()}) for line in csv.DictReader(lines)]
+
+
+def _value(name: str, text: str) -> Any:
+    if name in ("strict", "in_answer", "joints", "both", "honest", "alarm", "sharp"):
+        return bool(int(text)) if text else None
+    if name in ("d_prime", "excess_removed", "seconds"):
+        return float(text) if text else None
+    return int(text) if name in ("number", "seed") else text
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """The table as Markdown: each rate with its exact 95 % interval, in all and by kind of world."""
+    kinds = list(dict.fromkeys(row.kind for row in rows))
+    seen = [row for row in rows if row.d_prime is None or row.d_prime >= TOLD_APART]
+    lines = [f"| what | to reach | all | {' | '.join(kinds)} |", "|" + "---|" * (len(kinds) + 3)]
+
+    def line(words: str, reach: str, question: str, of: Iterable[Row]) -> None:
+        some = list(of)
+        cells = [rate(getattr(row, question) for row in some if row.kind == kind) for kind in kinds]
+        whole = rate(getattr(row, question) for row in some)
+        few = " (too few)" if whole.cases < LEAST_CASES.get(question, 0) else ""
+        parts = " | ".join(f"{cell.hits}/{cell.cases}" if cell.cases else "–" for cell in cells)
+        lines.append(f"| {words} | {reach} | {whole}{few} | {parts} |")
+
+    line("named right, strict, of all single effects", TO_REACH["strict"], "strict", rows)
+    line("the same without those of which d′ is known to be below 5", TO_REACH["strict"], "strict", seen)
+    open_ = sum(row.case == "single" and row.d_prime is not None and not row.resolved for row in rows)
+    line(f"as sharp as the record allows ({open_} not worked out)", TO_REACH["sharp"], "sharp", rows)
+    line("right one among what is named", "", "in_answer", rows)
+    line("joint right, where the right one is named", "", "joints", rows)
+    line("false alarm on sound arms", TO_REACH["alarm"], "alarm", rows)
+    line(QUESTIONS["both"], TO_REACH["both"], "both", rows)
+    line(QUESTIONS["honest"], TO_REACH["honest"], "honest", rows)
+    late = {kind: sum(row.verdict == "late" for row in rows if row.kind == kind) for kind in kinds}
+    lines.append(f"| no answer in the time | | {sum(late.values())} | {' | '.join(map(str, late.values()))} |")
+    medians = [f"{np.median([row.seconds for row in rows if row.kind == kind]):.0f}" for kind in kinds]
+    times = np.percentile([row.seconds for row in rows], (50, 95))
+    lines.append(
+        f"| whole command, s: median, 95th percentile | | {times[0]:.0f}, {times[1]:.0f} | {' | '.join(medians)} |"
+    )
+    removed = [row.excess_removed for row in rows if row.case == "single" and row.excess_removed is not None]
+    if removed:
+        low, middle = np.percentile(removed, (10, 50))
+        words = f"{100 * middle:.1f}, {100 * low:.1f} % of {len(removed)}"
+        lines.append(
+            f"| held-out excess removed from single effects: median, 10th percentile | ≥ 98, ≥ 90 % | {words} |"
+            + " |" * len(kinds)
+        )
+    return lines
+
+
+def main() -> int:
+    """The exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks worlds_trial", description=(__doc__ or "").partition("\n")[0]
+    )
+    parser.add_argument("--registration", type=Path)
+    parser.add_argument("--folder", type=Path, help="keeps the rigs and answers")
+    parser.add_argument("--seconds", type=float, default=500.0, help="no arm is begun after this time")
+    parser.add_argument("--detectability", action="store_true", help="add d′ against the sound arm")
+    parser.add_argument("--sharpness", action="store_true", help="add d′ against every rival, where a name was wrong")
+    parser.add_argument("--table", type=Path, help="print the table of these lines, and run nothing")
+    parser.add_argument("--hashes", action="store_true", help="print what a registration has to hold of the code")
+    asked = parser.parse_args()
+    if asked.hashes:
+        hashed = [f'"{path}" = "{digest}"' for path, digest in tree_hashes(DECIDES).items()]
+        versions = [f'{name} = "{found}"' for name, found in library_versions().items()]
+        print("\n".join(["[hashes]", *hashed, "", "[versions]", *versions]))
+        return 0
+    if asked.table is not None:
+        print("\n".join(table(read_rows(asked.table))))
+        return 0
+    afterwards = asked.detectability or asked.sharpness
+    if asked.folder is None or (asked.registration is None) == (not afterwards):
+        parser.error("--folder with --registration, --detectability or --sharpness; or --table; or --hashes")
+    if afterwards:
+        add_sharpness(asked.folder, asked.seconds, rivals_too=asked.sharpness)
+    else:
+        registration = WorldsRegistration.model_validate(
+            parse_toml(read_text(asked.registration, str(asked.registration)), str(asked.registration))
+        )
+        registration.check_code(tree_hashes(DECIDES), library_versions(), str(asked.registration))
+        run(registration, registering_commit(asked.registration), asked.folder, asked.seconds)
+    print("\n" + "\n".join(table(rows_of(asked.folder))))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
