@@ -144,23 +144,36 @@ _HOME = {
 no compiler."""
 
 _ON_A_ROBOT = {"Arm", "Run", "RunError", "connect", "machine_from_urdf", "plot", "run"}
+_ON_A_SERVICE = {"LocalService"}
 _WITH_MODELS = {
     "DesignOptions",
     "DesignedExperiments",
+    "FitOptions",
+    "FitResult",
+    "Profile",
+    "Reproduction",
     "Simulation",
+    "TorqueFit",
     "batch",
     "design",
     "diagnose",
     "feedforward",
     "fit",
+    "fit_torques",
     "followed",
     "learn",
+    "profile",
+    "reproduce_thesis",
     "simulate",
     "validate",
     "write_mjcf",
     "write_urdf",
 }
-_NEEDED: dict[Extra, tuple[str, ...]] = {"robot": ("matplotlib", "mujoco", "pydantic_settings"), "model": ("numba",)}
+_NEEDED: dict[Extra, tuple[str, ...]] = {
+    "robot": ("matplotlib", "mujoco", "pydantic_settings"),
+    "model": ("numba",),
+    "server": ("uvicorn",),
+}
 """Packages that tell whether an extra is installed."""
 
 __all__ = [  # noqa: PLE0604
@@ -196,4 +209,6 @@ def _extra_of(name: str) -> Extra | None:
     """The extra that a public name needs; None for one that a client's installation has."""
     if name in _WITH_MODELS:
         return "model"
+    if name in _ON_A_SERVICE:
+        return "server"
     return "robot" if name in _ON_A_ROBOT else None

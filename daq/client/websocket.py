@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from daq.client.errors import ServiceNotReachedError
@@ -32,16 +33,19 @@ class WebSocket:
 
         self._url = url
         self._closed = ConnectionClosed
+        self._closed_last = ExitStack()
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
         try:
-            self._socket = connect(
-                url,
-                additional_headers=headers,
-                open_timeout=within,
-                close_timeout=CLOSE_WITHIN,
-                max_size=largest,
-                compression=None,
-                proxy=proxy,
+            self._socket = self._closed_last.enter_context(
+                connect(
+                    url,
+                    additional_headers=headers,
+                    open_timeout=within,
+                    close_timeout=CLOSE_WITHIN,
+                    max_size=largest,
+                    compression=None,
+                    proxy=proxy,
+                )
             )
         except (OSError, InvalidHandshake, InvalidProxy, InvalidURI, TimeoutError) as error:
             raise ServiceNotReachedError(f"{url}: no stream: {error or 'no answer in time'}") from error
@@ -64,7 +68,7 @@ class WebSocket:
 
     def close(self) -> None:
         """Ends the connection."""
-        self._socket.close()
+        self._closed_last.close()
 
     def _lost(self, error: ConnectionClosed) -> ServiceNotReachedError:
         reason = error.rcvd.reason if error.rcvd is not None and error.rcvd.reason else "the connection is lost"

@@ -58,10 +58,13 @@ class FleetRobotSettings(FrozenRecord):
     """Table `[robots.NAME]`: one of several robots (docs/fleet.md)."""
 
     machine: str = "ma2000"
+    """A machine of the package, or a machine file."""
     port: str | None = None
+    """URL of its port; without one, runs use a mock."""
     memory_map: Path | None = None
+    """File of its memory map; without one, that of the package."""
     limits: Limits | None = None
-    """As in `RobotSettings`."""
+    """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
     traces: Path | None = None
     """Folder of its traces; None for the folder of its name in that of `[traces]`."""
     unattended: TrueOrFalse = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 
 from daq.acquisition.stop_socket import StopAttempt, request_stop
 
@@ -22,7 +23,7 @@ def attempts(robot: str | None = None) -> list[StopAttempt]:
 
 
 def _named(arguments: Sequence[str]) -> str | None:
-    for one, after in zip(arguments, (*arguments[1:], None), strict=True):
+    for one, after in zip_longest(arguments, arguments[1:]):
         name = after if one == "--robot" else one.removeprefix("--robot=") if one.startswith("--robot=") else None
         if name is not None:
             return name

@@ -16,6 +16,8 @@ BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.M
 RUN: Mapping[tuple[str, str], str] = {
     ("batches.md", "console"): "tests/daq_cli/test_batches_page.py",
     ("batches.md", "python"): "tests/daq_cli/test_batches_page.py",
+    ("fleet.md", "console"): "tests/server/fleet/test_page.py",
+    ("fleet.md", "python"): "tests/server/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",
     ("one-joint-rig.md", "python"): "tests/repository/test_snippets.py",
     ("own-effect.md", "python"): "tests/model/effects/test_own_effect.py",
@@ -27,6 +29,7 @@ RUN: Mapping[tuple[str, str], str] = {
 }
 """The test that runs a page's blocks of a language."""
 NOT_RUN: Mapping[tuple[str, str], str] = {
+    ("archive.md", "console"): "needs a store; tests/server/archive/test_service.py gives the same commands",
     ("thesis.md", "python"): "takes minutes; tests/model/thesis/test_page.py makes the same calls",
 }
 """Why a page's blocks of a language are not run. That what they import exists is checked all the same."""

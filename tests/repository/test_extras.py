@@ -99,7 +99,7 @@ def test_each_public_name_works_for_a_client_or_says_which_extra_it_needs(tmp_pa
     found = run_without(packages_beyond(), NAMES, tmp_path)
     for name, said in found["said"].items():
         assert re.fullmatch(
-            rf"MissingExtraError: ma2000\.{name} needs the package \w+: pip install 'ma2000-daq\[(robot|model)\]'", said
+            rf"MissingExtraError: ma2000\.{name} needs the package \w+: pip install 'ma2000-daq\[(robot|model|server)\]'", said
         )
     assert not {"Client", "read_trace", "read_traces", "write_trace", "load_machine"} & set(found["said"])
     only_when_called = {"plot", "batch", "write_urdf", "write_mjcf"}

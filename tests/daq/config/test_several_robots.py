@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.config import load_settings
+from daq.config.settings import load_settings
 from daq.config.toml_text import settings_text
 from daq.contracts.errors import SpecError
 
