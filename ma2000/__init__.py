@@ -148,8 +148,6 @@ _ON_A_SERVICE = {"LocalService"}
 _WITH_MODELS = {
     "DesignOptions",
     "DesignedExperiments",
-    "FitOptions",
-    "FitResult",
     "Profile",
     "Reproduction",
     "Simulation",

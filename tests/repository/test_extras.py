@@ -98,9 +98,9 @@ def test_a_client_needs_little() -> None:
 def test_each_public_name_works_for_a_client_or_says_which_extra_it_needs(tmp_path: Path) -> None:
     found = run_without(packages_beyond(), NAMES, tmp_path)
     for name, said in found["said"].items():
-        assert re.fullmatch(
-            rf"MissingExtraError: ma2000\.{name} needs the package \w+: pip install 'ma2000-daq\[(robot|model|server)\]'", said
-        )
+        line = rf"MissingExtraError: ma2000\.{name} needs the package \w+: "
+        line += r"pip install 'ma2000-daq\[(robot|model|server)\]'"
+        assert re.fullmatch(line, said)
     assert not {"Client", "read_trace", "read_traces", "write_trace", "load_machine"} & set(found["said"])
     only_when_called = {"plot", "batch", "write_urdf", "write_mjcf"}
     assert set(found["offered"]) == {*_HOME, "__version__"} - set(found["said"]) - only_when_called
