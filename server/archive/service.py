@@ -45,8 +45,8 @@ CHECKED_LATELY = timedelta(hours=1)
 RETRY_AFTER = 2
 """Time (s) after which a client asks again for a trace that is being fetched."""
 HEARD_WITHIN = 60.0
-"""Time (s) for which a failed fetch answers the next request: who waits for it asks every RETRY_AFTER, and whoever comes
-later has it tried again."""
+"""Time (s) for which a failed fetch answers the next request: who waits for it asks every RETRY_AFTER, and whoever
+comes later has it tried again."""
 MB = 1_000_000
 log = logging.getLogger("server.archive")
 
@@ -212,8 +212,8 @@ class ArchiveService:
             found.append(f"{status.problem}; {status.waiting} traces wait to be sent, and stay here until then")
         # Of either, one line for all: those of hundreds would hide the others.
         for failing in (self._attempts.failing, self._unreadable):
-            if lines := list(failing.copy().values()):
-                found.append(lines[0] if len(lines) == 1 else f"{lines[0]}; and {len(lines) - 1} other traces fail")
+            lines = list(failing.copy().values())
+            found += [f"{lines[0]}; and {len(lines) - 1} other traces fail"] if len(lines) > 1 else lines
         if self._over:
             found.append(self._over)
         elif status.local_limit is not None and status.local_bytes >= warn_at * status.local_limit:

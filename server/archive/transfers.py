@@ -13,7 +13,7 @@ FAILURES_SHOWN = 500
 
 
 class Transfers:
-    """A queue of one direction, by trace. Safe to use from any thread; nothing waits. `now`: the time (s, monotonic)."""
+    """A queue of one direction, by trace. Safe to use from any thread; nothing waits. `now`: a clock (s, monotonic)."""
 
     def __init__(self, direction: str, now: Callable[[], float]) -> None:
         self._direction = direction

@@ -58,8 +58,8 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
 
 
 def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
-    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, as `source` says.
-    Raises BackupError."""
+    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, as `source`
+    says. Raises BackupError."""
     try:
         with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
             if not _has_table(connection, "archived_traces"):
