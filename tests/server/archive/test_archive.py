@@ -318,7 +318,8 @@ def test_an_object_that_cannot_be_deleted_is_told_and_the_others_are_sent(
     assert len(bench.told) == told
     proxy.fail("")
     bench.service.deleted()
-    bench.until(lambda: len(store.objects(bench.service.status().place.split()[0])) == 2)
+    bench.until(lambda: bench.archived.to_delete(ROBOT) == [])
+    assert len(store.objects(bench.service.status().place.split()[0])) == 2
     bench.until(lambda: bench.service.warnings(0.9) == [])
 
 
