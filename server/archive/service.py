@@ -25,6 +25,7 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.archive import ArchiveStatus, TraceArchive, Transfer
 from daq.traces import disk
 from daq.traces.room import RESERVE
+from server.archive.attempts import Attempts
 from server.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError
 from server.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Health
 from server.archive.names import object_name
@@ -43,6 +44,9 @@ CHECKED_LATELY = timedelta(hours=1)
 """Time for which an object that was read back need not be read back again before the local copy goes."""
 RETRY_AFTER = 2
 """Time (s) after which a client asks again for a trace that is being fetched."""
+HEARD_WITHIN = 60.0
+"""Time (s) for which a failed fetch answers the next request: who waits for it asks every RETRY_AFTER, and whoever
+comes later has it tried again."""
 MB = 1_000_000
 log = logging.getLogger("server.archive")
 
@@ -76,7 +80,9 @@ class ArchiveService:
     def __init__(self, context: ArchiveContext) -> None:
         self._context = context
         self.health = Health(context.clock, context.pauses)
-        self._sending, self._fetching = Transfers("send"), Transfers("fetch")
+        now = context.clock.monotonic
+        self._sending, self._fetching = Transfers("send", now), Transfers("fetch", now)
+        self._attempts = Attempts()
         self._drops: set[str] = set()
         """Traces whose local copies somebody wants to be dropped, whatever the policy says."""
         self._closing = threading.Event()
@@ -84,6 +90,8 @@ class ArchiveService:
         self._local_bytes = self._archived = 0
         self._over = ""
         """Why more local traces are kept than the policy allows, in one line."""
+        self._unreadable: dict[str, str] = {}
+        """Traces whose files cannot be read or deleted, and why."""
         self._looked = -math.inf
         """When the last whole round ended (s, monotonic)."""
         self._threads = [
@@ -130,8 +138,8 @@ class ArchiveService:
 
     def fetch(self, trace: str) -> ProblemError:
         """Fetches a trace; returns the problem with which a request for it is answered meanwhile."""
-        before = self._fetching.of(trace)
-        if before is not None and before.state == "failed":
+        before = self._fetching.failed_since(trace, self._context.clock.monotonic() - HEARD_WITHIN)
+        if before is not None:
             self._fetching.ended(trace)  # whoever asks again has it tried again
             return ProblemError(503, "archive", before.problem, "try again, or look into the archive")
         self.fetch_now(trace)
@@ -146,15 +154,16 @@ class ArchiveService:
         if self._fetching.add(trace, 0 if found is None else found.size):
             self._asked.set()
 
-    def bring(self, traces: Iterable[str]) -> Transfer:
-        """Fetches traces. Returns how far this is altogether, or the first that has failed."""
+    def bring(self, traces: Iterable[str], since: float) -> Transfer:
+        """Fetches traces. Returns how far this is altogether, or the first that has failed since that moment (s,
+        monotonic). What failed before, perhaps since a disk was full, is tried again."""
         traces = list(traces)
         for trace in traces:
-            before = self._fetching.of(trace)
-            if before is not None and before.state == "failed":
+            if (failed := self._fetching.failed_since(trace, since)) is not None:
                 self._fetching.ended(trace)  # whoever asks again has it tried again
-                return before
-            if before is None:
+                return failed
+            before = self._fetching.of(trace)
+            if before is None or before.state == "failed":
                 self.fetch_now(trace)
         every = [one for trace in traces if (one := self._fetching.of(trace)) is not None]
         trouble = self.health.trouble
@@ -201,6 +210,10 @@ class ArchiveService:
         status, found = self.status(), []
         if status.problem:
             found.append(f"{status.problem}; {status.waiting} traces wait to be sent, and stay here until then")
+        # Of either, one line for all: those of hundreds would hide the others.
+        for failing in (self._attempts.failing, self._unreadable):
+            lines = list(failing.copy().values())
+            found += [f"{lines[0]}; and {len(lines) - 1} other traces fail"] if len(lines) > 1 else lines
         if self._over:
             found.append(self._over)
         elif status.local_limit is not None and status.local_bytes >= warn_at * status.local_limit:
@@ -232,6 +245,7 @@ class ArchiveService:
             wake.wait(pause)
 
     def _succeeded(self) -> None:
+        self._attempts.answered()
         if self.health.succeeded():
             line = f"archive {self._context.bucket.place}: answers again"
             log.info("%s", line)
@@ -252,22 +266,53 @@ class ArchiveService:
                 self._sending.add(trace)
             self._archived = context.archived.count(context.robot)
             self._local_bytes = context.archived.local_size(context.robot)
-        for gone in context.archived.to_delete(context.robot):
-            context.bucket.remove(gone.object)
-            context.archived.forget(gone.trace)
-            self._succeeded()
-        for _ in range(SENT_A_ROUND):
-            waiting = self._sending.first()
-            if waiting is None or self._closing.is_set():
-                break
-            self._send_one(waiting)
+            self._unreadable.clear()
+        self._attempts.begin()
+        self._delete_gone()
+        self._send_waiting()
+        self._attempts.begin_step()
         self._drop_asked()
         limit = self._context.settings.keep_size
         if is_due or (limit is not None and self._local_bytes > limit * MB and not self._over):
             self._drop_by_policy()
+        self._attempts.end()
         if is_due:
             self._looked = context.clock.monotonic()
-        return len(self._sending) > 0
+        return self._sending.has_others(self._attempts.failing)
+
+    def _delete_gone(self) -> None:
+        """Deletes the objects of deleted traces. One that the store does not delete keeps no other trace waiting."""
+        context = self._context
+        self._attempts.begin_step()
+        gone = context.archived.to_delete(context.robot)
+        for one in sorted(gone, key=lambda one: self._attempts.is_doubtful(one.trace)):
+            if self._closing.is_set() or self._attempts.is_enough:
+                return
+            try:
+                context.bucket.remove(one.object)
+            except ArchiveError as error:
+                log.warning("archive: %s is not deleted yet: %s", one.object, error)
+                self._attempts.failed(one.trace, error)
+                continue
+            context.archived.forget(one.trace)
+            self._attempts.forget(one.trace)
+            self._succeeded()
+
+    def _send_waiting(self) -> None:
+        """Sends what waits. A trace that cannot be sent waits behind the others."""
+        self._attempts.begin_step()
+        for _ in range(SENT_A_ROUND):
+            waiting = self._sending.first()
+            if waiting is None or self._attempts.has_failed(waiting):
+                return
+            if self._closing.is_set() or self._attempts.is_enough:
+                return
+            try:
+                self._send_one(waiting)
+            except ArchiveError as error:
+                self._attempts.failed(waiting, error)
+            else:
+                self._attempts.forget(waiting)
 
     def _send_one(self, trace: str) -> None:
         context = self._context
@@ -283,16 +328,19 @@ class ArchiveService:
             context.bucket.send(name, path, lambda done: self._sending.moved(trace, done, found.size))
             self._require_same(name, found)  # also if the file has changed meanwhile
         except OSError as error:
-            log.warning("archive: %s: cannot be read: %s", path, disk.reason(error))
-            self._sending.ended(trace, f"{path.name}: cannot be read: {disk.reason(error)}")
+            line = f"{path.name}: cannot be read: {disk.reason(error)}"
+            log.warning("archive: %s: not sent", line)
+            self._unreadable[trace] = f"{line}; it is not archived: look at the disk of the traces"
+            self._sending.ended(trace, line)
             return
         except ArchiveError as error:
             context.count("send", "failed", 0)
-            self._sending.held_up(trace, str(error), last=isinstance(error, DamagedError))
+            self._sending.held_up(trace, str(error))
             raise
         now = context.clock.utc()
         context.archived.add(Archived(trace, context.robot, name, found.size, found.sha256, now, now))
         self._sending.ended(trace)
+        self._unreadable.pop(trace, None)
         context.count("send", "done", found.size)
         self._archived += 1
         self._local_bytes += found.size
@@ -390,6 +438,8 @@ class ArchiveService:
             local = self._context.archived.local(trace)
             if local is None or self._drop(local):
                 self._drops.discard(trace)
+            if self._attempts.is_enough:
+                return
 
     def _drop_by_policy(self) -> None:
         """Drops local copies that are too old, then the oldest while all of them take too much room."""
@@ -402,7 +452,7 @@ class ArchiveService:
         if settings.keep_size is not None and self._local_bytes > (limit := settings.keep_size * MB):
             self._drop_some(lambda size: size > limit)
             self._local_bytes = context.archived.local_size(context.robot)
-            if self._local_bytes > limit:
+            if self._local_bytes > limit and not self._attempts.has_failures:  # else the store is the reason
                 size = f"{self._local_bytes / MB:.0f} of {limit / MB:.0f} MB"
                 why = "models and jobs refer to the others" if settings.keep_used else "the others are in use"
                 self._over = f"local traces take {size} (archive.keep_size), and no more can be dropped: {why}"
@@ -417,13 +467,32 @@ class ArchiveService:
             if not part:
                 return
             for local in part:
-                if not is_wanted(size) or self._closing.is_set():
+                if not is_wanted(size) or self._closing.is_set() or self._attempts.is_enough:
                     return
                 size -= local.size if self._drop(local) else 0
                 last = local
 
     def _drop(self, local: Local) -> bool:
-        """Deletes a local copy, after the archive has shown that it has the same. Raises ArchiveError."""
+        """Deletes a local copy, after the archive has shown that it has the same. Returns False if the copy stays,
+        whatever the reason is: others may go."""
+        path = self._context.catalogue.folder / local.file
+        try:
+            is_dropped = self._dropped(local)
+        except ArchiveError as error:
+            log.warning("archive: %s stays: %s", path, error)
+            self._attempts.failed(local.trace, error)
+            return False
+        except OSError as error:
+            line = f"{path.name}: cannot be dropped: {disk.reason(error)}; look at the disk of the traces"
+            log.warning("archive: %s", line)
+            self._unreadable[local.trace] = line
+            return False
+        self._attempts.forget(local.trace)
+        self._unreadable.pop(local.trace, None)
+        return is_dropped
+
+    def _dropped(self, local: Local) -> bool:
+        """Does this, and raises what goes wrong: ArchiveError, OSError."""
         context = self._context
         found = context.archived.get(local.trace)
         path = context.catalogue.folder / local.file

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable, Container
 
 from daq.contracts.service.archive import Transfer
 
@@ -12,13 +13,15 @@ FAILURES_SHOWN = 500
 
 
 class Transfers:
-    """A queue of one direction, by trace. Safe to use from any thread; nothing waits."""
+    """A queue of one direction, by trace. Safe to use from any thread; nothing waits. `now`: a clock (s, monotonic)."""
 
-    def __init__(self, direction: str) -> None:
+    def __init__(self, direction: str, now: Callable[[], float]) -> None:
         self._direction = direction
+        self._now = now
         self._lock = threading.Lock()
         self._waiting: OrderedDict[str, Transfer] = OrderedDict()
-        self._failed: OrderedDict[str, Transfer] = OrderedDict()
+        self._failed: OrderedDict[str, tuple[float, Transfer]] = OrderedDict()
+        """Failed transfers, and when they failed."""
 
     def add(self, trace: str, total: int = 0) -> bool:
         """Adds a trace at the end. Returns False if it waits already. One that failed is tried again."""
@@ -40,14 +43,13 @@ class Transfers:
             if trace in self._waiting:
                 self._waiting[trace] = self._transfer("moving", done, total)
 
-    def held_up(self, trace: str, problem: str, *, last: bool = False) -> None:
-        """Notes that a trace waits for another attempt; with `last`, behind all others."""
+    def held_up(self, trace: str, problem: str) -> None:
+        """Notes that a trace waits for another attempt, behind all others: one that always fails holds up none."""
         with self._lock:
             if trace in self._waiting:
                 total = self._waiting[trace].total
                 self._waiting[trace] = self._transfer("waiting", 0, total, problem)
-                if last:
-                    self._waiting.move_to_end(trace)
+                self._waiting.move_to_end(trace)
 
     def ended(self, trace: str, problem: str = "") -> None:
         """Takes a trace out of the queue; with a problem, it has failed and is not tried again by itself;
@@ -56,14 +58,27 @@ class Transfers:
             was = self._waiting.pop(trace, None)
             self._failed.pop(trace, None)
             if problem:
-                self._failed[trace] = self._transfer("failed", 0, was.total if was else 0, problem)
+                failed = self._transfer("failed", 0, was.total if was else 0, problem)
+                self._failed[trace] = self._now(), failed
                 while len(self._failed) > FAILURES_SHOWN:
                     self._failed.popitem(last=False)
 
     def of(self, trace: str) -> Transfer | None:
         """Returns how far a trace is; None if it neither waits nor has failed."""
         with self._lock:
-            return self._waiting.get(trace) or self._failed.get(trace)
+            _at, failed = self._failed.get(trace, (0.0, None))
+            return self._waiting.get(trace) or failed
+
+    def failed_since(self, trace: str, since: float) -> Transfer | None:
+        """Returns the failure of a trace; None if it has not failed, or failed before `since` (s, monotonic)."""
+        with self._lock:
+            at, failed = self._failed.get(trace, (0.0, None))
+            return failed if at >= since else None
+
+    def has_others(self, traces: Container[str]) -> bool:
+        """Whether any trace waits that is none of these."""
+        with self._lock:
+            return any(trace not in traces for trace in self._waiting)
 
     def __len__(self) -> int:
         with self._lock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Container
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -54,6 +55,40 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
             connection.execute(f"{line} {changes}", (robot, reason, since))
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: its queue cannot be paused: {error}") from error
+
+
+def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
+    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, as `source`
+    says. Raises BackupError."""
+    try:
+        with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
+            if not _has_table(connection, "archived_traces"):
+                return
+            connection.execute("ATTACH ? AS live", (str(source),))
+            local = connection.execute("SELECT id, file FROM traces WHERE NOT missing").fetchall()
+            gone = [(trace,) for trace, file in local if file not in packed]
+            of_archive = "FROM live.archived_traces WHERE trace = ? AND NOT deleting"
+            with connection:
+                connection.executemany(f"INSERT OR REPLACE INTO main.archived_traces SELECT * {of_archive}", gone)
+                is_gone = f"id IN (SELECT trace {of_archive})"
+                connection.executemany(f"UPDATE main.traces SET missing = 1 WHERE {is_gone}", gone)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {source}: what the archive has cannot be copied: {error}") from error
+
+
+def robots_of_traces(database: Path) -> dict[str, str]:
+    """Returns the robot of each trace. Raises BackupError."""
+    try:
+        with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
+            found = connection.execute("SELECT id, robot FROM traces") if _has_table(connection, "traces") else ()
+            return dict(found)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+
+
+def _has_table(connection: sqlite3.Connection, name: str) -> bool:
+    found = connection.execute("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (name,))
+    return bool(found.fetchone()[0])
 
 
 def require_known(revision: str | None) -> None:

@@ -22,6 +22,11 @@ NAMES = re.compile(
 """Names that the files of a backup may have. A restore writes no file with any other name."""
 
 
+def is_trace(name: str) -> bool:
+    """Whether the file that has this name in a backup is a trace."""
+    return name.startswith("traces/")
+
+
 class BackupError(DaqError):
     """A backup cannot be made, is damaged, or belongs to another robot. Nothing was changed."""
 

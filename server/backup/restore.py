@@ -17,9 +17,9 @@ from pathlib import Path
 
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
-from server.backup.database import hold_queue, require_known, revision_of
+from server.backup.database import hold_queue, require_known, revision_of, robots_of_traces
 from server.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
-from server.backup.places import DATABASE, BackupError, Places
+from server.backup.places import DATABASE, BackupError, Places, is_trace
 from server.backup.write import RESERVE
 from server.jobs.mailbox import REQUEST
 from server.store.lock import sole_use
@@ -94,6 +94,8 @@ class _Staged:
         self._folders = {folder / STAGING for folder in places.folders}
         self._traces: dict[str, Path] = {}
         """Place of each trace, by the name of its file, which no two robots have in common."""
+        self._robots: dict[str, str] = {}
+        """Robot of each trace, by its number, also of those that only the archive has."""
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
         """Extracts all files, and checks the digest of each once more. Raises BackupError, OSError."""
@@ -101,13 +103,16 @@ class _Staged:
         for folder in self._folders:
             folder.mkdir(parents=True)
         self._require_room(manifest)
-        names = [entry.name for entry in manifest.files if entry.name.startswith("traces/")]
+        names = [entry.name for entry in manifest.files if is_trace(entry.name)]
         self._traces = {Path(name).name: self._places.target(name) for name in names}
         done = 0
         with opened(self._archive) as (pack, _):
-            for entry in manifest.files:
+            # The database first: it says into which folders the requests of jobs lead.
+            for entry in sorted(manifest.files, key=lambda one: one.name != DATABASE):
                 progress(done / max(1, manifest.size), entry.name)
                 self._extract(pack, entry)
+                if entry.name == DATABASE:
+                    self._robots = robots_of_traces(self._staged(DATABASE))
                 done += entry.size
         if revision_of(self._staged(DATABASE)) != manifest.revision:
             raise BackupError(f"{self._archive}: its database is not the one that its list names")
@@ -150,9 +155,9 @@ class _Staged:
     def _lead_to_places(self, request: Path) -> None:
         """Changes the paths of traces, models and another job in a job's request to this configuration's folders."""
         task = json.loads(request.read_text("utf-8"))
-        first, models = next(iter(self._places.traces.values())), self._places.service / "models"
+        models = self._places.service / "models"
         traces = {number: Path(file).name for number, file in task.get("traces", {}).items()}
-        task["traces"] = {number: str(self._traces.get(name, first / name)) for number, name in traces.items()}
+        task["traces"] = {number: str(self._place_of(number, name)) for number, name in traces.items()}
         task["models"] = {number: str(models / Path(file).name) for number, file in task.get("models", {}).items()}
         if before := task.get("continues"):
             task["continues"] = str(self._places.service / "jobs" / Path(before).name)
@@ -160,6 +165,12 @@ class _Staged:
             json.dump(task, stream)
             stream.flush()
             os.fsync(stream.fileno())
+
+    def _place_of(self, number: str, name: str) -> Path:
+        """Returns the place of a trace; of one that the backup does not have, where it is fetched to."""
+        folders = self._places.traces
+        folder = folders.get(self._robots.get(number, ""), next(iter(folders.values())))
+        return self._traces.get(name, folder / name)
 
     def _require_room(self, manifest: Manifest) -> None:
         for folder in self._folders:

@@ -12,9 +12,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from daq.traces import disk
-from server.backup.database import copy_database, revision_of
+from server.backup.database import copy_database, note_dropped, revision_of
 from server.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
-from server.backup.places import DATABASE, BackupError, Places
+from server.backup.places import DATABASE, BackupError, Places, is_trace
 
 RESERVE = 20_000_000
 """Number of bytes that must stay free on the disk beside a backup."""
@@ -24,7 +24,8 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
     """Writes a backup to `target`, completely or not at all. Other users cannot read it: it holds hashes of tokens.
 
     The database is copied first, as it is at one moment: every file that it names exists by then, and is copied after
-    it. Files deleted meanwhile are left out, and the manifest lists them. Raises BackupError.
+    it. Files deleted meanwhile are left out, and the manifest lists them; those that the archive took over are noted as
+    archived. Raises BackupError.
     """
     if target.exists():
         raise BackupError(f"{target}: exists already; a backup is never overwritten")
@@ -33,10 +34,15 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             database = Path(folder) / "service.sqlite"
             copy_database(places.database, database)
             revision = revision_of(database)
-            files = [(DATABASE, database), *places.files()]
-            _require_room(target.absolute().parent, files, reserve)
+            files = list(places.files())
+            _require_room(target.absolute().parent, [(DATABASE, database), *files], reserve)
             part = Path(folder) / "backup.zip"
             entries, left_out = _pack(part, files, progress)
+            # The archive may have taken traces over since the copy. Its rows say where they are, and every trace is
+            # either packed or has its row by now: a service that runs need not be told to wait with its disk full.
+            note_dropped(places.database, database, {Path(one.name).name for one in entries if is_trace(one.name)})
+            with zipfile.ZipFile(part, "a") as pack:
+                entries.insert(0, _put(pack, DATABASE, database))
             manifest = Manifest(
                 format=FORMAT,
                 software=f"ma2000-daq {version('ma2000-daq')}",

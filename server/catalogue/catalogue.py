@@ -29,6 +29,8 @@ UPLOAD_IS_OLD = 2 * 3600.0
 """Time (s) after which such a folder is no longer in use, since its reader has an hour at most."""
 OPENED_STAYS = 600.0
 """Time (s) for which the file of a trace stays after somebody has opened it."""
+PRUNE_EVERY = 60.0
+"""Time (s) between two searches for those of them that may go: a batch opens thousands of traces at once."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
 """Number of characters of an error that the log shows."""
@@ -48,8 +50,9 @@ class Fetching(Protocol):
     def fetch(self, trace: str) -> ProblemError:
         """Fetches a trace that only the archive has; returns the problem that says how far this is."""
 
-    def bring(self, traces: Iterable[str]) -> Transfer:
-        """Fetches traces. Returns how far this is altogether, or the first that has failed."""
+    def bring(self, traces: Iterable[str], since: float) -> Transfer:
+        """Fetches traces. Returns how far this is altogether, or the first that has failed since that moment (s,
+        monotonic)."""
 
     def deleted(self) -> None:
         """A trace has been deleted."""
@@ -74,6 +77,7 @@ class Catalogue:
         self.limits = limits
         self.archive: Fetching | None = None
         self._opened: dict[str, float] = {}
+        self._pruned = time.monotonic()
         self._opening = threading.Lock()
         """Held for a moment by who opens a file, and by who drops one."""
 
@@ -177,16 +181,19 @@ class Catalogue:
             raise conflict("no-archive", line, "set [archive] in its daq.toml (docs/archive.md)")
         return path
 
-    def bring(self, traces: Iterable[str]) -> Transfer | None:
+    def bring(self, traces: Iterable[str], since: float) -> Transfer | None:
         """Fetches from the archive what the folder does not have. Returns None if it has all of these traces; else how
-        far it is, or the first that has failed. Raises a 404 for one that is in neither."""
+        far it is, or the first that has failed since that moment (s, monotonic). Raises a 404 for one that is in
+        neither."""
         if self.archive is None:
             return None
         names = self._traces.files_of(self._robot, traces)
         absent = {one: self.folder / name for one, name in names.items() if not self.is_here(one, self.folder / name)}
-        for one in absent:
+        if not absent:
+            return None
+        for one in absent.keys() - self._traces.archived_of(absent):
             self.place_of(one)
-        return self.archive.bring(absent) if absent else None
+        return self.archive.bring(absent, since)
 
     def is_here(self, identity: str, path: Path) -> bool:
         """Whether the folder has the file of a trace, which stays there for a while then."""
@@ -194,7 +201,10 @@ class Catalogue:
             if not path.is_file():
                 return False
             now = time.monotonic()
-            self._opened = {one: at for one, at in self._opened.items() if now - at < OPENED_STAYS} | {identity: now}
+            self._opened[identity] = now
+            if now - self._pruned >= PRUNE_EVERY:
+                self._pruned = now
+                self._opened = {one: at for one, at in self._opened.items() if now - at < OPENED_STAYS}
         return True
 
     def take_back(self, identity: str, source: Path) -> Path:

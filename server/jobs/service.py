@@ -65,6 +65,16 @@ class JobContext:
     """The workers that the robots of a service share; None for workers of its own."""
 
 
+@dataclass(frozen=True)
+class _Fetched:
+    """A waiting job whose traces are fetched: how far they are, and when (s, monotonic) it first asked for them, and
+    last looked."""
+
+    transfer: Transfer
+    asked: float
+    looked: float
+
+
 class JobService:
     """Hands jobs to executors and follows them. Safe to use from any thread."""
 
@@ -74,8 +84,8 @@ class JobService:
         self._closing = False
         self._workers = context.workers or SharedWorkers(context.executor, context.at_once, context.make_executor)
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
-        self._fetched: dict[str, Transfer] = {}
-        """Waiting jobs whose traces are fetched from the archive, and how far these are."""
+        self._fetched: dict[str, _Fetched] = {}
+        """Waiting jobs whose traces are fetched from the archive."""
         self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
@@ -169,7 +179,7 @@ class JobService:
     def _with_progress(self, job: Job) -> Job:
         fetched = self._fetched.get(job.id)
         if job.state == "queued" and fetched is not None:
-            return job.model_copy(update={"progress_text": _words_of(fetched)})
+            return job.model_copy(update={"progress_text": _words_of(fetched.transfer)})
         if job.state != "running":
             return job
         reported = self._reported(job.id)
@@ -252,16 +262,23 @@ class JobService:
         return has_begun
 
     def _away(self, job: Job) -> Transfer | None:
-        """Returns how far the traces of a job are that only the archive has; None if all are here."""
+        """Returns how far the traces of a job are that only the archive has; None if all are here. It looks once every
+        LOOK_EVERY, however often it is asked: each trace that has been fetched wakes this thread, and a batch has
+        thousands."""
+        now, before = self._context.clock.monotonic(), self._fetched.get(job.id)
+        if before is not None and now - before.looked < LOOK_EVERY:
+            return before.transfer
+        asked = now if before is None else before.asked
         try:
-            away = self._context.catalogue.bring(traces_of(job.request))
+            away = self._context.catalogue.bring(traces_of(job.request), asked)
         except ProblemError as error:
             away = Transfer(direction="fetch", state="failed", done=0, total=0, problem=error.detail)
         if away is None or away.state == "failed":
             self._fetched.pop(job.id, None)
-        elif self._fetched.get(job.id) != away:
-            self._fetched[job.id] = away
-            self._tell(job)
+        else:
+            self._fetched[job.id] = _Fetched(away, asked, now)
+            if before is None or before.transfer != away:
+                self._tell(job)
         return away
 
     def look(self) -> None:

@@ -137,6 +137,14 @@ class TraceStore:
         with self._store.reading() as session:
             return bool(_archived(session, [identity]))
 
+    def archived_of(self, identities: Iterable[str]) -> set[str]:
+        """Returns those of these traces that the archive has."""
+        names, found = list(identities), set[str]()
+        with self._store.reading() as session:
+            for first in range(0, len(names), 500):
+                found |= _archived(session, names[first : first + 500])
+        return found
+
     def found(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first, read anew."""
         return self._page(robot, search, cursor, limit)

@@ -30,10 +30,16 @@ class TurnedClock(SystemClock):
     """The computer's clock, with a wall clock that is ahead."""
 
     ahead = timedelta(0)
+    turned = 0.0
+    """Time (s) by which its monotonic clock is ahead."""
 
     def utc(self) -> datetime:
         """What it shows."""
         return datetime.now(UTC) + self.ahead
+
+    def monotonic(self) -> float:
+        """Since an arbitrary start."""
+        return super().monotonic() + self.turned
 
 
 class Bench:

@@ -82,12 +82,13 @@ def running_store() -> Iterator[ObjectStore]:
 @dataclass
 class FaultyStore:
     """A proxy before a store. `fault` is what happens to requests whose method is one of `methods`; `left` is how
-    often, None for always."""
+    often, None for always; `only` is a part of the path of those that are meant."""
 
     url: str
     fault: Fault = ""
     methods: tuple[str, ...] = ("GET", "HEAD", "PUT", "POST", "DELETE")
     left: int | None = None
+    only: str = ""
     seen: list[str] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
     stalled: threading.Event = field(default_factory=threading.Event)
@@ -95,16 +96,17 @@ class FaultyStore:
     go_on: threading.Event = field(default_factory=threading.Event)
     """Ends what stalls."""
 
-    def fail(self, fault: Fault, *methods: str, times: int | None = None) -> None:
+    def fail(self, fault: Fault, *methods: str, times: int | None = None, only: str = "") -> None:
         """From now on."""
+        self.only = only
         self.methods = methods or ("GET", "HEAD", "PUT", "POST", "DELETE")
         self.left = times
         self.fault = fault
 
-    def taken(self, method: str) -> Fault:
+    def taken(self, method: str, path: str) -> Fault:
         """The fault of a request."""
         self.seen.append(method)
-        if not self.fault or method not in self.methods or self.left == 0:
+        if not self.fault or method not in self.methods or self.left == 0 or self.only not in path:
             return ""
         if self.left is not None:
             self.left -= 1
@@ -124,7 +126,7 @@ def faulty(store: ObjectStore) -> Iterator[FaultyStore]:
         def _pass_on(self) -> None:
             body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
             proxy.paths.append(self.path)
-            match proxy.taken(self.command):
+            match proxy.taken(self.command, self.path):
                 case "refuse":
                     return
                 case "stall":

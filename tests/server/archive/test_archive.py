@@ -16,6 +16,8 @@ from tests.server.archive.bench import ROBOT, Bench
 from tests.server.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore
 
 Make = Callable[..., Bench]
+UNREADABLE = Path("/proc/self/mem")
+"""A regular file whose first byte nobody can read, not even root: nothing lies at address 0."""
 
 
 @pytest.fixture
@@ -297,3 +299,89 @@ def test_without_an_archive_a_trace_that_only_that_has_says_so(bench: Bench) -> 
     with pytest.raises(ProblemError) as caught:
         bench.catalogue.path_of(trace)
     assert caught.value.kind == "no-archive"
+
+
+def test_an_object_that_cannot_be_deleted_is_told_and_the_others_are_sent(
+    bench: Bench, store: ObjectStore, proxy: FaultyStore
+) -> None:
+    gone = bench.trace()
+    bench.service.start()
+    bench.until_archived(gone)
+    proxy.fail("403", "DELETE", "POST")  # several are deleted by one POST
+    bench.catalogue.remove(gone)
+    bench.until(lambda: bench.service.status().state != "ok")
+    bench.until_archived(bench.trace())
+    bench.until(lambda: any(f"(trace {gone})" in line for line in bench.service.warnings(0.9)))
+    assert bench.service.status().state == "ok"
+    told = len(bench.told)
+    bench.until_archived(bench.trace())
+    assert len(bench.told) == told
+    proxy.fail("")
+    bench.service.deleted()
+    bench.until(lambda: bench.archived.to_delete(ROBOT) == [])
+    assert len(store.objects(bench.service.status().place.split()[0])) == 2
+    bench.until(lambda: bench.service.warnings(0.9) == [])
+
+
+def test_a_file_that_cannot_be_read_is_told_and_the_other_copies_go(
+    bench: Bench, make: Make, proxy: FaultyStore
+) -> None:
+    bad, good = bench.trace(), bench.trace()
+    bench.service.start()
+    bench.until_archived(bad, good)
+    bench.close()
+    again = make(bench.service.status().place.split()[0], proxy.url, keep_days=30)
+    path = again.path(bad)
+    path.unlink()
+    path.symlink_to(UNREADABLE)
+    again.clock.ahead = timedelta(days=31)
+    again.service.start()
+    again.until(lambda: not again.path(good).exists())
+    again.until(lambda: again.service.warnings(0.9) != [])
+    (line,) = again.service.warnings(0.9)
+    assert line.startswith(f"{path.name}: cannot be dropped: ")
+
+
+@pytest.mark.parametrize("direction", ["send", "fetch"])
+def test_a_trace_that_always_fails_holds_up_no_other(bench: Bench, proxy: FaultyStore, direction: str) -> None:
+    bad, good = bench.trace(), bench.trace()
+    digest = hashlib.sha256(bench.path(bad).read_bytes()).hexdigest()[:16]
+    if direction == "send":
+        proxy.fail("500", "PUT", only=digest)
+        bench.service.start()
+        bench.until_archived(good)
+        assert bench.archived.get(bad) is None
+        bench.until(lambda: any(f"(trace {bad})" in line for line in bench.service.warnings(0.9)))
+        proxy.fail("")
+        bench.service.deleted()  # wakes it: it would look again after some minutes
+        bench.until_archived(bad)
+        return
+    bench.service.start()
+    _drop(bench, bad)
+    _drop(bench, good)
+    proxy.fail("500", "GET", "HEAD", only=digest)
+    bench.service.fetch(bad)
+    bench.service.fetch(good)
+    bench.until(lambda: bench.service.of(good).local)
+    proxy.fail("")
+    bench.until(lambda: bench.service.of(bad).local)
+
+
+def test_what_failed_before_somebody_asked_is_fetched_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    trace = bench.trace()
+    bench.service.start()
+    _drop(bench, trace)
+    full = bench.clock.monotonic()
+    with monkeypatch.context() as disk:
+        disk.setattr("server.archive.service.RESERVE", 1 << 60)
+        bench.service.fetch_now(trace)
+        bench.until(lambda: bench.counted.count(("fetch", "failed", 0)) == 1)
+        assert bench.service.bring([trace], full).state == "failed"
+        bench.service.fetch_now(trace)
+        bench.until(lambda: bench.counted.count(("fetch", "failed", 0)) == 2)
+        bench.clock.turned = 3600.0
+        assert bench.service.bring([trace], bench.clock.monotonic()).state == "waiting"
+        bench.until(lambda: bench.counted.count(("fetch", "failed", 0)) == 3)
+        bench.clock.turned = 7200.0
+    assert bench.service.fetch(trace).kind == "trace-in-archive"
+    bench.until(lambda: bench.service.of(trace).local)

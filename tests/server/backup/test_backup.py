@@ -20,6 +20,7 @@ from server.backup.manifest import MANIFEST, verify
 from server.backup.places import DATABASE, BackupError, Places, places_of
 from server.backup.restore import restore
 from server.backup.write import back_up
+from server.store.archived import Archived, ArchivedStore
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
@@ -184,6 +185,30 @@ def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path
         named = traces_in(there)
         assert len(named) >= 2
         assert all((there.traces["ma2000"] / name).is_file() for name in named)
+
+
+def test_a_trace_that_is_archived_and_dropped_meanwhile_is_noted_as_archived(tmp_path: Path) -> None:
+    here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
+    store = Store(here.url)
+    made = Archived("bbb", "ma2000", "bbb-0", 9, "0" * 64, NOW, NOW)
+    told: list[str] = []
+
+    def meanwhile(_fraction: float, name: str) -> None:
+        if not told:
+            ArchivedStore(store).add(made)
+            TraceStore(store).mark_missing("ma2000", ["bbb.mcap"], missing=True)
+            (here.traces["ma2000"] / "bbb.mcap").unlink()
+        told.append(name)
+
+    manifest = back_up(here, tmp_path / "arm.zip", NOW, meanwhile)
+    store.close()
+    assert manifest.left_out == ("traces/bbb.mcap",)
+    restore(tmp_path / "arm.zip", there, NOW, quietly)
+    store = Store(there.url)
+    entries = [TraceStore(store).get("ma2000", number) for number in ("aaa", "bbb")]
+    assert ArchivedStore(store).get("bbb") == made
+    assert [(one.local, one.archived) for one in entries] == [(True, False), (False, True)]
+    store.close()
 
 
 def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archive: Path, tmp_path: Path) -> None:
@@ -379,12 +404,14 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     here, there = places_of_two(tmp_path / "here"), places_of_two(tmp_path / "there")
     store = Store(here.url)
     store.migrate()
-    for number, robot in (("aaa", "left"), ("bbb", "right")):
+    for number, robot in (("aaa", "left"), ("bbb", "right"), ("ccc", "right")):
         add_trace(store, here, number, robot)
     store.close()
+    (here.traces["right"] / "ccc.mcap").unlink()  # only the archive has it
     job = here.service / "jobs" / "0123456789ab"
     job.mkdir(parents=True)
-    task = {"request": {"kind": "fit"}, "traces": {"bbb": str(here.traces["right"] / "bbb.mcap")}, "models": {}}
+    files = {number: str(here.traces["right"] / f"{number}.mcap") for number in ("bbb", "ccc")}
+    task = {"request": {"kind": "fit"}, "traces": files, "models": {}}
     (job / "request.json").write_text(json.dumps(task))
     back_up(here, tmp_path / "arms.zip", NOW, quietly)
     with pytest.raises(BackupError, match="is of robot 'left, right'; this configuration is for 'ma2000'"):
@@ -393,7 +420,7 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     assert [path.name for path in there.traces["left"].glob("*.mcap")] == ["aaa.mcap"]
     assert [path.name for path in there.traces["right"].glob("*.mcap")] == ["bbb.mcap"]
     found = json.loads((there.service / "jobs" / "0123456789ab" / "request.json").read_text())
-    assert found["traces"] == {"bbb": str(there.traces["right"] / "bbb.mcap")}
+    assert found["traces"] == {number: str(there.traces["right"] / f"{number}.mcap") for number in ("bbb", "ccc")}
     store = Store(there.url)
     states = [QueueStore(store).get(robot) for robot in ("left", "right")]
     store.close()

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any, Literal
 
 import pytest
+from sqlalchemy.event import listen
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.errors import ReachError
@@ -36,7 +37,7 @@ from server.experiments.states import Event
 from server.jobs.lanes import lane_of
 from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
-from server.jobs.service import JobContext, JobService
+from server.jobs.service import LOOK_EVERY, JobContext, JobService
 from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
 from server.store.archived import Archived, ArchivedStore
@@ -201,6 +202,7 @@ class HandArchive:
     def __init__(self, bench: Bench) -> None:
         self.problem = ""
         self.asked: list[str] = []
+        self.since: list[float] = []
         self._bench = bench
         self._file = bench.catalogue.folder / "1.mcap"
         ArchivedStore(bench.store).add(
@@ -219,15 +221,17 @@ class HandArchive:
         """Is not asked by jobs."""
         raise AssertionError(trace)
 
-    def bring(self, traces: Iterable[str]) -> Transfer:
+    def bring(self, traces: Iterable[str], since: float) -> Transfer:
         """Tells how far it is."""
         self.asked += traces
+        self.since.append(since)
         state: Literal["failed", "moving"] = "failed" if self.problem else "moving"
         return Transfer(direction="fetch", state=state, done=1_000_000, total=4_000_000, problem=self.problem)
 
     def ends(self) -> None:
         """The trace is there."""
         self._file.touch()
+        self._bench.clock.turn(LOOK_EVERY)
         self._bench.service.look()
 
 
@@ -244,6 +248,33 @@ def test_a_job_waits_until_its_trace_is_fetched_from_the_archive_and_says_so(ben
     archive.ends()
     assert bench.end_of(job).state == "done"
     assert set(archive.asked) == {TRACE}
+
+
+def test_a_job_looks_at_its_traces_twice_a_second_however_often_one_is_fetched(bench: Bench) -> None:
+    archive = HandArchive(bench)
+    job = _submitted(bench)
+    begun = bench.clock.now
+    for _ in range(5):
+        bench.service._begin()  # as its thread does for every trace that has been fetched
+    assert archive.asked == [TRACE]
+    bench.clock.turn(LOOK_EVERY)
+    bench.service._begin()
+    assert archive.asked == [TRACE, TRACE]
+    assert archive.since == [begun, begun]
+    assert bench.state_of(job) == "queued"
+
+
+def test_the_traces_of_a_large_batch_are_looked_up_together(bench: Bench) -> None:
+    archive = HandArchive(bench)
+    now, names = bench.clock.utc(), [new_trace(number) for number in range(2, 40)]
+    for new in names:
+        bench.traces.insert(new)
+        ArchivedStore(bench.store).add(Archived(new.id, "ma2000", new.id, 4, "0" * 64, now, now))
+    asked: list[str] = []
+    listen(bench.store.engine, "before_cursor_execute", lambda *told: asked.append(told[2]))
+    assert bench.catalogue.bring([new.id for new in names], 0.0) is not None
+    assert archive.asked == [new.id for new in names]
+    assert len([line for line in asked if line.startswith("SELECT")]) == 2
 
 
 def test_a_job_whose_trace_the_archive_cannot_give_fails_with_one_line_and_the_next_begins(bench: Bench) -> None:
