@@ -252,7 +252,7 @@ def table(rows: Sequence[Row]) -> list[str]:
 
     line("named right, strict, of all single effects", TO_REACH["strict"], "strict", rows)
     line("the same without those of which d′ is known to be below 5", TO_REACH["strict"], "strict", seen)
-    open_ = sum(row.case == "single" and row.d_prime is not None and not row.resolved for row in rows)
+    open_ = sum(row.case == "single" and (row.d_prime is None or not row.resolved) for row in rows)
     line(f"as sharp as the record allows ({open_} not worked out)", TO_REACH["sharp"], "sharp", rows)
     line("right one among what is named", "", "in_answer", rows)
     line("joint right, where the right one is named", "", "joints", rows)

@@ -25,5 +25,9 @@ def main() -> None:
 
             run()
     except DaqError as error:  # every other one ends inside `run`
+        if command == "stop":  # a client's installation has the early stop alone
+            from daq_cli.app import early_stop
+
+            print("\n".join(early_stop.told() or ["NOTHING WAS STOPPED: no program here moves a robot"]), flush=True)
         print(f"daq: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.contracts.errors import DaqError, SpecError
 from daq.transport import MockPort, parse_port_url
 from ma2000.running import MOCK
@@ -45,14 +46,18 @@ class LocalService:
     def __init__(self, folder: Path | str = "lab", port: str = MOCK) -> None:
         """Starts it and waits until it answers.
 
-        Raises SpecError for a port that is no mock: a service that moves an arm is started by its operator.
-        LocalServiceError when it does not start.
+        Raises SpecError for a port that is no mock, since a service that moves an arm is started by its operator, and
+        for a folder with a configuration of its own; LocalServiceError when it does not start.
         """
         if not isinstance(parse_port_url(port), MockPort):
             raise SpecError(
                 f"port {port!r}: a program's own service runs on mock:// alone; for an arm, use `daq serve`"
             )
         self.folder = Path(folder)
+        if (self.folder / "daq.toml").exists():
+            raise SpecError(
+                f"{self.folder}: has a daq.toml, whose service is begun with `daq serve`; name another folder"
+            )
         self._process = _started(self.folder, port)
         assert self._process.stdout is not None
         self.url = self._process.stdout.readline().strip()
@@ -88,13 +93,15 @@ class LocalService:
 
 def _started(folder: Path, port: str) -> subprocess.Popen[str]:
     """Raises SpecError for a folder that cannot be made."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("DAQ_")}
+    environment = {
+        name: value for name, value in os.environ.items() if name == FOLDER_VARIABLE or not name.startswith("DAQ_")
+    }
     environment |= {"DAQ_SERVER__STOP_PORT": "0", "XDG_CONFIG_HOME": str(folder.absolute())}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / LOG).open("ab") as log:
             return subprocess.Popen(
-                [sys.executable, "-c", _OWNED, "--port", port, "serve", "--port", "0"],
+                [sys.executable, "-c", _OWNED, "--port", port, "serve", "--host", "127.0.0.1", "--port", "0"],
                 cwd=folder,
                 env=environment,
                 stdin=subprocess.PIPE,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import zip_longest
 
-from daq.acquisition.stop_socket import StopAttempt, request_stop
+from daq.acquisition.stop_socket import StopAnswer, StopAttempt, request_stop
 
 _asked: list[StopAttempt] | None = None
 
@@ -20,6 +20,27 @@ def ask(arguments: Sequence[str] = ()) -> None:
 def attempts(robot: str | None = None) -> list[StopAttempt]:
     """The answers to the early stop; stops now when there was none (`daq --config … stop`)."""
     return request_stop(robot) if _asked is None else _asked
+
+
+def told() -> list[str]:
+    """One line for each robot of the early stop: for a command line that cannot be loaded."""
+    return [line_of(answer_of(attempt)) for attempt in _asked or []]
+
+
+def answer_of(attempt: StopAttempt) -> StopAnswer:
+    """The answer to a stop, also of a process that gave none."""
+    silent = "the process that moves it did not answer"
+    return attempt.answer or StopAnswer(robot=attempt.robot, delivered=False, confirmed=False, text=silent)
+
+
+def line_of(answer: StopAnswer) -> str:
+    """What became of a stop, for a person."""
+    if answer.confirmed:
+        line = f"{answer.robot}: stopped, confirmed by the board: set points frozen at tick {answer.tick}"
+        return f"{line}. {answer.text}" if answer.text else line
+    if answer.delivered:
+        return f"{answer.robot}: stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
+    return f"{answer.robot}: stop NOT DELIVERED: {answer.text}. Use the emergency stop."
 
 
 def _named(arguments: Sequence[str]) -> str | None:

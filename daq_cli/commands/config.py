@@ -72,14 +72,18 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     from daq.executors.address import parse_service_address
     from daq.safety import unchecked
     from daq.transport import parse_port_url
-    from server.archive.bucket import open_bucket
-    from server.store.address import parse_address
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
-    parse_address(settings.server.database_url)
+    if settings.server.database is not None:
+        from server.store.address import parse_address  # here: it needs the extra `server`
+
+        parse_address(settings.server.database)
     parse_service_address(settings.server.executor)
-    open_bucket(settings.archive)
+    if settings.archive.bucket is not None:
+        from server.archive.bucket import open_bucket
+
+        open_bucket(settings.archive)
     found: dict[str, dict[str, Any]] = {}
     titles: dict[str, str] = {}
     for own in settings.each_robot() if call.robot_option is None else (settings.of_robot(call.robot_option),):

@@ -13,7 +13,7 @@ from daq_cli.app.context import Invocation, JsonOption, invocation, print_json, 
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
-    from daq.acquisition.stop_socket import StopAnswer, StopAttempt
+    pass
 
 app = typer.Typer(add_completion=False)
 
@@ -46,7 +46,7 @@ def stop(
         if call.server is None:  # a service is still asked by the name: it may have a robot of this name
             call.robot_option = None
         attempts = early_stop.attempts()
-    answers = [_answer(attempt) for attempt in attempts]
+    answers = [early_stop.answer_of(attempt) for attempt in attempts]
     answers += robot_of(context).stop({answer.port for answer in answers})
     if json:
         print_json([answer.as_data() for answer in answers])
@@ -54,7 +54,7 @@ def stop(
         print("no robot is being moved from here, and none is configured: nothing to stop")
     else:
         for answer in answers:
-            print(_line(answer))
+            print(early_stop.line_of(answer))
     if not answers or not all(answer.confirmed for answer in answers):
         raise typer.Exit(exit_codes.NOT_REACHED)
 
@@ -67,19 +67,3 @@ def _is_unknown(call: Invocation) -> bool:
         return call.robot_option not in call.configuration.names
     except DaqError:
         return True
-
-
-def _answer(attempt: StopAttempt) -> StopAnswer:
-    from daq.acquisition.stop_socket import StopAnswer
-
-    silent = "the process that moves it did not answer"
-    return attempt.answer or StopAnswer(robot=attempt.robot, delivered=False, confirmed=False, text=silent)
-
-
-def _line(answer: StopAnswer) -> str:
-    if answer.confirmed:
-        line = f"{answer.robot}: stopped, confirmed by the board: set points frozen at tick {answer.tick}"
-        return f"{line}. {answer.text}" if answer.text else line
-    if answer.delivered:
-        return f"{answer.robot}: stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
-    return f"{answer.robot}: stop NOT DELIVERED: {answer.text}. Use the emergency stop."

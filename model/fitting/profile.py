@@ -3,6 +3,10 @@
 An interval from a covariance takes the model to be linear about the fit. A profile does not: it shows a parameter that
 the data bound on one side alone, on neither, or by a curve that is no parabola. In its 95 % interval −2 ln L rises by
 less than 3.84, the quantile of χ² with one degree of freedom (Wilks 1938; Raue et al. 2009, Bioinformatics 25).
+
+That holds for white residuals of the stated noise. Where residuals are correlated or larger, the fit's own variance is
+the sandwich's (`model.fitting.covariance`), and the rise that ends the interval is 3.84 times the same ratio of
+variances (Kent 1982, Biometrika 69, for one parameter).
 """
 
 from __future__ import annotations
@@ -18,22 +22,23 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.fitting.covariance import inverse
 from model.fitting.fit import LEAST_SQUARES_EVALUATIONS, fit_problem, with_noise
 from model.fitting.least_squares import Search, solve
-from model.fitting.problem import Evaluation, Problem
+from model.fitting.problem import Evaluation, Problem, whitened
 from model.fitting.result import FitResult
-from model.fitting.unknowns import Unknown
+from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import Whitener
 
 RISE = 3.841459
-"""Rise of −2 ln L at the ends of a 95 % interval."""
+"""Rise of −2 ln L at the ends of a 95 % interval, for white residuals of the stated noise."""
 POINTS = 12
 """Most steps outwards on either side. They double while the likelihood hardly changes."""
 HARDLY = 0.25
 """Share of RISE below which the next step is twice as long."""
 CLOSE = 0.005
 """Share of RISE within which an end of the interval is found."""
-REFINEMENTS = 8
+REFINEMENTS = 16
 BETTER = 0.05
 """Fall of −2 ln L, as a share of RISE, from which another value counts as a better fit than the one found."""
 
@@ -42,7 +47,8 @@ class Profile(FrozenRecord):
     """Profile likelihood of one parameter.
 
     `rises` of −2 ln L (0 at the best fit) belong to `values`, which ascend. `low` and `high` end the 95 % interval;
-    None where the data set no end on that side, as far as `values` reach. The parameter's own prior takes no part;
+    None where the data set no end on that side, as far as `values` reach. There −2 ln L has risen by `rise`, or, at the
+    edge of values for which the model has no finite answer, by less. The parameter's own prior takes no part;
     those of all others do. `better` tells that another value fits better than the fit's own: the search had ended in a
     local minimum, and a fit with more `starts` is needed.
     """
@@ -54,6 +60,7 @@ class Profile(FrozenRecord):
     high: float | None
     values: tuple[float, ...]
     rises: tuple[float, ...]
+    rise: float
     better: bool
 
 
@@ -115,7 +122,18 @@ def profile(
     search = Search(options.robust, options.tolerance, options.most_evaluations or LEAST_SQUARES_EVALUATIONS)
     index = fitted.names.index(name)
     size = min(float(np.sqrt(fitted.covariance_matrix[index, index])), problem.unknowns[index].scale)
-    return profiled(problem, whiteners, values, index, size, search, progress=progress, cancel=cancel)
+    rise = RISE * _stretch(fitted, problem, whiteners, values, index)
+    return profiled(problem, whiteners, values, index, size, search, rise=rise, progress=progress, cancel=cancel)
+
+
+def _stretch(fitted: FitResult, problem: Problem, whiteners: Sequence[Whitener], values: Floats, index: int) -> float:
+    """Variance that the fit states for an unknown, over the one that white residuals of the stated noise would give."""
+    data = whitened(problem, problem.evaluate(values, derivatives=True), whiteners)
+    scale = scales(problem.unknowns)
+    prior = np.maximum(prior_precision(problem.unknowns) * scale**2, 1e-12)
+    information = replace(data, jacobian=data.jacobian * scale).information
+    white = float(inverse(information + np.diag(prior))[index, index] * scale[index] ** 2)
+    return max(1.0, float(fitted.covariance_matrix[index, index]) / white)
 
 
 def profiled(
@@ -137,7 +155,10 @@ def profiled(
     others = np.delete(best.values, index)
 
     def risen(value: float, begin: Floats) -> tuple[float, Floats]:
-        found = solve(_Held(problem, index, value), whiteners, begin, cancel, search)
+        try:
+            found = solve(_Held(problem, index, value), whiteners, begin, cancel, search)
+        except SpecError:  # held there, the simulation does not stay finite
+            return math.inf, begin
         return 2 * (found.cost - best.cost), found.values
 
     points = {centre: 0.0}
@@ -149,7 +170,7 @@ def profiled(
 
         ends.append(_end(risen, points, (centre, others), bound, size, rise, tell))
     progress(1.0, "done")
-    order = sorted(points)
+    order = sorted(value for value, risen_by in points.items() if math.isfinite(risen_by))
     return Profile(
         name=unknown.name,
         unit=unknown.unit,
@@ -158,6 +179,7 @@ def profiled(
         high=ends[1],
         values=tuple(order),
         rises=tuple(points[value] for value in order),
+        rise=rise,
         better=min(points.values()) < -BETTER * rise,
     )
 
@@ -196,15 +218,19 @@ def _crossing(
     others: Floats,
     rise: float,
 ) -> float:
-    """Where −2 ln L has risen by `rise`, between two values: its square root is nearly straight there."""
-    inside, outside = between
-    wanted = np.sqrt(rise)
-    value = outside
+    """Where −2 ln L has risen by `rise`, between two values: its square root is nearly straight there.
+
+    Where it is not, as before a cliff, the middle is tried: whenever the same end has moved twice.
+    """
+    (inside, outside), wanted, moved = between, math.sqrt(rise), [""]
     for _ in range(REFINEMENTS):
-        low, high = (np.sqrt(max(points[one], 0.0)) for one in (inside, outside))
-        value = float(inside + (outside - inside) * np.clip((wanted - low) / (high - low), 0.02, 0.98))
+        low, high = (math.sqrt(max(points[one], 0.0)) for one in (inside, outside))
+        is_straight = math.isfinite(high) and moved[-2:] not in (["inside"] * 2, ["outside"] * 2)
+        share = min(max((wanted - low) / (high - low), 0.02), 0.98) if is_straight else 0.5
+        value = inside + (outside - inside) * share
         points[value], others = risen(value, others)
         if abs(points[value] - rise) <= CLOSE * rise:
-            break
+            return value
+        moved = [*moved, "inside" if points[value] < rise else "outside"]
         inside, outside = (value, outside) if points[value] < rise else (inside, value)
-    return value
+    return 0.5 * (inside + outside)

@@ -41,7 +41,8 @@ def run_without(packages: Iterable[str], program: str, folder: Path) -> Any:
         [sys.executable, "-c", _PROGRAM, json.dumps(list(packages))],
         input=program,
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(folder)},
+        env=os.environ
+        | {"PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(folder), "DAQ_RUNTIME_FOLDER": str(folder / "run")},
         capture_output=True,
         text=True,
         check=False,

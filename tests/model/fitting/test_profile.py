@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from daq.contracts.errors import SpecError
 from daq.contracts.progress import Never
 from model.arrays import Floats
 from model.fitting.least_squares import Search, solve
@@ -48,6 +49,12 @@ class Curve:
             largest, half = values
             slopes = [CONCENTRATION / (half + CONCENTRATION), -largest * CONCENTRATION / (half + CONCENTRATION) ** 2]
             model = largest * slopes[0]
+        elif self.of in ("cliff", "unstable"):
+            over = max(0.0, values[0] - 2.0)
+            if self.of == "unstable" and over > 0.0:
+                raise SpecError("the simulation does not stay finite")
+            model = np.full(len(self.measured), 1e4 * over)
+            slopes = [np.full(len(self.measured), 1e4 if over else 0.0), np.zeros(len(self.measured))]
         else:  # a sum of two, of which the second has nothing to show
             slopes = [np.linspace(0, 1, len(self.measured)), np.zeros(len(self.measured))]
             model = values[0] * slopes[0]
@@ -82,6 +89,16 @@ def test_a_straight_line_has_the_interval_of_its_deviation_and_a_prior_of_its_ow
     assert found.high is not None
     assert (found.low - 3.0, found.high - 3.0) == pytest.approx((-1.959964 * deviation, 1.959964 * deviation), rel=2e-3)
     assert found.rises == pytest.approx([((value - 3.0) / deviation) ** 2 for value in found.values], abs=1e-6)
+
+
+def test_an_interval_ends_at_a_cliff_and_where_the_model_has_no_finite_answer() -> None:
+    """Flat to 2, then too steep for a straight line between two trials, then no simulation that stays finite."""
+    slope = Unknown(parameter("slope"), 1.0, -5.0, 50.0)
+    for of_ in ("cliff", "unstable"):
+        found = of(Curve(of_, np.zeros(20), (slope, Unknown(parameter("nothing"), 1.0, -5.0, 5.0))), 0, 0.3, 0.2)
+        assert found.high == pytest.approx(2.0, abs=0.05), of_
+        assert found.low is None
+        assert all(np.isfinite(found.rises))
 
 
 def test_what_the_data_do_not_bound_has_no_ends_and_a_flat_profile_to_its_bounds() -> None:

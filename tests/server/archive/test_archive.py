@@ -78,9 +78,9 @@ def test_a_dropped_trace_is_fetched_when_it_is_opened(bench: Bench) -> None:
     with pytest.raises(ProblemError) as caught:
         bench.catalogue.path_of(trace)
     assert (caught.value.status, caught.value.kind) == (503, "trace-in-archive")
-    bench.until(lambda: bench.service.of(trace).local)
+    bench.until(lambda: bench.traces.get(ROBOT, trace).local)  # the file is there a moment earlier
+    assert bench.service.of(trace).local
     assert bench.catalogue.path_of(trace).read_bytes() == content
-    assert bench.traces.get(ROBOT, trace).local
     assert [one.name for one in bench.catalogue.folder.iterdir()] == [bench.path(trace).name]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import threading
 from datetime import timedelta
-from types import SimpleNamespace
 
 import pytest
 from sqlalchemy import text
@@ -24,7 +23,7 @@ def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_r
 ) -> None:
     schedule = bench.schedule()
     usage = shutil.disk_usage
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=10**6))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: (10**9, 10**9 - 10**6, 10**6))
     bench.queue.start()
     line = "1 MB are free for traces, 20 MB stay free"
     bench.until(lambda event: event == f"schedule: schedule {schedule.id}: its run has to wait: {line}")
