@@ -31,7 +31,7 @@ from server.archive.service import ArchiveContext, ArchiveService
 from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
-from server.catalogue.room import disk_warnings
+from server.catalogue.room import of_robots, storage_warnings
 from server.clock import Clock, SystemClock
 from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
@@ -263,11 +263,17 @@ class Services:
 
     def warnings(self) -> list[str]:
         """Returns what will need somebody soon, one line each."""
-        warn_at = self.settings.traces.warn_at
-        found = disk_warnings(self.settings.traces.folder.absolute(), warn_at)
-        for rig in self.robots():
-            found += [] if rig.archive is None else rig.archive.warnings(warn_at)
+        warn_at, rigs = self.settings.traces.warn_at, self.robots()
+        found = self.storage_warnings()
+        for rig in rigs:
+            lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
+            found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
         return found
+
+    def storage_warnings(self) -> list[str]:
+        """Returns the warnings about the folders of traces, each of which may be on a disk of its own."""
+        folders = {rig.robot.name: rig.catalogue.folder for rig in self.robots()}
+        return storage_warnings(folders, self.settings.traces.warn_at)
 
     def _make_queue(
         self, robot: Robot, control: ControlService, catalogue: Catalogue, *, unattended: bool

@@ -38,10 +38,13 @@ def stop(
     call = invocation(context)
     call.robot_option = robot or call.robot_option
     attempts = early_stop.attempts(call.robot_option) if call.stops_here else []
-    if not attempts and call.server is None and _is_unknown(call):
+    if not attempts and call.stops_here and _is_unknown(call):
         line = f"no robot is called {call.robot_option}: every robot is stopped"
+        if call.server is not None:
+            line = f"no robot here is called {call.robot_option}: every robot that is moved from here is stopped"
         print(printable(line), file=sys.stderr, flush=True)
-        call.robot_option = None
+        if call.server is None:  # a service is still asked by the name: it may have a robot of this name
+            call.robot_option = None
         attempts = early_stop.attempts()
     answers = [early_stop.answer_of(attempt) for attempt in attempts]
     answers += robot_of(context).stop({answer.port for answer in answers})
@@ -57,7 +60,7 @@ def stop(
 
 
 def _is_unknown(call: Invocation) -> bool:
-    """Whether the command line names a robot that is not configured. In doubt it is: then all are stopped."""
+    """Whether the command line names a robot that is not configured here. In doubt it is: then all are stopped."""
     if call.robot_option is None or call.port_option is not None:
         return False
     try:

@@ -70,9 +70,12 @@ def submit_fleet_experiment(
     ]
     for rig in new:
         _require_possible(services, rig, body)
-    return FleetExperiments(
-        experiments=tuple(rig.queue.submit(body.request, caller.name, idempotency_key)[0] for rig in rigs)
-    )
+    names = [rig.robot.name for rig in rigs]
+    made = services.experiments.submit_to_each(names, body.request, services.clock.utc(), caller.name, idempotency_key)
+    for rig, (experiment, is_new) in zip(rigs, made, strict=True):  # no queue begins before every one has it
+        if is_new:
+            rig.queue.submitted(experiment, caller.name)
+    return FleetExperiments(experiments=tuple(experiment for experiment, _ in made))
 
 
 @router.get("/comparison")

@@ -17,7 +17,7 @@ from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
 from daq.traces.room import RESERVE
 from server.access.caller import caller_of
 from server.api.dependencies import ServicesDep, Viewer
-from server.catalogue.room import disk_size, disk_warnings, free_room
+from server.catalogue.room import room_of
 from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
@@ -68,6 +68,8 @@ async def get_me(caller: Viewer) -> Me:
 def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     """Returns version, uptime, storage and live clients of the service."""
     file = _database_file(services)
+    # Whatever becomes of a disk, the page must learn the port of the stop listener.
+    room = room_of(rig.catalogue.folder for rig in services.robots())
     with services.store.reading() as session:
         count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
     return SystemStatus(
@@ -75,9 +77,9 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         uptime=services.clock.monotonic() - services.begun,
         storage=StorageStatus(
             traces_folder=", ".join(str(rig.catalogue.folder) for rig in services.robots()),
-            traces_free=min(free_room(rig.catalogue.folder) for rig in services.robots()),
+            traces_free=room.free,
             traces_reserve=RESERVE,
-            traces_size=sum(disk_size(rig.catalogue.folder) for rig in services.robots()),
+            traces_size=room.size,
             traces=count,
             database=make_url(services.store.url).get_backend_name(),
             database_size=file.stat().st_size if file is not None and file.is_file() else None,
@@ -101,8 +103,7 @@ def _checks(services: Services) -> dict[str, str]:
         services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
-    warnings = disk_warnings(services.settings.traces.folder, services.settings.traces.warn_at)
-    checks["room"] = "; ".join(warnings)
+    checks["room"] = "; ".join(services.storage_warnings())
     for rig in services.robots():
         name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
         checks[name] = _problem_of_folder(rig.catalogue.folder)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,9 +34,34 @@ def _usage(folder: Path) -> _Usage:
         raise ProblemError(503, "traces-away", line, "mount its disk, then try again") from error
 
 
-def disk_size(folder: Path) -> int:
-    """Returns the size of the disk for traces in bytes. Raises a 503 if the folder does not exist."""
-    return _usage(folder).total
+class Room(NamedTuple):
+    """The room on the disks of several folders (bytes): the least that is free on one, and the size of all."""
+
+    free: int
+    size: int
+
+
+def room_of(folders: Iterable[Path]) -> Room:
+    """Returns the room for traces. A folder that does not exist is left out; there is no room if none exists."""
+    usages = []
+    for folder, *_same in by_disk(folders):
+        with suppress(ProblemError):  # `storage_warnings` tells of it
+            usages.append(_usage(folder))
+    return Room(min((one.free for one in usages), default=0), sum(one.total for one in usages))
+
+
+def by_disk(
+    folders: Iterable[Path], disk_of: Callable[[Path], object] = lambda folder: folder.stat().st_dev
+) -> list[list[Path]]:
+    """Groups folders by the disk on which they are. One that does not exist is alone."""
+    found: dict[object, list[Path]] = {}
+    for folder in folders:
+        try:
+            disk = disk_of(folder)
+        except OSError:
+            disk = folder
+        found.setdefault(disk, []).append(folder)
+    return list(found.values())
 
 
 def disk_warnings(folder: Path, warn_at: float) -> list[str]:
@@ -48,6 +75,29 @@ def disk_warnings(folder: Path, warn_at: float) -> list[str]:
         return []
     line = f"the disk of the traces is {used:.0%} full: {room.free / 1e6:.0f} MB are free; no experiment is taken below"
     return [f"{line} {RESERVE / 1e6:.0f} MB"]
+
+
+def storage_warnings(folders: Mapping[str, Path], warn_at: float) -> list[str]:
+    """Returns what will need somebody soon about the folders of traces, by robot: a line for each disk, with the names
+    of its robots where there are several, and one for each folder that does not exist."""
+    found = []
+    for same in by_disk(folders.values()):
+        names = [name for name, folder in folders.items() if folder in same]
+        found += [of_robots(names, line, among=len(folders)) for line in _warnings_of(same[0], warn_at)]
+    return found
+
+
+def of_robots(names: Sequence[str], line: str, *, among: int) -> str:
+    """Returns a line with the names of the robots that it is about; the line alone if the service has one robot."""
+    return line if among == 1 else f"{', '.join(names)}: {line}"
+
+
+def _warnings_of(folder: Path, warn_at: float) -> list[str]:
+    try:
+        free_room(folder)
+    except ProblemError as problem:
+        return [f"{problem.detail}; mount its disk"]
+    return disk_warnings(folder, warn_at)
 
 
 def require_room(folder: Path) -> None:

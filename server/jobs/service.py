@@ -224,6 +224,8 @@ class JobService:
                 # The disk may be full, or the database locked: try again at the next check.
                 log.exception("jobs")
                 failed = True
+                for lane in LANES:  # the other robots do not wait for this one's turn meanwhile
+                    self._workers.wait_no_more(lane, self._wake.set)
             self._wake.wait(LOOK_EVERY if self._running or self._fetched or failed else None)
 
     def _begin(self) -> bool:
@@ -239,17 +241,20 @@ class JobService:
             if not self._workers.take_place(lane, self._wake.set):
                 busy.add(lane)
                 continue
-            away = self._away(job)
-            if away is not None and away.state != "failed":
-                self._workers.give_place_back(lane)
-                continue
-            try:  # its state first: a job cancelled before that is never computed
-                begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
-            except BaseException as error:
+            begun: Job | None = None
+            try:
+                away = self._away(job)
+                if away is None or away.state == "failed":
+                    # Its state first: a job cancelled before that is never computed.
+                    begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
+            except BaseException as error:  # such as a folder or a database that cannot be read
                 self._workers.give_place_back(lane)
                 if isinstance(error, ProblemError):  # it has just been cancelled
                     continue
                 raise
+            if begun is None:
+                self._workers.give_place_back(lane)
+                continue
             future = self._handed_over(job.id, lane) if away is None else _refused(away.problem)
             self._running[job.id] = begun, future
             future.add_done_callback(partial(self._leave, lane))

@@ -51,10 +51,15 @@ class SharedWorkers:
             if self._taken[lane] < self._places[lane] and (not waiting or waiting[0] == robot):
                 self._taken[lane] += 1
                 del waiting[:1]
-                return True
-            if robot not in waiting:
-                waiting.append(robot)
-            return False
+                # Of two places that came free together, both told the first in line only: it tells the next.
+                following = waiting[:1] if self._taken[lane] < self._places[lane] else []
+            else:
+                if robot not in waiting:
+                    waiting.append(robot)
+                return False
+        for wake in following:
+            wake()
+        return True
 
     def give_place_back(self, lane: Lane) -> None:
         """Gives a job's place to the robot that waits for one."""

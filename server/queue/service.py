@@ -92,9 +92,13 @@ class QueueService:
             self._context.robot.name, request, self._context.clock.utc(), by, key
         )
         if new:
-            self._context.record_event("experiment", "queued", actor=by, experiment=experiment.id)
-            self.wake()
+            self.submitted(experiment, by)
         return experiment, new
+
+    def submitted(self, experiment: Experiment, by: str) -> None:
+        """Tells of an experiment that is in the database by now, and looks whether it can begin."""
+        self._context.record_event("experiment", "queued", actor=by, experiment=experiment.id)
+        self.wake()
 
     def cancel(self, identity: str, by: str) -> Experiment:
         """Cancels an experiment; stops the arm if it runs. Raises a 404, and a 409 for one that has ended."""

@@ -11,7 +11,7 @@ import re
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -43,7 +43,8 @@ OnStop = Callable[[str, StopResult, Caller], None]
 
 
 class StopListener:
-    """Listens until closed. `stops`: by robot; `on_stop`: called with the robot, the stop's result, and who asked."""
+    """Listens until closed. `stops`: by robot; `on_stop`: called with the robot, the stop's result, and who asked,
+    from any thread."""
 
     def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> None:
         self._server = _Server(listener, gate, stops, on_stop)
@@ -72,10 +73,13 @@ class _Server(ThreadingHTTPServer):
         self.server_activate()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Handles a connection on a thread of its own, or closes it if there are too many."""
+        """Handles a connection on a thread of its own or closes it if there are too many."""
         if self._room.acquire(blocking=False):
             self._since[request] = time.monotonic()
-            super().process_request(request, client_address)
+            try:
+                super().process_request(request, client_address)
+            except RuntimeError:  # the operating system has no further thread now, and a stop must not wait for one
+                self.process_request_thread(request, client_address)
         else:
             self.shutdown_request(request)
 
@@ -94,6 +98,37 @@ class _Server(ThreadingHTTPServer):
             if begun < latest:
                 with suppress(OSError):  # it has been closed meanwhile
                     request.shutdown(socket.SHUT_RD)
+
+    def stop_all(self, robots: Sequence[str], caller: Caller) -> dict[str, StopResult]:
+        """Stops robots at the same time, so that an arm that does not answer delays no other's stop.
+
+        `on_stop` is called for each as soon as its result is there, on several threads at once: before the answer,
+        since the client may be gone, and without waiting for the slowest arm.
+        """
+        found: dict[str, StopResult] = {}
+
+        def stop(name: str) -> None:
+            found[name] = self.stops[name]()  # never raises
+            try:
+                self.on_stop(name, found[name], caller)
+            except Exception:  # the arm has been stopped, and the other arms and the client still count on the answer
+                log.exception("stop listener: the stop of %s is not told", name)
+
+        here = list(robots[:1])  # on this thread, so that one stop needs no further thread
+        elsewhere: list[threading.Thread] = []
+        for name in robots[1:]:
+            thread = threading.Thread(target=stop, args=(name,), name="stop", daemon=True)
+            try:
+                thread.start()
+            except RuntimeError:  # the operating system has no further thread now: later is better than never
+                here.append(name)
+            else:
+                elsewhere.append(thread)
+        for name in here:
+            stop(name)
+        for thread in elsewhere:
+            thread.join()
+        return {name: found[name] for name in robots}
 
     def wait_for_answers(self, within: float) -> None:
         """Waits until no connection is left, or `within` s are over."""
@@ -132,26 +167,6 @@ class _Bounded(io.RawIOBase):
         super().close()
 
 
-class _Asked(threading.Thread):
-    """A stop on a thread of its own, so that an arm that does not answer delays no other's."""
-
-    def __init__(self, stop: Stop) -> None:
-        super().__init__(name="stop", daemon=True)
-        self._stop_arm = stop
-        self._found: StopResult | None = None
-        self.start()
-
-    def run(self) -> None:
-        """Stops the arm."""
-        self._found = self._stop_arm()
-
-    def result(self) -> StopResult:
-        """Waits for the result."""
-        self.join()
-        assert self._found is not None  # a stop never raises
-        return self._found
-
-
 class _Handler(BaseHTTPRequestHandler):
     """Answers one request with what the server knows."""
 
@@ -178,12 +193,7 @@ class _Handler(BaseHTTPRequestHandler):
         except ProblemError as problem:
             self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
             return
-        stops = self.server.stops
-        # The first is stopped on this thread, so that one stop needs no further thread.
-        others = {name: _Asked(stops[name]) for name in robots[1:]}
-        results = {robots[0]: stops[robots[0]](), **{name: asked.result() for name, asked in others.items()}}
-        for name, result in results.items():  # before the answer: the client may be gone, and the stop has been made
-            self.server.on_stop(name, result, caller)
+        results = self.server.stop_all(robots, caller)
         self._answer(200, together(results) if self.path == ALL else results[robots[0]], "application/json")
 
     def do_OPTIONS(self) -> None:

@@ -36,14 +36,14 @@ class ExperimentStore:
         self.page = Remembered(store, self._page)
 
     @contextmanager
-    def _changing(self, robot: str) -> Iterator[Session]:
-        """A session that may change the number of waiting experiments, which is remembered afterwards."""
+    def _changing(self, *robots: str) -> Iterator[Session]:
+        """A session that may change these robots' numbers of waiting experiments, which are remembered afterwards."""
         with self._counting:
             with self._store.writing() as session:
                 yield session
                 session.flush()
-                waiting = _count_waiting(session, robot)
-            self._waiting[robot] = waiting
+                waiting = {robot: _count_waiting(session, robot) for robot in robots}
+            self._waiting |= waiting
 
     def made_before(self, robot: str, request: ExperimentRequest, key: str | None) -> Experiment | None:
         """Returns the experiment that this key made before. Raises a 409 if the key was used for another request."""
@@ -66,22 +66,18 @@ class ExperimentStore:
         `also` is called in the transaction that makes the experiment, so that both are written or neither. Raises a 409
         if the key was used for another request.
         """
-        digest = digest_of(request)
         with self._changing(robot) as session:
-            if (found := made_before(session, ExperimentRow, robot, key, digest)) is not None:
-                return as_experiment(found), False
-            row = ExperimentRow(
-                **new_columns(robot, key, digest, now, by),
-                spec=request.spec.model_dump(mode="json"),
-                priority=request.priority,
-                at=request.at,
-                schedule=schedule,
-                trace=new_trace_id(),
-            )
-            session.add(row)
-            session.flush()
-            also(session)
-            return as_experiment(row), True
+            experiment, new = _submit(session, robot, request, now, by, key, schedule)
+            if new:
+                also(session)
+            return experiment, new
+
+    def submit_to_each(
+        self, robots: Sequence[str], request: ExperimentRequest, now: datetime, by: str, key: str | None = None
+    ) -> list[tuple[Experiment, bool]]:
+        """Does the same for several robots in one transaction: if one raises, no robot gets the experiment."""
+        with self._changing(*robots) as session:
+            return [_submit(session, robot, request, now, by, key) for robot in robots]
 
     def get(self, robot: str, identity: str) -> Experiment:
         """Returns an experiment. Raises a 404."""
@@ -211,6 +207,32 @@ class ExperimentStore:
             row = session.scalar(select(ExperimentRow).filter_by(trace=trace))
             if row is not None and row.outcome is None:
                 row.outcome = outcome
+
+
+def _submit(
+    session: Session,
+    robot: str,
+    request: ExperimentRequest,
+    now: datetime,
+    by: str,
+    key: str | None,
+    schedule: str | None = None,
+) -> tuple[Experiment, bool]:
+    """Adds an experiment and returns it with True; or returns the one that the key made before, with False."""
+    digest = digest_of(request)
+    if (found := made_before(session, ExperimentRow, robot, key, digest)) is not None:
+        return as_experiment(found), False
+    row = ExperimentRow(
+        **new_columns(robot, key, digest, now, by),
+        spec=request.spec.model_dump(mode="json"),
+        priority=request.priority,
+        at=request.at,
+        schedule=schedule,
+        trace=new_trace_id(),
+    )
+    session.add(row)
+    session.flush()
+    return as_experiment(row), True
 
 
 def as_experiment(row: ExperimentRow) -> Experiment:

@@ -141,6 +141,17 @@ def moving_process(answer: StopAnswer) -> Iterator[None]:
         thread.join()
 
 
+def test_a_name_that_nobody_here_has_stops_all_that_is_moved_here_beside_a_default_service(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
+    with moving_process(StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)):
+        said = daq("stop", "--robot", "amr", "--json")
+    assert "no robot here is called amr: every robot that is moved from here is stopped\n" in said.err
+    answers = {answer["robot"]: answer["confirmed"] for answer in json.loads(said.out)}
+    assert answers == {"arm": True, "amr": False}  # the service, which does not answer, was asked by the name
+
+
 @pytest.mark.parametrize("written", ["serial://{device}?baud=9600", "serial://{link}", "serial://{link}?baud=115200"])
 def test_a_port_whose_process_was_asked_is_not_opened_again(daq: CommandLine, written: str) -> None:
     device, link = Path("device").absolute(), Path("link").absolute()

@@ -7,13 +7,14 @@ import threading
 from pathlib import Path
 
 import httpx
+import pytest
 
 from daq.contracts.service.robot import FleetStopResult, StopResult
 from server.access.caller import Caller
 from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens, TokenStore
 from server.stopping.arm import together
-from server.stopping.listener import StopListener
+from server.stopping.listener import OnStop, Stop, StopListener
 from server.store.engine import Store
 from tests.server.clocks import HandClock
 
@@ -34,17 +35,59 @@ def test_all_arms_are_stopped_at_the_same_time_and_every_stop_is_told(tmp_path: 
     def on_stop(robot: str, result: StopResult, caller: Caller) -> None:
         told.append((robot, result.confirmed, caller.name))
 
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    answer = stop_of_all(tmp_path, dict.fromkeys(("a", "b", "c"), stop), on_stop)
+    assert answer.confirmed
+    assert list(answer.robots) == ["a", "b", "c"]
+    assert sorted(told) == [(name, True, "local") for name in ("a", "b", "c")]
+
+
+def stop_of_all(folder: Path, stops: dict[str, Stop], on_stop: OnStop) -> FleetStopResult:
+    """The answer of a stop listener of these arms to the stop of all."""
+    store = Store(f"sqlite:///{folder / 'service.sqlite'}")
     gate = StopGate(KnownTokens(TokenStore(store), HandClock()), True, (), 8300)
     with socket.create_server(("127.0.0.1", 0)) as door:
         url = f"http://127.0.0.1:{door.getsockname()[1]}/api/v1/fleet/stop"
-        listener = StopListener(door, gate, dict.fromkeys(("a", "b", "c"), stop), on_stop)
+        listener = StopListener(door, gate, stops, on_stop)
         answer = FleetStopResult.model_validate(httpx.post(url, timeout=60).json())
         listener.close()
     store.close()
+    return answer
+
+
+def test_a_stop_is_told_before_a_slower_arm_has_answered(tmp_path: Path) -> None:
+    told: dict[str, threading.Event] = {name: threading.Event() for name in ("slow", "quick")}
+
+    def slow() -> StopResult:
+        return FROZEN if told["quick"].wait(10) else LOST
+
+    answer = stop_of_all(tmp_path, {"slow": slow, "quick": lambda: FROZEN}, lambda name, *_: told[name].set())
     assert answer.confirmed
-    assert list(answer.robots) == ["a", "b", "c"]
-    assert told == [(name, True, "local") for name in ("a", "b", "c")]
+    assert told["slow"].is_set()
+
+
+def test_a_stop_that_cannot_be_told_is_answered_all_the_same(tmp_path: Path) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("no reader")
+
+    assert stop_of_all(tmp_path, {"a": lambda: FROZEN, "b": lambda: FROZEN}, fails).confirmed
+
+
+def test_all_arms_are_stopped_though_no_thread_can_be_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    start, refused = threading.Thread.start, list[str]()
+
+    def seldom(thread: threading.Thread) -> None:
+        if thread.name == "stop" or "process_request" in thread.name:
+            refused.append(thread.name)
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", seldom)
+    told: list[str] = []
+    names = ("a", "b", "c")
+    answer = stop_of_all(tmp_path, dict.fromkeys(names, lambda: FROZEN), lambda name, *_: told.append(name))
+    assert list(answer.robots) == sorted(told) == list(names)
+    assert answer.confirmed
+    assert len(refused) == 3  # the request's own, and those of two arms
 
 
 def test_one_arm_that_does_not_confirm_is_named() -> None:

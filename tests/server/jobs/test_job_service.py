@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
@@ -38,6 +39,7 @@ from server.jobs.lanes import lane_of
 from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
 from server.jobs.service import LOOK_EVERY, JobContext, JobService
+from server.jobs.shared_workers import SharedWorkers
 from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
 from server.store.archived import Archived, ArchivedStore
@@ -79,7 +81,7 @@ class HandExecutor(Workers):
 class Bench:
     """A service, its stores, at whose calls something may happen, and everything that it has told."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, workers: SharedWorkers | None = None) -> None:
         self.folder = folder / "jobs"
         self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
         self.store.migrate()
@@ -110,6 +112,7 @@ class Bench:
                 changed=self._hear,
                 at_once=1,
                 make_executor=self._make_executor,
+                workers=workers,
             )
         )
 
@@ -233,6 +236,28 @@ class HandArchive:
         self._file.touch()
         self._bench.clock.turn(LOOK_EVERY)
         self._bench.service.look()
+
+
+def test_a_folder_that_cannot_be_looked_into_keeps_neither_places_nor_turns_from_other_robots(tmp_path: Path) -> None:
+    shared = SharedWorkers("local://", 1, lambda _url, _count: HandExecutor(lambda _folder: Ended()))
+    bench, told = Bench(tmp_path, shared), threading.Event()
+    HandArchive(bench).ends()
+    assert shared.take_place("long", lambda: None)
+
+    def the_disk_goes() -> None:
+        assert not shared.take_place("long", told.set)  # behind this robot's fit
+        raise OSError(errno.EIO, "the disk is away")
+
+    bench.traces.before("files_of", the_disk_goes)
+    _asked(bench, FitRequest(traces=(TRACE,)))
+    compare = _asked(bench, COMPARE)
+    bench.service.start()
+    assert told.wait(60)
+    shared.give_place_back("long")
+    assert shared.take_place("long", told.set)
+    assert bench.end_of(compare).state == "done"  # in the only place of its lane
+    bench.service.close(10)
+    bench.store.close()
 
 
 def test_a_job_waits_until_its_trace_is_fetched_from_the_archive_and_says_so(bench: Bench) -> None:

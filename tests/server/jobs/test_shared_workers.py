@@ -63,6 +63,20 @@ def test_a_turn_that_is_given_up_passes_to_the_next() -> None:
     assert workers.take_place("short", third.wake)
 
 
+def test_two_places_that_come_free_together_reach_two_robots() -> None:
+    workers = SharedWorkers("local://", 2)
+    busy, first, second = Robot(), Robot(), Robot()
+    assert [workers.take_place("long", robot.wake) for robot in (busy, busy, first, second)] == [True, True] + [
+        False
+    ] * 2
+    workers.give_place_back("long")
+    workers.give_place_back("long")
+    assert (first.woken, second.woken) == (2, 0)
+    assert workers.take_place("long", first.wake)
+    assert second.woken == 1
+    assert workers.take_place("long", second.wake)
+
+
 def test_lanes_do_not_wait_for_each_other() -> None:
     workers = SharedWorkers("local://", 2)
     robot = Robot()
