@@ -28,6 +28,8 @@ def main() -> None:
         if command == "stop":  # a client's installation has the early stop alone
             from daq_cli.app import early_stop
 
+            if not early_stop.told():
+                early_stop.ask()  # a name that nobody has stops all
             print("\n".join(early_stop.told() or ["NOTHING WAS STOPPED: no program here moves a robot"]), flush=True)
         print(f"daq: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
