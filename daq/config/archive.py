@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlsplit
@@ -10,11 +11,14 @@ from pydantic import Field, field_validator
 
 from daq.contracts.frozen import FrozenRecord
 
+BUCKET = r"^[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]$"
+"""Names of buckets, as S3 allows them."""
+
 
 class ArchiveSettings(FrozenRecord):
     """Section `[archive]`. Without a bucket there is no archive."""
 
-    bucket: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]$")] | None = None
+    bucket: Annotated[str, Field(pattern=BUCKET)] | None = None
     """Name of the bucket, which must exist."""
     endpoint: Annotated[str, Field(max_length=500)] | None = None
     """Address of a server that speaks S3; None for Amazon's of the `region`. Only the configuration names it: no
@@ -35,6 +39,14 @@ class ArchiveSettings(FrozenRecord):
     """Whether local copies of traces that a model or a job refers to stay in any case."""
     timeout: Annotated[float, Field(ge=0.1, le=600)] = 30.0
     """Time (s) that one request to the store may take. A trace is sent and fetched in pieces of 8 MB."""
+
+    @field_validator("bucket", mode="before")
+    @classmethod
+    def _is_name(cls, bucket: object) -> object:
+        """Raises ValueError for a text that names no bucket: in words, where the pattern alone would be shown."""
+        if isinstance(bucket, str) and not re.fullmatch(BUCKET, bucket):
+            raise ValueError("names no bucket; write 3 to 63 lower-case letters, digits, dots and hyphens")
+        return bucket
 
     @field_validator("endpoint")
     @classmethod

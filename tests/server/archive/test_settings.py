@@ -60,6 +60,12 @@ def test_a_wrong_setting_is_one_line_without_secrets(tmp_path: Path, line: str) 
     assert "\n" not in str(caught.value)
 
 
+def test_a_name_that_no_bucket_can_have_is_told_in_words(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="names no bucket; write 3 to 63 lower-case letters") as caught:
+        load_settings(_config(tmp_path, 'bucket = "UP"'))
+    assert "pattern" not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
