@@ -36,7 +36,7 @@ ORDERS = "MUTATION_ORDERS"
 """Environment variable with the path of a pickled `Orders`."""
 GRACE_S = 20.0
 """Time that a mutant has beyond three times what its tests take without a fault."""
-BASELINE_LIMIT_S = 900.0
+BASELINE_LIMIT_S = 3600.0
 Answer = TypeVar("Answer")
 
 

@@ -206,12 +206,12 @@ class Campaign:
 
     def run(self, kills: int) -> Findings:
         """Kills the service so often."""
-        for number in range(kills):
+        for _ in range(kills):
             with started_service(self._folder, PORT) as service:
                 self._proxy.go_on.clear()
                 for _ in range(4):
                     self._fail()
-                    self._order(service, number)
+                    self._order(service)
                     time.sleep(self._random.uniform(0, LONGEST_MOMENT_S / 4))
                 service.kill()
                 self._proxy.go_on.set()
@@ -226,14 +226,14 @@ class Campaign:
         self.found.faults[fault or "none"] += 1
         self._proxy.fail(fault)
 
-    def _order(self, service: RunningService, number: int) -> None:
+    def _order(self, service: RunningService) -> None:
         what = self._random.choice(("make", "make", "drop", "drop", "fetch", "delete"))
         trace = self._random.choice(sorted(self._made)) if self._made else ""
         if what != "make" and not trace:
             what = "make"
         self.found.orders[what] += 1
         if what == "make":
-            path = make_trace(self._folder, 1000 + 10 * number + len(self._made), 200)
+            path = make_trace(self._folder, 1000 + self.found.traces, 200)  # content that no earlier one had
             body = path.read_bytes()
             path.unlink()
             headers = {"Content-Type": "application/octet-stream"}
