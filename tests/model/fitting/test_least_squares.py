@@ -93,6 +93,18 @@ def test_outliers_weigh_as_huber_says() -> None:
     np.testing.assert_allclose(solution.values, found_elsewhere(problem, robust=True), rtol=1e-3)
 
 
+def test_outliers_weigh_in_the_information_as_in_the_steps_when_the_search_is_cut_short() -> None:
+    problem = curve()
+    problem.measured[50:60] += 5.0
+    found = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(True, 1e-12, 7))
+    assert not found.converged
+    (at,) = problem.evaluate(found.values, derivatives=True)
+    assert at.jacobian is not None
+    slopes, residual = at.jacobian[:, :, 0] / 0.01, at.residual[:, 0] / 0.01
+    weights = np.minimum(1.0, 4.0 / np.abs(residual))  # Huber's, beyond four deviations
+    np.testing.assert_allclose(found.information, (slopes * weights) @ slopes.T, rtol=1e-9)
+
+
 @pytest.mark.parametrize("bounds", [((-10.0, 1.5), (-10.0, 10.0), (-10.0, 10.0)), ((-10, 10), (0.1, 0.9), (-1, 0.2))])
 def test_bounds_hold_and_the_others_are_best_under_them(bounds: tuple[tuple[float, float], ...]) -> None:
     problem = curve(bounds=bounds)

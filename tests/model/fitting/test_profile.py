@@ -107,3 +107,25 @@ def test_what_the_data_do_not_bound_has_no_ends_and_a_flat_profile_to_its_bounds
     assert (found.low, found.high, found.better) == (None, None, False)
     assert (found.values[0], found.values[-1]) == (-5.0, 5.0)
     assert found.rises == pytest.approx([0.0] * len(found.rises), abs=1e-9)
+
+
+def test_steps_outwards_double_only_while_the_likelihood_hardly_changes() -> None:
+    time = np.linspace(0, 1, 50)
+    deviation = 0.2 / np.linalg.norm(time)
+    slope, nothing = Unknown(parameter("slope"), 1.0), Unknown(parameter("nothing"), 1.0, -5.0, 5.0)
+    found = of(Curve("line", 3.0 * time, (slope, nothing)), 0, 0.1 * deviation, 0.2)
+    away = sorted((value - 3.0) / deviation for value in found.values if value > 3.0)
+    # 1.5 deviations raise −2 ln L by 2.25, which is more than a quarter of 3.84: the next step is as long as the last.
+    assert [*away[:4], away[-1]] == pytest.approx([0.1, 0.3, 0.7, 1.5, 2.3], rel=1e-6)
+
+
+def test_progress_grows_to_one() -> None:
+    told: list[float] = []
+    problem = Curve("enzyme", VELOCITY, (Unknown(parameter("V"), 200.0), Unknown(parameter("K"), 0.05, 0.0, 10.0)))
+    profiled(
+        problem, [white(10.9)], np.array([212.7, 0.064]), 0, 2.0, SEARCH, progress=lambda share, _: told.append(share)
+    )
+    assert told == sorted(told)
+    assert told[0] == 0.0
+    assert told[-1] == 1.0
+    assert sum(0.5 < share < 1.0 for share in told) > 1
