@@ -243,7 +243,7 @@ def run_tests(
     The code is None when they took too long; everything they began was then ended.
     """
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", LEFT_OUT, *arguments]
-    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled"), **more}
+    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", **more}
     with (
         tempfile.TemporaryFile("w+", errors="replace") as output,
         subprocess.Popen(
@@ -272,7 +272,10 @@ def tried_in_forks(
     orders, answer = tree / "mutation-orders", tree / "mutation-findings"
     orders.write_bytes(pickle.dumps(Orders(tuple(mutants), longest_s, answer, uncompiled)))
     answer.unlink(missing_ok=True)
-    more = {ORDERS: str(orders), **(UNCOMPILED if uncompiled else {})}
+    more = {
+        ORDERS: str(orders),
+        **(UNCOMPILED if uncompiled else {}),
+    }  # a fork changes no file: all may use what is compiled
     code, failed = run_tests(tree, ["-p", Findings.__module__, *files], FORKS_LIMIT_S, more)
     if code == 5:  # pytest: there was no test
         return Findings()
@@ -292,8 +295,9 @@ def outcome(tree: Path, mutant: Mutant, tests: Tests, uncompiled: bool = False) 
     _write(file, mutant.applied(unchanged), next(_TIMES) * 10**9)
     try:
         arguments = [*tests.files, *(f"--deselect={name}" for name in tests.deselected)]
+        more = UNCOMPILED if uncompiled else {"NUMBA_CACHE_DIR": str(tree / ".compiled")}
         grace = COMPILING_S if mutant.file.startswith("model/") and not uncompiled else GRACE_S
-        code, failed = run_tests(tree, arguments, 3.0 * tests.seconds + grace, UNCOMPILED if uncompiled else {})
+        code, failed = run_tests(tree, arguments, 3.0 * tests.seconds + grace, more)
     finally:
         _write(file, unchanged, changed_at)
     return Outcome(mutant, {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed"), failed)
