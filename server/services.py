@@ -23,6 +23,7 @@ from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
 from daq.trajectories import control_period
+from server.access.caller import Caller
 from server.access.lanes import Lanes
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
@@ -84,6 +85,8 @@ class RobotServices:
     models: Models
     unattended: bool
     archive: ArchiveService | None
+    owners: tuple[str, ...] = ()
+    """Names of this robot's owners; empty: every owner."""
 
     def status(self) -> RobotStatus:
         """The status of the robot now."""
@@ -98,6 +101,13 @@ class RobotServices:
         if lacks_consent(self.robot.identity, given):
             line = f"{self.robot.place.url} is a real arm: it moves only with the operator's consent"
             raise conflict("consent-needed", line, advice)
+
+    def require_own(self, caller: Caller, owner: str, what: str) -> None:
+        """Raises a 403 unless the caller owns `what`, or is an owner of this robot."""
+        if caller.name != owner and not caller.owns(self.owners):
+            line = f"{what} is {owner}'s: an operator changes and cancels only their own"
+            advice = f"ask {owner}, or an owner of the robot; everybody who may see the robot may stop it"
+            raise ProblemError(403, "owner-needed", line, advice)
 
     def word(self, lease: str | None, said: float) -> Word:
         """Returns the request of a client with this lease to move the arm by hand."""
@@ -241,6 +251,7 @@ class Services:
             models=models,
             archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
             unattended=settings.server.unattended,
+            owners=settings.robot.owners,
         )
 
     def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:

@@ -52,6 +52,8 @@ class RobotSettings(FrozenRecord):
     """File of the memory map; without one, that of the package, whose addresses are mostly assumed."""
     limits: Limits | None = None
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+    owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
+    """Names of those with the role owner who are responsible for this arm; none for all of them."""
 
 
 class FleetRobotSettings(FrozenRecord):
@@ -65,6 +67,8 @@ class FleetRobotSettings(FrozenRecord):
     """File of its memory map; without one, that of the package."""
     limits: Limits | None = None
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+    owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
+    """Names of those with the role owner who are responsible for this arm; none for all of them."""
     traces: Path | None = None
     """Folder of its traces; None for the folder of its name in that of `[traces]`."""
     unattended: TrueOrFalse = False

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
+from daq.contracts.service.queue import Role
 from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
 
 if TYPE_CHECKING:
@@ -23,8 +24,11 @@ def add(
     context: typer.Context,
     name: NameArgument,
     role: Annotated[
-        Literal["viewer", "operator"],
-        typer.Option(help="A viewer may look, and stop the robot; an operator may also move it."),
+        Role,
+        typer.Option(
+            help="A viewer may look, and stop the robot; an operator may also move it; an owner may also change and "
+            "cancel what others submitted; an admin is an owner of every robot."
+        ),
     ] = "viewer",
 ) -> None:
     """Make a token. It is shown only once; its hash is stored."""

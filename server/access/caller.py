@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -27,10 +28,14 @@ class Caller:
     @property
     def may_operate(self) -> bool:
         """Whether they may change something."""
-        return self.role == "operator"
+        return self.role != "viewer"
+
+    def owns(self, owners: Collection[str]) -> bool:
+        """Whether they are an owner of an arm whose configuration names `owners`; without names, every owner is one."""
+        return self.role == "admin" or (self.role == "owner" and (not owners or self.name in owners))
 
 
-LOCAL = Caller("local", "operator")
+LOCAL = Caller("local", "owner")
 """A user of this computer: they reach a service on loopback without a token and without a proxy."""
 
 

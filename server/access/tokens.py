@@ -17,8 +17,8 @@ from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.errors import SpecError
-from daq.contracts.service.queue import Role
-from server.access.caller import Caller
+from daq.contracts.service.queue import Role, role_of
+from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.clock import Clock
 from server.database_errors import DamagedError
@@ -55,6 +55,8 @@ class TokenStore:
 
     def add(self, name: str, role: Role, now: datetime) -> str:
         """Makes a new token and returns it; it cannot be shown again. Raises SpecError if the name is taken."""
+        if name == LOCAL.name:
+            raise SpecError(f"token {name!r}: users of this computer have this name; choose another one")
         token = PREFIX + secrets.token_urlsafe(32)
         with self._store.writing() as session:
             if session.scalar(select(TokenRow).filter_by(name=name)) is not None:
@@ -75,14 +77,14 @@ class TokenStore:
         """Returns all tokens, including the revoked ones."""
         with self._store.reading() as session:
             rows = session.scalars(select(TokenRow).order_by(TokenRow.created))
-            return [TokenInfo(row.name, _role(row.role), row.created, row.revoked) for row in rows]
+            return [TokenInfo(row.name, role_of(row.role), row.created, row.revoked) for row in rows]
 
     def callers(self) -> dict[str, Caller]:
         """Returns the caller of each token that is not revoked, by the token's digest. It reads no other columns, so
         that a damaged time keeps nobody out."""
         with self._store.reading() as session:
             rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
-            return {digest: Caller(name, _role(role), digest) for digest, name, role in rows}
+            return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,3 @@ class KnownTokens:
 
     def _age(self) -> float:
         return self._clock.monotonic() - self._known.at
-
-
-def _role(text: str) -> Role:
-    return "operator" if text == "operator" else "viewer"

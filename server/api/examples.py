@@ -116,6 +116,7 @@ def _experiments() -> list[BaseModel]:
         at=NOON,
         submitted=NOON,
         submitted_by="anna",
+        owner="anna",
         started=NOON,
         progress=0.4,
         progress_text="120 of 300 samples",
@@ -480,7 +481,7 @@ def _system() -> list[BaseModel]:
     )
     return [
         Health(status="ok", version="0.1.0", checks={"database": "", "traces": "", f"robot {ROBOT}": ""}),
-        Me(name="anna", role="operator"),
+        Me(name="anna", role="owner", owner_of=(ROBOT,)),
         SystemStatus(
             version="0.1.0",
             uptime=86400.0,

@@ -17,6 +17,7 @@ from daq.contracts.service.experiments import (
     ExperimentState,
     MotionPreview,
 )
+from server.access.caller import Caller
 from server.api.dependencies import (
     CursorOf,
     IdempotencyKey,
@@ -111,7 +112,8 @@ async def get_experiment(
 def change_experiment(
     experiment: Identity, change: ExperimentChange, rig: RobotDep, services: ServicesDep, caller: Operator
 ) -> Experiment:
-    """Changes the priority of an experiment that still waits."""
+    """Changes the priority of an experiment that still waits: one's own, or, for owners of the robot, anybody's."""
+    _require_own(services, rig, caller, experiment)
     changed = services.experiments.set_priority(rig.robot.name, experiment, change.priority)
     services.record_event(
         rig.robot.name, "experiment", f"priority {change.priority}", actor=caller.name, experiment=experiment
@@ -121,9 +123,19 @@ def change_experiment(
 
 
 @router.post("/{experiment}/cancel")
-def cancel_experiment(experiment: Identity, rig: RobotDep, caller: Operator) -> Experiment:
-    """Cancels an experiment. One that runs is ended by a stop: the arm is frozen and needs a reset."""
+def cancel_experiment(experiment: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Experiment:
+    """Cancels an experiment: one's own, or, for owners of the robot, anybody's.
+
+    One that runs is ended by a stop: the arm is frozen and needs a reset.
+    """
+    _require_own(services, rig, caller, experiment)
     return rig.queue.cancel(experiment, caller.name)
+
+
+def _require_own(services: Services, rig: RobotServices, caller: Caller, experiment: str) -> None:
+    """Raises a 403 unless the caller may change this experiment, and a 404."""
+    found = services.experiments.get(rig.robot.name, experiment)
+    rig.require_own(caller, found.owner, f"experiment {found.spec.name or found.id}")
 
 
 def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:

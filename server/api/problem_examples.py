@@ -43,6 +43,13 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "anna may look, and stop the robot; this needs the role operator",
         "ask for a token with the role operator",
     ),
+    _met(
+        "(patch|delete) .*/(experiments|schedules)/|post .*/experiments/.*/cancel",
+        403,
+        "owner-needed",
+        "experiment morning-ramp is anna's: an operator changes and cancels only their own",
+        "ask anna, or an owner of the robot; everybody who may see the robot may stop it",
+    ),
     _met(".*", 404, "not-found", "there is no robot 'other'", "this service has ma2000"),
     _met(".*", 409, "not-safe", "not while the arm is busy (experiment)", "remove the cause, then try again"),
     _met(

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Response
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
+from server.access.caller import Caller
 from server.api.dependencies import (
     CursorOf,
     Identity,
@@ -23,6 +24,7 @@ from server.api.dependencies import (
 from server.api.experiments import require_possible
 from server.problems import PROBLEMS
 from server.queue.notices import Seen
+from server.services import RobotServices, Services
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 
@@ -99,7 +101,8 @@ def get_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, _: Vi
 def change_schedule(
     schedule: Identity, change: ScheduleChange, rig: RobotDep, services: ServicesDep, caller: Operator
 ) -> Schedule:
-    """Switches a schedule on or off."""
+    """Switches a schedule on or off: one's own, or, for owners of the robot, anybody's."""
+    _require_own(services, rig, caller, schedule)
     changed = services.schedules.switch(rig.robot.name, schedule, active=change.active, now=services.clock.utc())
     state = "on" if change.active else "off"
     services.record_event(rig.robot.name, "schedule", f"schedule {schedule} switched {state}", actor=caller.name)
@@ -109,10 +112,17 @@ def change_schedule(
 
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)
 def delete_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
-    """Deletes a schedule. The experiments that it has submitted are kept."""
+    """Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept."""
+    _require_own(services, rig, caller, schedule)
     services.schedules.remove(rig.robot.name, schedule)
     services.record_event(rig.robot.name, "schedule", f"schedule {schedule} deleted", actor=caller.name)
     return Response(status_code=204)
+
+
+def _require_own(services: Services, rig: RobotServices, caller: Caller, schedule: str) -> None:
+    """Raises a 403 unless the caller may change this schedule, and a 404."""
+    found = services.schedules.get(rig.robot.name, schedule)
+    rig.require_own(caller, found.created_by, f"schedule {found.spec.name or found.id}")
 
 
 @router.get("/control", tags=["control"])

@@ -64,6 +64,7 @@ class DueRuns:
             now,
             f"schedule {identity}",
             schedule=identity,
+            owner=schedule.created_by,
             also=lambda session: context.schedules.count_run(session, name, identity, now),
         )
         self._left_out.discard(identity)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
 from server.access.digest import digest_of
 
@@ -136,7 +137,7 @@ def _of_file(file: Path) -> Callers:
     uri = f"{file.absolute().as_uri()}?mode=ro"
     with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_WITHIN)) as connection:
         rows = connection.execute("SELECT digest, name, role FROM tokens WHERE revoked IS NULL").fetchall()
-    return {digest: Caller(name, "operator" if role == "operator" else "viewer", digest) for digest, name, role in rows}
+    return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
 def _of_database(url: str) -> Callable[[], Callers]:
@@ -148,6 +149,6 @@ def _of_database(url: str) -> Callable[[], Callers]:
     def read() -> Callers:
         with engine.connect() as connection:
             rows = connection.execute(text("SELECT digest, name, role FROM tokens WHERE revoked IS NULL")).all()
-        return {row[0]: Caller(row[1], "operator" if row[2] == "operator" else "viewer", row[0]) for row in rows}
+        return {row[0]: Caller(row[1], role_of(row[2]), row[0]) for row in rows}
 
     return read

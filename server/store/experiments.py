@@ -59,15 +59,16 @@ class ExperimentStore:
         by: str,
         key: str | None = None,
         schedule: str | None = None,
+        owner: str | None = None,
         also: Callable[[Session], None] = lambda _session: None,
     ) -> tuple[Experiment, bool]:
         """Queues a new experiment, and returns it with True; or returns the one that the key made before, with False.
 
-        `also` is called in the transaction that makes the experiment, so that both are written or neither. Raises a 409
-        if the key was used for another request.
+        `owner` is who submits it, unless a schedule does. `also` is called in the transaction that makes the experiment,
+        so that both are written or neither. Raises a 409 if the key was used for another request.
         """
         with self._changing(robot) as session:
-            experiment, new = _submit(session, robot, request, now, by, key, schedule)
+            experiment, new = _submit(session, robot, request, now, by, key, schedule, owner)
             if new:
                 also(session)
             return experiment, new
@@ -217,6 +218,7 @@ def _submit(
     by: str,
     key: str | None,
     schedule: str | None = None,
+    owner: str | None = None,
 ) -> tuple[Experiment, bool]:
     """Adds an experiment and returns it with True; or returns the one that the key made before, with False."""
     digest = digest_of(request)
@@ -229,6 +231,7 @@ def _submit(
         at=request.at,
         schedule=schedule,
         trace=new_trace_id(),
+        owner=owner or by,
     )
     session.add(row)
     session.flush()
@@ -248,6 +251,7 @@ def as_experiment(row: ExperimentRow) -> Experiment:
         schedule=row.schedule,
         submitted=row.submitted,
         submitted_by=row.submitted_by,
+        owner=row.owner,
         started=row.started,
         ended=row.ended,
         outcome=row.outcome,

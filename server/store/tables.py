@@ -83,6 +83,8 @@ class ExperimentRow(Submitted, Table):
     outcome: Mapped[str | None] = mapped_column(String(16))
     trace: Mapped[str] = mapped_column(String(12), unique=True)
     """The number of its trace, chosen before it runs, so that the trace is found after a crash."""
+    owner: Mapped[str] = mapped_column(default="", server_default="")
+    """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule."""
 
 
 class ScheduleRow(Table):

@@ -62,6 +62,9 @@ class Experiment(Wire):
     """The schedule that submitted it."""
     submitted: AwareDatetime
     submitted_by: str
+    owner: str = ""
+    """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule. Empty at
+    an older service."""
     started: AwareDatetime | None = None
     ended: AwareDatetime | None = None
     progress: float | None = None

@@ -26,6 +26,8 @@ class Me(Wire):
 
     name: str
     role: Role
+    owner_of: tuple[str, ...] = ()
+    """Robots of which they are an owner: there they may change and cancel everybody's experiments."""
 
 
 class StorageStatus(Wire):

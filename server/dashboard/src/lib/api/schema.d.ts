@@ -633,7 +633,7 @@ export interface paths {
         head?: never;
         /**
          * Change Experiment
-         * @description Changes the priority of an experiment that still waits.
+         * @description Changes the priority of an experiment that still waits: one's own, or, for owners of the robot, anybody's.
          */
         patch: operations["change_experiment"];
         trace?: never;
@@ -649,7 +649,9 @@ export interface paths {
         put?: never;
         /**
          * Cancel Experiment
-         * @description Cancels an experiment. One that runs is ended by a stop: the arm is frozen and needs a reset.
+         * @description Cancels an experiment: one's own, or, for owners of the robot, anybody's.
+         *
+         *     One that runs is ended by a stop: the arm is frozen and needs a reset.
          */
         post: operations["cancel_experiment"];
         delete?: never;
@@ -838,14 +840,14 @@ export interface paths {
         post?: never;
         /**
          * Delete Schedule
-         * @description Deletes a schedule. The experiments that it has submitted are kept.
+         * @description Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept.
          */
         delete: operations["delete_schedule"];
         options?: never;
         head?: never;
         /**
          * Change Schedule
-         * @description Switches a schedule on or off.
+         * @description Switches a schedule on or off: one's own, or, for owners of the robot, anybody's.
          */
         patch: operations["change_schedule"];
         trace?: never;
@@ -2429,6 +2431,11 @@ export interface components {
             submitted: string;
             /** Submitted By */
             submitted_by: string;
+            /**
+             * Owner
+             * @default
+             */
+            owner?: string;
             /** Started */
             started?: string | null;
             /** Ended */
@@ -3753,7 +3760,12 @@ export interface components {
              * Role
              * @enum {string}
              */
-            role: "viewer" | "operator";
+            role: "viewer" | "operator" | "owner" | "admin";
+            /**
+             * Owner Of
+             * @default []
+             */
+            owner_of?: string[];
         };
         /**
          * MeasuredGain

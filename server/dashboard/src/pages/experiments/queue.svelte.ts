@@ -71,6 +71,13 @@ export class QueueLists {
     this.loaded = true;
   }
 
+  /** Whether what waits at one place can be moved to another: all priorities that this changes are the caller's to change. */
+  mayMove(from: number, to: number): boolean {
+    if (to < 0 || to >= this.waiting.length) return false;
+    const owners = new Map(this.waiting.map((one) => [one.id, one.owner]));
+    return reordered(this.waiting, from, to)?.every(({ id }) => live.mayChange(owners.get(id) ?? '')) ?? true;
+  }
+
   /** Moves what waits at one place to another. */
   async move(from: number, to: number): Promise<void> {
     const changes = reordered(this.waiting, from, to);
