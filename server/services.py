@@ -34,6 +34,7 @@ from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.catalogue.room import of_robots, storage_warnings
 from server.clock import Clock, SystemClock
+from server.experiments.review import Given
 from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
@@ -108,6 +109,18 @@ class RobotServices:
             line = f"{what} is {owner}'s: an operator changes and cancels only their own"
             advice = f"ask {owner}, or an owner of the robot; everybody who may see the robot may stop it"
             raise ProblemError(403, "owner-needed", line, advice)
+
+    def approval(self, caller: Caller, content: str) -> Given:
+        """Returns the caller's approval of some content. Raises a 403 where only owners of the robot may approve, and a
+        409 where nobody needs to."""
+        reviewer, is_owner = self.queue.review.reviewer, caller.owns(self.owners)
+        if reviewer is None:
+            line = f"experiments of {self.robot.name} need no approval"
+            raise conflict("no-review", line, "they begin without; the key `review` of the robot's configuration")
+        if reviewer == "owner" and not is_owner:
+            line = f"an owner of {self.robot.name} must approve its experiments, and {caller.name} is none"
+            raise ProblemError(403, "owner-needed", line, "ask an owner of the robot")
+        return Given(content, caller.name, is_owner)
 
     def word(self, lease: str | None, said: float) -> Word:
         """Returns the request of a client with this lease to move the arm by hand."""
@@ -209,7 +222,7 @@ class Services:
         )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
-        queue = self._make_queue(robot, control, catalogue, unattended=settings.server.unattended)
+        queue = self._make_queue(robot, control, catalogue, settings)
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
         teaching = TeachingService(robot, lambda line: self.record_event_later(name, "teaching", line))
@@ -287,7 +300,7 @@ class Services:
         return storage_warnings(folders, self.settings.traces.warn_at)
 
     def _make_queue(
-        self, robot: Robot, control: ControlService, catalogue: Catalogue, *, unattended: bool
+        self, robot: Robot, control: ControlService, catalogue: Catalogue, settings: Settings
     ) -> QueueService:
         """Returns the queue of a robot, which hears the robot's reports."""
 
@@ -309,7 +322,8 @@ class Services:
                 record_event=record_event,
                 add_trace=add_trace,
                 add_unfinished_traces=lambda: self._take_in(catalogue),
-                unattended=unattended,
+                unattended=settings.server.unattended,
+                reviewer=None if settings.robot.review == "off" else settings.robot.review,
             )
         )
         robot.listeners.append(queue.on_report)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import platformdirs
 from pydantic import BaseModel, Field, ValidationError, field_validator
@@ -54,6 +54,9 @@ class RobotSettings(FrozenRecord):
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
     owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
     """Names of those with the role owner who are responsible for this arm; none for all of them."""
+    review: Literal["off", "operator", "owner"] = "off"
+    """Whose approval each experiment needs before it moves this arm, a real one: nobody's, that of an operator who did
+    not submit it, or that of an owner of the arm who did not."""
 
 
 class FleetRobotSettings(FrozenRecord):
@@ -69,6 +72,9 @@ class FleetRobotSettings(FrozenRecord):
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
     owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
     """Names of those with the role owner who are responsible for this arm; none for all of them."""
+    review: Literal["off", "operator", "owner"] = "off"
+    """Whose approval each experiment needs before it moves this arm, a real one: nobody's, that of an operator who did
+    not submit it, or that of an owner of the arm who did not."""
     traces: Path | None = None
     """Folder of its traces; None for the folder of its name in that of `[traces]`."""
     unattended: TrueOrFalse = False

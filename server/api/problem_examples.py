@@ -50,6 +50,27 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "experiment morning-ramp is anna's: an operator changes and cancels only their own",
         "ask anna, or an owner of the robot; everybody who may see the robot may stop it",
     ),
+    _met(
+        "put .*/approval",
+        403,
+        "own-experiment",
+        "experiment 'morning-ramp' was submitted or changed by anna: somebody else must approve it",
+        "ask another operator, or an owner of the robot",
+    ),
+    _met(
+        "put .*/approval",
+        409,
+        "content-changed",
+        "experiment 'morning-ramp' is not what you have looked at: it, or the machine file, has changed",
+        "look at it again, then approve what it is now",
+    ),
+    _met(
+        "put .*/approval",
+        409,
+        "no-review",
+        "experiments of ma2000 need no approval",
+        "they begin without; the key `review` of the robot's configuration",
+    ),
     _met(".*", 404, "not-found", "there is no robot 'other'", "this service has ma2000"),
     _met(".*", 409, "not-safe", "not while the arm is busy (experiment)", "remove the cause, then try again"),
     _met(

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Response
 
 from daq.contracts.service.base import Page
-from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
+from daq.contracts.service.experiments import ApprovalRequest, Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
 from server.access.caller import Caller
 from server.api.dependencies import (
@@ -46,7 +46,7 @@ async def get_queue(rig: RobotDep, _: Viewer) -> QueueStatus:
 @router.get("/queue/experiments", tags=["queue"])
 def list_queue(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[Experiment, ...]:
     """Lists the waiting experiments in the order in which they will run."""
-    return tuple(services.experiments.in_order(rig.robot.name))
+    return tuple(map(rig.queue.with_progress, services.experiments.in_order(rig.robot.name)))
 
 
 @router.post("/queue/pause", tags=["queue"])
@@ -80,7 +80,7 @@ def create_schedule(
     made = services.schedules.create(rig.robot.name, request, services.clock.utc(), caller.name)
     services.record_event(rig.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=caller.name)
     rig.queue.wake()
-    return made
+    return rig.queue.with_review(made)
 
 
 @router.get("/schedules", tags=["queue"])
@@ -88,13 +88,14 @@ def list_schedules(
     rig: RobotDep, services: ServicesDep, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
 ) -> Page[Schedule]:
     """Lists schedules, the newest first."""
-    return services.schedules.page(rig.robot.name, cursor, limit)
+    page = services.schedules.page(rig.robot.name, cursor, limit)
+    return page.model_copy(update={"items": tuple(map(rig.queue.with_review, page.items))})
 
 
 @router.get("/schedules/{schedule}", tags=["queue"])
 def get_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, _: Viewer) -> Schedule:
     """Returns one schedule."""
-    return services.schedules.get(rig.robot.name, schedule)
+    return rig.queue.with_review(services.schedules.get(rig.robot.name, schedule))
 
 
 @router.patch("/schedules/{schedule}", tags=["queue"])
@@ -107,7 +108,29 @@ def change_schedule(
     state = "on" if change.active else "off"
     services.record_event(rig.robot.name, "schedule", f"schedule {schedule} switched {state}", actor=caller.name)
     rig.queue.wake()
-    return changed
+    return rig.queue.with_review(changed)
+
+
+@router.put("/schedules/{schedule}/approval", tags=["queue"])
+def approve_schedule(
+    schedule: Identity, request: ApprovalRequest, rig: RobotDep, services: ServicesDep, caller: Operator
+) -> Schedule:
+    """Approves exactly this content of a schedule: its later runs may move a real arm. Its maker cannot."""
+    given = rig.approval(caller, request.content)
+    approved = services.schedules.approve(rig.robot.name, schedule, rig.queue.review, given, services.clock.utc())
+    services.record_event(rig.robot.name, "review", f"schedule {schedule} approved", actor=caller.name)
+    rig.queue.wake()
+    return rig.queue.with_review(approved)
+
+
+@router.delete("/schedules/{schedule}/approval", tags=["queue"])
+def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Schedule:
+    """Ends the approval of a schedule. Runs that wait keep theirs. Every operator may."""
+    found, ended = services.schedules.withdraw_approval(rig.robot.name, schedule)
+    if ended is not None:
+        line = f"schedule {schedule}: approval of {ended} withdrawn"
+        services.record_event(rig.robot.name, "review", line, actor=caller.name)
+    return rig.queue.with_review(found)
 
 
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)

@@ -65,7 +65,7 @@ class DueRuns:
             f"schedule {identity}",
             schedule=identity,
             owner=schedule.created_by,
-            also=lambda session: context.schedules.count_run(session, name, identity, now),
+            also=lambda session, run: context.schedules.submit_run(session, name, identity, now, run),
         )
         self._left_out.discard(identity)
         context.record_event("experiment", f"queued by schedule {identity}", experiment=made.id)

@@ -67,7 +67,16 @@ class Submitted:
     reason: Mapped[str] = mapped_column(Text, default="")
 
 
-class ExperimentRow(Submitted, Table):
+class Approvable:
+    """The columns of a review. `approved_content`: digest of what was approved; all are None without an approval."""
+
+    approved_content: Mapped[str | None] = mapped_column(String(64))
+    approved_by: Mapped[str | None]
+    approved_as_owner: Mapped[bool | None]
+    approved: Mapped[datetime | None]
+
+
+class ExperimentRow(Submitted, Approvable, Table):
     """One experiment."""
 
     __tablename__ = "experiments"
@@ -85,9 +94,11 @@ class ExperimentRow(Submitted, Table):
     """The number of its trace, chosen before it runs, so that the trace is found after a crash."""
     owner: Mapped[str] = mapped_column(default="", server_default="")
     """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule."""
+    changed_by: Mapped[str | None]
+    """Who wrote its present specification, if it was changed after it was submitted."""
 
 
-class ScheduleRow(Table):
+class ScheduleRow(Approvable, Table):
     """An experiment that is submitted at regular intervals."""
 
     __tablename__ = "schedules"

@@ -16,7 +16,7 @@ ROLES: tuple[Role, ...] = ("viewer", "operator", "owner", "admin")
 
 
 def role_of(text: str) -> Role:
-    """Returns the role of this name. One that this version does not know, which a newer one has written, is a viewer."""
+    """Returns the role of this name. One that this version does not know, but a newer one may, is a viewer."""
     return next((role for role in ROLES if role == text), "viewer")
 
 

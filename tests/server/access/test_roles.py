@@ -111,7 +111,8 @@ def test_a_database_of_before_keeps_roles_and_its_experiments_get_their_owners(t
                 "created_by) VALUES ('s', 'ma2000', '{}', 60, '2026-01-01', 0, 0, 1, '2026-01-01', 'bert')"
             )
         )
-        begun = "INSERT INTO experiments (id, robot, state, submitted, submitted_by, reason, spec, priority, trace, schedule)"
+        columns = "id, robot, state, submitted, submitted_by, reason, spec, priority, trace, schedule"
+        begun = f"INSERT INTO experiments ({columns})"
         connection.execute(
             text(
                 f"{begun} VALUES ('a', 'ma2000', 'queued', '2026-01-01', 'anna', '', '{{}}', 0, 'a', NULL), "

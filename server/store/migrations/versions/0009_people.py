@@ -1,4 +1,4 @@
-"""Every experiment has an owner: who submitted it, or who made the schedule that did. Roles of tokens stay as they are."""
+"""Experiments have owners (who submitted them, or made their schedule) and approvals. Roles of tokens stay."""
 
 from __future__ import annotations
 
@@ -12,14 +12,27 @@ depends_on = None
 
 OF_SCHEDULES = "SELECT created_by FROM schedules WHERE schedules.id = experiments.schedule"
 
+REVIEWED = ("experiments", "schedules")
+
 
 def upgrade() -> None:
     """Upgrades the tables to this version."""
     op.add_column("experiments", sa.Column("owner", sa.String(length=200), nullable=False, server_default=""))
     op.execute(f"UPDATE experiments SET owner = COALESCE(({OF_SCHEDULES}), submitted_by)")
+    op.add_column("experiments", sa.Column("changed_by", sa.String(length=200), nullable=True))
+    for table in REVIEWED:
+        op.add_column(table, sa.Column("approved_content", sa.String(length=64), nullable=True))
+        op.add_column(table, sa.Column("approved_by", sa.String(length=200), nullable=True))
+        op.add_column(table, sa.Column("approved_as_owner", sa.Boolean(), nullable=True))
+        op.add_column(table, sa.Column("approved", sa.DateTime(), nullable=True))
 
 
 def downgrade() -> None:
     """Undoes the upgrade."""
+    for table in REVIEWED:
+        with op.batch_alter_table(table, schema=None) as batch_op:
+            for column in ("approved", "approved_as_owner", "approved_by", "approved_content"):
+                batch_op.drop_column(column)
     with op.batch_alter_table("experiments", schema=None) as batch_op:
+        batch_op.drop_column("changed_by")
         batch_op.drop_column("owner")

@@ -633,9 +633,37 @@ export interface paths {
         head?: never;
         /**
          * Change Experiment
-         * @description Changes the priority of an experiment that still waits: one's own, or, for owners of the robot, anybody's.
+         * @description Changes an experiment that still waits: one's own, or, for owners of the robot, anybody's.
+         *
+         *     A new specification is checked like that of a new experiment, and ends its approval.
          */
         patch: operations["change_experiment"];
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/experiments/{experiment}/approval": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Approve Experiment
+         * @description Approves exactly this content of a waiting experiment, so that it may move a real arm.
+         *
+         *     Whoever submitted or changed it cannot. It begins as soon as the queue lets it; a change ends the approval.
+         */
+        put: operations["approve_experiment"];
+        post?: never;
+        /**
+         * Withdraw Experiment Approval
+         * @description Ends the approval of an experiment that still waits. Every operator may.
+         */
+        delete: operations["withdraw_experiment_approval"];
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/v1/robots/{robot}/experiments/{experiment}/cancel": {
@@ -850,6 +878,30 @@ export interface paths {
          * @description Switches a schedule on or off: one's own, or, for owners of the robot, anybody's.
          */
         patch: operations["change_schedule"];
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/schedules/{schedule}/approval": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Approve Schedule
+         * @description Approves exactly this content of a schedule: its later runs may move a real arm. Its maker cannot.
+         */
+        put: operations["approve_schedule"];
+        post?: never;
+        /**
+         * Withdraw Schedule Approval
+         * @description Ends the approval of a schedule. Runs that wait keep theirs. Every operator may.
+         */
+        delete: operations["withdraw_schedule_approval"];
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/v1/robots/{robot}/control": {
@@ -1527,6 +1579,29 @@ export interface components {
             duration: number;
             /** Reason */
             reason: string;
+        };
+        /**
+         * Approval
+         * @description Who has approved an experiment or a schedule, and when. `as_owner`: whether they owned the robot.
+         */
+        Approval: {
+            /** By */
+            by: string;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** As Owner */
+            as_owner: boolean;
+        };
+        /**
+         * ApprovalRequest
+         * @description Approves exactly the `content` that the caller has looked at: that of the experiment or schedule.
+         */
+        ApprovalRequest: {
+            /** Content */
+            content: string;
         };
         /**
          * ArchiveOrder
@@ -2436,6 +2511,14 @@ export interface components {
              * @default
              */
             owner?: string;
+            /**
+             * Content
+             * @default
+             */
+            content?: string;
+            approval?: components["schemas"]["Approval"] | null;
+            /** Needs Approval Of */
+            needs_approval_of?: ("operator" | "owner") | null;
             /** Started */
             started?: string | null;
             /** Ended */
@@ -2459,11 +2542,12 @@ export interface components {
         };
         /**
          * ExperimentChange
-         * @description A new priority for a waiting experiment.
+         * @description Changes of a waiting experiment; what is None stays. A new specification ends its approval.
          */
         ExperimentChange: {
             /** Priority */
-            priority: number;
+            priority?: number | null;
+            spec?: components["schemas"]["ExperimentSpec"] | null;
         };
         /**
          * ExperimentPreset
@@ -5276,6 +5360,14 @@ export interface components {
             created: string;
             /** Created By */
             created_by: string;
+            /**
+             * Content
+             * @default
+             */
+            content?: string;
+            approval?: components["schemas"]["Approval"] | null;
+            /** Needs Approval Of */
+            needs_approval_of?: ("operator" | "owner") | null;
         };
         /**
          * ScheduleChange
@@ -7272,6 +7364,58 @@ export interface operations {
             };
         };
     };
+    approve_experiment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ApprovalRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+        };
+    };
+    withdraw_experiment_approval: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+        };
+    };
     cancel_experiment: {
         parameters: {
             query?: never;
@@ -7580,6 +7724,58 @@ export interface operations {
                 "application/json": components["schemas"]["ScheduleChange"];
             };
         };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Schedule"];
+                };
+            };
+        };
+    };
+    approve_schedule: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                schedule: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ApprovalRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Schedule"];
+                };
+            };
+        };
+    };
+    withdraw_schedule_approval: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                schedule: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {

@@ -102,6 +102,42 @@ export class QueueLists {
     );
   }
 
+  /** Approves exactly what is shown: the service refuses it if it has changed meanwhile. */
+  async approve(one: Experiment | Schedule, isSchedule: boolean): Promise<void> {
+    const body = { content: one.content };
+    await this.change(() =>
+      isSchedule
+        ? ask(
+            api.PUT('/api/v1/robots/{robot}/schedules/{schedule}/approval', {
+              params: { path: { ...here(), schedule: one.id } },
+              body,
+            }),
+          )
+        : ask(
+            api.PUT('/api/v1/robots/{robot}/experiments/{experiment}/approval', {
+              params: { path: { ...here(), experiment: one.id } },
+              body,
+            }),
+          ),
+    );
+  }
+
+  async withdrawApproval(one: Experiment | Schedule, isSchedule: boolean): Promise<void> {
+    await this.change(() =>
+      isSchedule
+        ? ask(
+            api.DELETE('/api/v1/robots/{robot}/schedules/{schedule}/approval', {
+              params: { path: { ...here(), schedule: one.id } },
+            }),
+          )
+        : ask(
+            api.DELETE('/api/v1/robots/{robot}/experiments/{experiment}/approval', {
+              params: { path: { ...here(), experiment: one.id } },
+            }),
+          ),
+    );
+  }
+
   async pause(): Promise<void> {
     await this.change(() =>
       ask(api.POST('/api/v1/robots/{robot}/queue/pause', { params: { path: here() } })),
