@@ -10,13 +10,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from daq.config.oidc import OidcSettings
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import Settings
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
+from daq.contracts.extras import require_extra
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
@@ -25,6 +28,8 @@ from daq.executors.address import parse_service_address
 from daq.trajectories import control_period
 from server.access.caller import Caller
 from server.access.lanes import Lanes
+from server.access.sessions import SessionStore
+from server.access.sign_in import SignIns
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.archive.bucket import Bucket, open_bucket
@@ -63,6 +68,9 @@ from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
+
+if TYPE_CHECKING:
+    from server.access.openid import Provider
 
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
@@ -159,6 +167,12 @@ class Services:
         """Separate from uploads, so that they delay no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
+        self.sessions = SessionStore(self.store)
+        self.provider = _provider(settings.server.oidc)
+        self.sign_ins = SignIns(self.clock)
+        self.signed_in: Callable[[Caller], None] = lambda _caller: None
+        """Called when a session has begun, and when one was left, with its caller."""
+        self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.comparisons = Comparisons(self.jobs)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
@@ -386,6 +400,16 @@ def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
         thread.start()
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
+
+
+def _provider(settings: OidcSettings) -> Provider | None:
+    """Returns the provider of OpenID Connect. Raises SpecError, and MissingExtraError without Authlib."""
+    if settings.issuer is None:
+        return None
+    require_extra("oidc", "server.oidc", "authlib")
+    from server.access.openid import open_provider
+
+    return open_provider(settings)
 
 
 def _place(settings: Settings) -> RobotPlace:

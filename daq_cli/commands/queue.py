@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from daq.contracts.service.queue import QueueStatus
 
 app = typer.Typer(
-    add_completion=False, help="Show, pause and resume the queue of a server's robot; approve experiments.", no_args_is_help=True
+    add_completion=False,
+    help="Show, pause and resume the queue of a server's robot; approve experiments.",
+    no_args_is_help=True,
 )
 
 

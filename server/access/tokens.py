@@ -20,6 +20,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role, role_of
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
+from server.access.sessions import SessionStore
 from server.clock import Clock
 from server.database_errors import DamagedError
 from server.store.engine import Store
@@ -48,10 +49,11 @@ class TokenInfo:
 
 
 class TokenStore:
-    """Tokens in the database."""
+    """Tokens in the database; `callers` has the sessions of people, too."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self._sessions = SessionStore(store)
 
     def add(self, name: str, role: Role, now: datetime) -> str:
         """Makes a new token and returns it; it cannot be shown again. Raises SpecError if the name is taken."""
@@ -79,12 +81,17 @@ class TokenStore:
             rows = session.scalars(select(TokenRow).order_by(TokenRow.created))
             return [TokenInfo(row.name, role_of(row.role), row.created, row.revoked) for row in rows]
 
-    def callers(self) -> dict[str, Caller]:
-        """Returns the caller of each token that is not revoked, by the token's digest. It reads no other columns, so
-        that a damaged time keeps nobody out."""
+    def callers(self, now: datetime) -> dict[str, Caller]:
+        """Returns the caller of each token that is not revoked, by the token's digest, and of each session that may at
+        least stop the robot. Of tokens it reads no other columns, so that a damaged time keeps nobody out."""
         with self._store.reading() as session:
             rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
-            return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
+            tokens = {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
+        try:
+            return tokens | self._sessions.callers(now)
+        except CANNOT_BE_READ:  # damaged sessions take nobody's token
+            log.exception("sessions cannot be read")
+            return tokens
 
 
 @dataclass(frozen=True)
@@ -111,7 +118,27 @@ class KnownTokens:
 
     def was_known(self, token: str) -> bool:
         """Whether the token was valid when the database was last read, however long ago."""
-        return digest_of(token) in self._known.callers
+        return self.last_known(token) is not None
+
+    def last_known(self, token: str) -> Caller | None:
+        """Returns a token's caller as the database had it when it was last read, however long ago."""
+        return self._known.callers.get(digest_of(token))
+
+    def is_over(self, caller: Caller) -> bool:
+        """Whether the caller's session has ended. It may still stop the robot for a while."""
+        return caller.expires is not None and caller.expires <= self._clock.utc()
+
+    def add(self, caller: Caller) -> None:
+        """Notes a session that has just begun, and is in the database already."""
+        if caller.token is not None:
+            with self._reading:
+                self._known = _Known({**self._known.callers, caller.token: caller}, self._known.at)
+
+    def forget(self, caller: Caller) -> None:
+        """Forgets a session that was left, at once."""
+        with self._reading:
+            left = {digest: one for digest, one in self._known.callers.items() if digest != caller.token}
+            self._known = _Known(left, self._known.at)
 
     def look_up(self, token: str) -> Caller | None:
         """Returns a token's caller from the database. If that cannot be read, the tokens read last stay valid: nobody
@@ -123,6 +150,8 @@ class KnownTokens:
         """Whether the token with which a caller was admitted is still valid. Call this on the event loop."""
         if caller.token is None:
             return True
+        if self.is_over(caller):
+            return False
         known, found = self._remembered(caller.token)
         if not known:
             try:
@@ -143,7 +172,7 @@ class KnownTokens:
             if known:
                 return caller
             try:
-                self._known = _Known(self._tokens.callers(), self._clock.monotonic())
+                self._known = _Known(self._tokens.callers(self._clock.utc()), self._clock.monotonic())
             except CANNOT_BE_READ as error:
                 if self._known.at == -math.inf:
                     raise

@@ -74,7 +74,7 @@ from daq.contracts.service.robot import (
     Sample,
     StopResult,
 )
-from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
+from daq.contracts.service.system import Health, LoginWays, Me, OpenIdWay, SignedOut, StorageStatus, SystemStatus
 from daq.contracts.service.teaching import (
     CalibrationRequest,
     JogRequest,
@@ -488,7 +488,9 @@ def _system() -> list[BaseModel]:
     )
     return [
         Health(status="ok", version="0.1.0", checks={"database": "", "traces": "", f"robot {ROBOT}": ""}),
-        Me(name="anna", role="owner", owner_of=(ROBOT,)),
+        Me(name="anna", role="owner", owner_of=(ROBOT,), session_until=NOON),
+        LoginWays(openid=OpenIdWay(label="the laboratory's accounts", start="/api/v1/login/start")),
+        SignedOut(provider="https://accounts.example/end_session"),
         SystemStatus(
             version="0.1.0",
             uptime=86400.0,

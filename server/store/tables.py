@@ -263,6 +263,30 @@ class EventRow(Table):
     experiment: Mapped[str | None] = mapped_column(String(12))
 
 
+class SessionRow(Table):
+    """A session of a person who has signed in: the hash of its secret, their name and role, and when it ends."""
+
+    __tablename__ = "sessions"
+
+    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), index=True)
+    role: Mapped[str] = mapped_column(String(16))
+    created: Mapped[datetime]
+    expires: Mapped[datetime] = mapped_column(index=True)
+
+
+class PersonRow(Table):
+    """Somebody who has signed in, by the name of their first session. `subject`: the provider's number for them."""
+
+    __tablename__ = "people"
+    __table_args__ = (UniqueConstraint("issuer", "subject"),)
+
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    issuer: Mapped[str] = mapped_column(String(500))
+    subject: Mapped[str] = mapped_column(String(255))
+    since: Mapped[datetime]
+
+
 class TokenRow(Table):
     """A token's hash; the token itself is shown only once, when it is made."""
 

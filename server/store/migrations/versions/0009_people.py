@@ -1,4 +1,5 @@
-"""Experiments have owners (who submitted them, or made their schedule) and approvals. Roles of tokens stay."""
+"""Experiments have owners (who submitted them, or made their schedule) and approvals; people have sessions. Roles of
+tokens stay."""
 
 from __future__ import annotations
 
@@ -25,10 +26,32 @@ def upgrade() -> None:
         op.add_column(table, sa.Column("approved_by", sa.String(length=200), nullable=True))
         op.add_column(table, sa.Column("approved_as_owner", sa.Boolean(), nullable=True))
         op.add_column(table, sa.Column("approved", sa.DateTime(), nullable=True))
+    op.create_table(
+        "sessions",
+        sa.Column("digest", sa.String(length=64), nullable=False),
+        sa.Column("name", sa.String(length=64), nullable=False),
+        sa.Column("role", sa.String(length=16), nullable=False),
+        sa.Column("created", sa.DateTime(), nullable=False),
+        sa.Column("expires", sa.DateTime(), nullable=False),
+        sa.PrimaryKeyConstraint("digest"),
+    )
+    op.create_index(op.f("ix_sessions_name"), "sessions", ["name"])
+    op.create_index(op.f("ix_sessions_expires"), "sessions", ["expires"])
+    op.create_table(
+        "people",
+        sa.Column("name", sa.String(length=64), nullable=False),
+        sa.Column("issuer", sa.String(length=500), nullable=False),
+        sa.Column("subject", sa.String(length=255), nullable=False),
+        sa.Column("since", sa.DateTime(), nullable=False),
+        sa.PrimaryKeyConstraint("name"),
+        sa.UniqueConstraint("issuer", "subject"),
+    )
 
 
 def downgrade() -> None:
     """Undoes the upgrade."""
+    op.drop_table("people")
+    op.drop_table("sessions")
     for table in REVIEWED:
         with op.batch_alter_table(table, schema=None) as batch_op:
             for column in ("approved", "approved_as_owner", "approved_by", "approved_content"):

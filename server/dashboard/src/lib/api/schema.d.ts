@@ -1436,6 +1436,88 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/login": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Login Ways
+         * @description Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token.
+         */
+        get: operations["get_login_ways"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/login/start": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Start Login
+         * @description Sends the browser to the provider of OpenID Connect.
+         */
+        get: operations["start_login"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/login/callback": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Finish Login
+         * @description Takes the provider's answer, begins a session, and sends the browser to the page.
+         *
+         *     A refused answer leads to the page's sign-in, with the problem's kind in the address.
+         */
+        get: operations["finish_login"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/logout": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Log Out
+         * @description Ends the caller's session; a token stays. Returns where the provider's own session is left.
+         */
+        post: operations["log_out"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/me": {
         parameters: {
             query?: never;
@@ -3792,6 +3874,13 @@ export interface components {
             messages: (components["schemas"]["SampleMessage"] | components["schemas"]["HistoryMessage"] | components["schemas"]["RecordEventMessage"] | components["schemas"]["RobotMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["QueueMessage"] | components["schemas"]["ProgressMessage"] | components["schemas"]["JobMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TeachingMessage"] | components["schemas"]["ThinnedMessage"] | components["schemas"]["RefusedMessage"])[];
         };
         /**
+         * LoginWays
+         * @description How people sign in besides by a token. `openid` is None where no provider is configured.
+         */
+        LoginWays: {
+            openid?: components["schemas"]["OpenIdWay"] | null;
+        };
+        /**
          * Machine
          * @description A machine file. `modelled_joints` are the joints (from 1) whose motion the model describes; the others are held
          *     and their mass is part of `load`, a point mass at the end of the last modelled link.
@@ -3850,6 +3939,8 @@ export interface components {
              * @default []
              */
             owner_of?: string[];
+            /** Session Until */
+            session_until?: string | null;
         };
         /**
          * MeasuredGain
@@ -4257,6 +4348,16 @@ export interface components {
             high: number;
             /** Changed */
             changed: boolean;
+        };
+        /**
+         * OpenIdWay
+         * @description A provider of OpenID Connect. `start`: the address at this service that a browser opens to sign in.
+         */
+        OpenIdWay: {
+            /** Label */
+            label: string;
+            /** Start */
+            start: string;
         };
         /**
          * OutputRequest
@@ -5513,6 +5614,14 @@ export interface components {
             after: number;
             /** Floor */
             floor: number;
+        };
+        /**
+         * SignedOut
+         * @description The session has ended. `provider`: where the provider's own session is left, if it has such an address.
+         */
+        SignedOut: {
+            /** Provider */
+            provider?: string | null;
         };
         /**
          * SimulateStudy
@@ -8708,6 +8817,69 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Ticket"];
+                };
+            };
+        };
+    };
+    get_login_ways: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LoginWays"];
+                };
+            };
+        };
+    };
+    start_login: {
+        parameters: {
+            query?: {
+                /** @description What to show afterwards. */
+                robot?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: never;
+    };
+    finish_login: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: never;
+    };
+    log_out: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignedOut"];
                 };
             };
         };

@@ -205,7 +205,10 @@ class Live {
       ticket: () => {
         const ticket = given ?? newTicket();
         given = null;
-        return ticket;
+        return ticket.then(
+          (known) => this.admitted(known),
+          (error: unknown) => this.notAdmitted(error),
+        );
       },
       open: (ticket) => new WebSocket(`${location.origin.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
       wanted: () => ({
@@ -224,6 +227,18 @@ class Live {
         return () => clearTimeout(timer);
       },
     });
+  }
+
+  private admitted(ticket: string): string {
+    if (this.problem?.status === 401) this.problem = null;
+    return ticket;
+  }
+
+  /** A session that has ended, or a token that was revoked, leads to the sign-in. */
+  private notAdmitted(error: unknown): never {
+    const problem = asProblem(error);
+    if (problem.status === 401) this.problem = problem;
+    throw problem;
   }
 
   /** s of the past that this page does not have. */
