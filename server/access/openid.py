@@ -191,9 +191,11 @@ def open_provider(settings: OidcSettings) -> Provider | None:
         try:
             secret = settings.client_secret.read_text("utf-8").strip()
         except (OSError, UnicodeDecodeError) as error:
-            raise SpecError(f"server.oidc.client_secret {settings.client_secret}: cannot be read: {error}") from error
+            # Without the value: whoever writes the secret itself there shall not find it in a log.
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise SpecError(f"server.oidc.client_secret: names a file that cannot be read: {why}") from None
         if not secret:
-            raise SpecError(f"server.oidc.client_secret {settings.client_secret}: is empty")
+            raise SpecError("server.oidc.client_secret: names a file that is empty")
     return Provider(settings, secret)
 
 

@@ -57,7 +57,7 @@ def _free_port() -> int:
 
 
 @contextmanager
-def _service(folder: Path, issuer: str, **more: object) -> Iterator[Service]:
+def service_of_people(folder: Path, issuer: str, **more: object) -> Iterator[Service]:
     port = _free_port()
     _configure(folder, issuer, port, **more)
     with running_service(folder, "mock://?pty=1&lock_step=1", "--port", str(port)) as service:
@@ -67,7 +67,7 @@ def _service(folder: Path, issuer: str, **more: object) -> Iterator[Service]:
 @pytest.fixture(scope="module")
 def service(provider: Provider, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service whose people sign in at that provider."""
-    with _service(tmp_path_factory.mktemp("service"), provider.url) as found:
+    with service_of_people(tmp_path_factory.mktemp("service"), provider.url) as found:
         yield found
 
 
@@ -296,11 +296,11 @@ def test_both_doors_stop_for_a_session_of_every_role(provider: Provider, service
 def test_a_session_outlasts_the_provider_and_a_restart_and_ends_in_time(tmp_path: Path) -> None:
     with running_provider() as provider:
         provider.person("anna-1", **OPERATORS)
-        with _service(tmp_path, provider.url) as service, _browser(service) as browser:
+        with service_of_people(tmp_path, provider.url) as service, _browser(service) as browser:
             browser.sign_in(provider)
             cookie = browser.client.cookies["daq-session"]
         provider.end()
-    with _service(tmp_path, provider.url) as service, _browser(service) as browser:
+    with service_of_people(tmp_path, provider.url) as service, _browser(service) as browser:
         assert browser.begin() == "/?sign-in=provider-away"
         browser.client.cookies.set("daq-session", cookie)
         assert browser.me().json()["name"] == "anna"
@@ -325,7 +325,7 @@ def test_a_session_outlasts_the_provider_and_a_restart_and_ends_in_time(tmp_path
 
 
 def test_a_provider_may_change_its_keys(tmp_path: Path) -> None:
-    with running_provider() as provider, _service(tmp_path, provider.url) as service:
+    with running_provider() as provider, service_of_people(tmp_path, provider.url) as service:
         provider.person("anna-1", **OPERATORS)
         with _browser(service) as browser:
             assert browser.sign_in(provider) == "/"
@@ -339,12 +339,16 @@ def test_a_provider_may_change_its_keys(tmp_path: Path) -> None:
 def test_a_provider_that_calls_itself_otherwise_is_not_used(provider: Provider, tmp_path: Path) -> None:
     named = provider.url.replace("127.0.0.1", "localhost")
     other = f"{named}/"
-    with _service(tmp_path, other) as service, _browser(service) as browser:
+    with service_of_people(tmp_path, other) as service, _browser(service) as browser:
         assert browser.begin() == "/?sign-in=provider-away"
 
 
 def test_a_stop_waits_neither_for_the_database_nor_for_the_provider(tmp_path: Path) -> None:
-    with running_provider() as provider, _service(tmp_path, provider.url) as service, _browser(service) as browser:
+    with (
+        running_provider() as provider,
+        service_of_people(tmp_path, provider.url) as service,
+        _browser(service) as browser,
+    ):
         provider.person("anna-1", **OPERATORS)
         browser.sign_in(provider)
         assert browser.ask("POST", "/robots/ma2000/connect").status_code == 200

@@ -156,7 +156,7 @@ test_what_begins_was_approved = WhatBegins.TestCase
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
     """A service whose experiments another operator must approve. Its mock passes for a real arm."""
-    _seems_real(monkeypatch)
+    seems_real(monkeypatch)
     with service_inside(tmp_path, SystemClock(), monkeypatch, review="operator") as client:
         client.post("/connect")
         yield client
@@ -168,7 +168,7 @@ def people(robot: httpx.Client, tmp_path: Path) -> dict[str, Person]:
     return people_at(robot, tmp_path, {"anna": "operator", "bert": "operator", "olga": "owner", "vera": "viewer"})
 
 
-def _seems_real(monkeypatch: pytest.MonkeyPatch) -> None:
+def seems_real(monkeypatch: pytest.MonkeyPatch) -> None:
     def identity(robot: Robot) -> object:
         return robot._identity and robot._identity.model_copy(update={"simulated": False})
 
@@ -249,7 +249,7 @@ def test_a_change_ends_the_approval_and_whoever_changed_it_cannot_give_it(people
 def test_an_approval_survives_a_restart_unless_the_machine_is_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _seems_real(monkeypatch)
+    seems_real(monkeypatch)
     tokens = tokens_of(tmp_path, {"anna": "operator", "bert": "operator"})
     with service_inside(tmp_path, SystemClock(), monkeypatch, review="operator") as robot:
         anna, bert = Person(robot, tokens["anna"]), Person(robot, tokens["bert"])
@@ -299,7 +299,7 @@ def test_runs_of_a_schedule_have_its_approval(people: dict[str, Person]) -> None
 
 @pytest.mark.parametrize("name", ["bert", "olga"])
 def test_an_arm_may_need_an_owner_s_approval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    _seems_real(monkeypatch)
+    seems_real(monkeypatch)
     with service_inside(tmp_path, SystemClock(), monkeypatch, review="owner") as robot:
         people = people_at(robot, tmp_path, {"anna": "operator", "bert": "operator", "olga": "owner"})
         robot.post("/connect")
