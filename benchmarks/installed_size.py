@@ -32,6 +32,7 @@ OWN_USE = {
     "cluster": "import ma2000, distributed; ma2000.Trace",
     "postgresql": "import ma2000, psycopg; ma2000.Trace",
     "archive": "import ma2000, obstore; ma2000.Trace",
+    "oidc": "import ma2000, authlib.oidc.core; ma2000.Trace",
     "all": "import ma2000, server.serve; ma2000.run; ma2000.diagnose",
 }
 """What each extra is installed for; of a client: to read traces."""

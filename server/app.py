@@ -21,6 +21,7 @@ from server.api import (
     fleet,
     jobs,
     live,
+    login,
     presets,
     programs,
     queue,
@@ -90,6 +91,7 @@ def bare_app(services: Services | None) -> FastAPI:
         archive,
         jobs,
         live,
+        login,
         system,
     ):
         api.include_router(part.router)

@@ -13,6 +13,7 @@ import uvicorn
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
 from daq.contracts.errors import SpecError
+from server.access.caller import Caller
 from server.access.connections import Connection
 from server.access.gate import Gate
 from server.access.origin import is_loopback
@@ -49,7 +50,8 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         except SpecError:
             services.close()
             raise
-        door.set_tokens(services.tokens.callers())
+        door.set_tokens(services.tokens.callers(services.clock.utc()))
+        _tell_sessions(services, gate, door)
         app = make_app(services, gate)
         config = uvicorn.Config(
             app,
@@ -85,7 +87,7 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     """Makes the gate. Raises SpecError if tokens are needed and there is none."""
     loopback = is_loopback(section.host)
     local = _is_open_here(section)
-    if not local and all(token.revoked is not None for token in services.tokens.all()):
+    if not local and section.oidc.issuer is None and all(token.revoked is not None for token in services.tokens.all()):
         why, instead = 'server.tokens is "always"', 'say "remote"'
         if not loopback:
             why = f"server.host {section.host}: people at other computers could reach the robot"
@@ -129,6 +131,16 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     door.stopped = stopped
     for rig in services.robots():
         rig.robot.reached.append(lambda reach: door.set_owner(reach.robot, reach.owner, reach.terminal))
+
+
+def _tell_sessions(services: Services, gate: Gate, door: StopDoor) -> None:
+    """Lets the gate and the stop listener know of sessions at once; they read the others from the database."""
+
+    def signed_in(caller: Caller) -> None:
+        gate.tokens.add(caller)
+        door.add(caller)
+
+    services.signed_in, services.signed_out = signed_in, gate.tokens.forget
 
 
 class _Server(uvicorn.Server):

@@ -10,20 +10,26 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from daq.config.oidc import OidcSettings
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import Settings
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
+from daq.contracts.extras import require_extra
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
 from daq.trajectories import control_period
+from server.access.caller import Caller
 from server.access.lanes import Lanes
+from server.access.sessions import SessionStore
+from server.access.sign_in import SignIns
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.archive.bucket import Bucket, open_bucket
@@ -33,6 +39,7 @@ from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.catalogue.room import of_robots, storage_warnings
 from server.clock import Clock, SystemClock
+from server.experiments.review import Given
 from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
@@ -62,6 +69,9 @@ from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
 
+if TYPE_CHECKING:
+    from server.access.openid import Provider
+
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
 robot's port finishes alone if it needs longer."""
@@ -84,6 +94,8 @@ class RobotServices:
     models: Models
     unattended: bool
     archive: ArchiveService | None
+    owners: tuple[str, ...] = ()
+    """Names of this robot's owners; empty: every owner."""
 
     def status(self) -> RobotStatus:
         """The status of the robot now."""
@@ -98,6 +110,25 @@ class RobotServices:
         if lacks_consent(self.robot.identity, given):
             line = f"{self.robot.place.url} is a real arm: it moves only with the operator's consent"
             raise conflict("consent-needed", line, advice)
+
+    def require_own(self, caller: Caller, owner: str, what: str) -> None:
+        """Raises a 403 unless the caller owns `what`, or is an owner of this robot."""
+        if caller.name != owner and not caller.owns(self.owners):
+            line = f"{what} is {owner}'s: an operator changes and cancels only their own"
+            advice = f"ask {owner}, or an owner of the robot; everybody who may see the robot may stop it"
+            raise ProblemError(403, "owner-needed", line, advice)
+
+    def approval(self, caller: Caller, content: str) -> Given:
+        """Returns the caller's approval of some content. Raises a 403 where only owners of the robot may approve, and a
+        409 where nobody needs to."""
+        reviewer, is_owner = self.queue.review.reviewer, caller.owns(self.owners)
+        if reviewer is None:
+            line = f"experiments of {self.robot.name} need no approval"
+            raise conflict("no-review", line, "they begin without; the key `review` of the robot's configuration")
+        if reviewer == "owner" and not is_owner:
+            line = f"an owner of {self.robot.name} must approve its experiments, and {caller.name} is none"
+            raise ProblemError(403, "owner-needed", line, "ask an owner of the robot")
+        return Given(content, caller.name, is_owner)
 
     def word(self, lease: str | None, said: float) -> Word:
         """Returns the request of a client with this lease to move the arm by hand."""
@@ -136,6 +167,12 @@ class Services:
         """Separate from uploads, so that they delay no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
+        self.sessions = SessionStore(self.store)
+        self.provider = _provider(settings.server.oidc)
+        self.sign_ins = SignIns(self.clock)
+        self.signed_in: Callable[[Caller], None] = lambda _caller: None
+        """Called when a session has begun, and when one was left, with its caller."""
+        self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.comparisons = Comparisons(self.jobs)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
@@ -199,7 +236,7 @@ class Services:
         )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
-        queue = self._make_queue(robot, control, catalogue, unattended=settings.server.unattended)
+        queue = self._make_queue(robot, control, catalogue, settings)
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
         teaching = TeachingService(robot, lambda line: self.record_event_later(name, "teaching", line))
@@ -241,6 +278,7 @@ class Services:
             models=models,
             archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
             unattended=settings.server.unattended,
+            owners=settings.robot.owners,
         )
 
     def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:
@@ -276,7 +314,7 @@ class Services:
         return storage_warnings(folders, self.settings.traces.warn_at)
 
     def _make_queue(
-        self, robot: Robot, control: ControlService, catalogue: Catalogue, *, unattended: bool
+        self, robot: Robot, control: ControlService, catalogue: Catalogue, settings: Settings
     ) -> QueueService:
         """Returns the queue of a robot, which hears the robot's reports."""
 
@@ -298,7 +336,8 @@ class Services:
                 record_event=record_event,
                 add_trace=add_trace,
                 add_unfinished_traces=lambda: self._take_in(catalogue),
-                unattended=unattended,
+                unattended=settings.server.unattended,
+                reviewer=None if settings.robot.review == "off" else settings.robot.review,
             )
         )
         robot.listeners.append(queue.on_report)
@@ -361,6 +400,16 @@ def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
         thread.start()
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
+
+
+def _provider(settings: OidcSettings) -> Provider | None:
+    """Returns the provider of OpenID Connect. Raises SpecError, and MissingExtraError without Authlib."""
+    if settings.issuer is None:
+        return None
+    require_extra("oidc", "server.oidc", "authlib")
+    from server.access.openid import open_provider
+
+    return open_provider(settings)
 
 
 def _place(settings: Settings) -> RobotPlace:

@@ -12,6 +12,7 @@ from daq.contracts.consent import require_word
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import (
     ENDS,
+    ApprovalRequest,
     Experiment,
     ExperimentChange,
     ExperimentRequest,
@@ -78,6 +79,20 @@ class Experiments:
         """Withdraws a waiting experiment; for a running one it stops the arm, which then needs a reset. `within`: s for
         the answer."""
         return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel", within=within))
+
+    def change(self, experiment: str, spec: ExperimentSpec) -> Experiment:
+        """Gives a waiting experiment another specification. Its approval ends."""
+        body = ExperimentChange(spec=spec)
+        return self._connection.ask(Experiment, Request("PATCH", f"{self._path}/{experiment}", body))
+
+    def approve(self, experiment: Experiment) -> Experiment:
+        """Approves a waiting experiment exactly as it is in this record, which is what the caller has looked at."""
+        body = ApprovalRequest(content=experiment.content)
+        return self._connection.ask(Experiment, Request("PUT", f"{self._path}/{experiment.id}/approval", body))
+
+    def withdraw_approval(self, experiment: str) -> Experiment:
+        """Ends the approval of a waiting experiment."""
+        return self._connection.ask(Experiment, Request("DELETE", f"{self._path}/{experiment}/approval"))
 
     def set_priority(self, experiment: str, priority: int) -> Experiment:
         """Sets the priority of a waiting experiment; higher goes first."""
@@ -148,6 +163,15 @@ class Schedules:
         return self._connection.ask(
             Schedule, Request("PATCH", f"{self._path}/{schedule}", ScheduleChange(active=active))
         )
+
+    def approve(self, schedule: Schedule) -> Schedule:
+        """Approves a schedule exactly as it is in this record; its later runs are approved, too."""
+        body = ApprovalRequest(content=schedule.content)
+        return self._connection.ask(Schedule, Request("PUT", f"{self._path}/{schedule.id}/approval", body))
+
+    def withdraw_approval(self, schedule: str) -> Schedule:
+        """Ends the approval of a schedule; runs that wait keep theirs."""
+        return self._connection.ask(Schedule, Request("DELETE", f"{self._path}/{schedule}/approval"))
 
     def delete(self, schedule: str) -> None:
         """Deletes a schedule; the experiments that it submitted stay."""

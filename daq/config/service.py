@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
+from daq.config.oidc import OidcSettings
 from daq.contracts.frozen import FrozenRecord
 
 DEFAULT_PORT = 8300
@@ -58,6 +59,7 @@ class ServiceSettings(FrozenRecord):
     """Time limit (s) of that process."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service, beside its address: others are refused."""
+    oidc: OidcSettings = OidcSettings()
 
     @field_validator("folder")
     @classmethod

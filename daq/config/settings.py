@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import platformdirs
 from pydantic import BaseModel, Field, ValidationError, field_validator
@@ -18,6 +18,7 @@ from pydantic_settings import (
 
 from daq.config.archive import ArchiveSettings
 from daq.config.limits import merged_limits
+from daq.config.oidc import OidcSettings
 from daq.config.service import ServiceSettings, TrueOrFalse
 from daq.contracts.documents import parse_toml, read_text, shown
 from daq.contracts.errors import SpecError
@@ -52,6 +53,11 @@ class RobotSettings(FrozenRecord):
     """File of the memory map; without one, that of the package, whose addresses are mostly assumed."""
     limits: Limits | None = None
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+    owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
+    """Names of those with the role owner who are responsible for this arm; none for all of them."""
+    review: Literal["off", "operator", "owner"] = "off"
+    """Whose approval each experiment needs before it moves this arm, a real one: nobody's, that of an operator who did
+    not submit it, or that of an owner of the arm who did not."""
 
 
 class FleetRobotSettings(FrozenRecord):
@@ -65,6 +71,11 @@ class FleetRobotSettings(FrozenRecord):
     """File of its memory map; without one, that of the package."""
     limits: Limits | None = None
     """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+    owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
+    """Names of those with the role owner who are responsible for this arm; none for all of them."""
+    review: Literal["off", "operator", "owner"] = "off"
+    """Whose approval each experiment needs before it moves this arm, a real one: nobody's, that of an operator who did
+    not submit it, or that of an owner of the arm who did not."""
     traces: Path | None = None
     """Folder of its traces; None for the folder of its name in that of `[traces]`."""
     unattended: TrueOrFalse = False
@@ -255,6 +266,8 @@ def _require_apart(settings: Settings, what: str) -> None:
 def _is_secret(where: tuple[int | str, ...]) -> bool:
     """Whether a wrong value may be a secret, or an address with one in it: who writes a key of the archive into the
     wrong place shall not find it in a log."""
+    if where[:2] == ("server", "oidc"):
+        return where[-1] not in OidcSettings.model_fields
     return where[:1] == ("archive",) and where[-1] not in ArchiveSettings.model_fields.keys() - {"endpoint"}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,10 +11,13 @@ from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
+    from daq.contracts.service.experiments import Experiment
     from daq.contracts.service.queue import QueueStatus
 
 app = typer.Typer(
-    add_completion=False, help="Show, pause and resume the queue of a server's robot.", no_args_is_help=True
+    add_completion=False,
+    help="Show, pause and resume the queue of a server's robot; approve experiments.",
+    no_args_is_help=True,
 )
 
 
@@ -29,7 +32,38 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
     _print_status(status)
     for one in waiting:
         when = "" if one.at is None else f", not before {one.at:%Y-%m-%d %H:%M:%S %Z}"
-        print(f"  {one.id}  {one.spec.name or one.spec.trajectory.kind}, by {one.submitted_by}{when}")
+        print(f"  {one.id}  {_name(one)}, by {one.owner or one.submitted_by}{when}{_review(one)}")
+
+
+@app.command()
+def approve(
+    context: typer.Context,
+    experiment: Annotated[str, typer.Argument(help="Number of a waiting experiment, as `queue show` prints it.")],
+    yes: Annotated[bool, typer.Option("--yes", help="Approve without being asked.")] = False,
+) -> None:
+    """Approve an experiment of somebody else, exactly as it is shown, so that it may move a real arm."""
+    from daq.contracts.errors import SpecError
+    from daq_cli.app.consent import can_be_asked
+
+    with robot_of(context).service("queue") as robot:
+        found = robot.experiments.get(experiment)
+        print(f"{_name(found)}, by {found.owner or found.submitted_by}:")
+        print(found.spec.model_dump_json(indent=2, exclude_defaults=True))
+        motion = robot.experiments.preview(found.spec)
+        joints = ", ".join(str(joint) for joint in motion.moving) or "none"
+        print(f"moves joints {joints} for {motion.duration:.1f} s")
+        if not yes and not (can_be_asked() and typer.confirm("Do you approve it?", err=True)):
+            raise SpecError(f"experiment {experiment}: not approved; answer the question, or give --yes")
+        print(f"{experiment}{_review(robot.experiments.approve(found))}")
+
+
+@app.command()
+def withdraw(
+    context: typer.Context, experiment: Annotated[str, typer.Argument(help="Number of a waiting experiment.")]
+) -> None:
+    """End the approval of a waiting experiment."""
+    with robot_of(context).service("queue") as robot:
+        print(f"{experiment}{_review(robot.experiments.withdraw_approval(experiment))}")
 
 
 @app.command()
@@ -47,6 +81,18 @@ def resume(context: typer.Context, yes: YesOption = False) -> None:
     with robot_of(context).service("queue") as robot:
         real = require_consent(connected_status(robot), ConsentPrompt(yes))
         _print_status(robot.queue.resume(moves_real_arm=real))
+
+
+def _name(experiment: Experiment) -> str:
+    return experiment.spec.name or experiment.spec.trajectory.kind
+
+
+def _review(experiment: Experiment) -> str:
+    """Returns what a line says about an experiment's approval."""
+    if experiment.needs_approval_of is not None:
+        who = "an operator" if experiment.needs_approval_of == "operator" else "an owner of the robot"
+        return f", not approved yet by {who} who did not submit it"
+    return "" if experiment.approval is None else f", approved by {experiment.approval.by}"
 
 
 def _print_status(status: QueueStatus) -> None:

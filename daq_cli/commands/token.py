@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
+from daq.contracts.service.queue import Role
 from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
 
 if TYPE_CHECKING:
     from server.access.tokens import TokenStore
+    from server.store.engine import Store
 
-app = typer.Typer(add_completion=False, help="Make, list and revoke tokens of the service.", no_args_is_help=True)
+app = typer.Typer(
+    add_completion=False,
+    help="Make, list and revoke tokens of the service; list and end sessions.",
+    no_args_is_help=True,
+)
 
 NameArgument = Annotated[str, typer.Argument(help="Owner of the token: a person or a program.")]
 
@@ -23,8 +29,11 @@ def add(
     context: typer.Context,
     name: NameArgument,
     role: Annotated[
-        Literal["viewer", "operator"],
-        typer.Option(help="A viewer may look, and stop the robot; an operator may also move it."),
+        Role,
+        typer.Option(
+            help="A viewer may look, and stop the robot; an operator may also move it; an owner may also change and "
+            "cancel what others submitted; an admin is an owner of every robot."
+        ),
     ] = "viewer",
 ) -> None:
     """Make a token. It is shown only once; its hash is stored."""
@@ -58,6 +67,31 @@ def revoke(context: typer.Context, name: NameArgument) -> None:
     print(f"token of {name} revoked")
 
 
+@app.command()
+def sessions(context: typer.Context, json: JsonOption = False) -> None:
+    """List people who have signed in by OpenID Connect, and until when."""
+    from server.access.sessions import SessionStore
+    from server.clock import SystemClock
+
+    found = SessionStore(_store(invocation(context))).all(SystemClock().utc())
+    if json:
+        print_json([{"name": one.name, "role": one.role, "expires": one.expires} for one in found])
+        return
+    for one in found:
+        print(f"{one.name:20} {one.role:9} until {one.expires:%Y-%m-%d %H:%M} UTC")
+
+
+@app.command()
+def sign_out(context: typer.Context, name: Annotated[str, typer.Argument(help="Name of the person.")]) -> None:
+    """End all sessions of a person; within two seconds they must sign in again."""
+    from server.access.sessions import SessionStore
+
+    count = SessionStore(_store(invocation(context))).end_all(name)
+    if count == 0:
+        raise SpecError(f"{shown(name)} has no session; `daq token sessions` lists those there are")
+    print(f"{count} session{'s' * (count > 1)} of {name} ended")
+
+
 def _require_name(name: str) -> None:
     if not 1 <= len(name) <= 64 or not name.isprintable():
         raise SpecError(f"token {shown(name)}: a name has 1 to 64 printable characters")
@@ -65,8 +99,13 @@ def _require_name(name: str) -> None:
 
 def _tokens(call: Invocation) -> TokenStore:
     from server.access.tokens import TokenStore
+
+    return TokenStore(_store(call))
+
+
+def _store(call: Invocation) -> Store:
     from server.store.engine import Store
 
     store = Store(call.configuration.server.database_url)
     store.migrate()
-    return TokenStore(store)
+    return store

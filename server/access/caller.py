@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 from daq.contracts.service.queue import Role
@@ -17,20 +19,26 @@ class Caller:
     """A person or program that sends requests. `name` is their token's name; `local` for a user of this computer
     without a token.
 
-    token: hash of the token with which they were admitted; None if none was needed
+    token:   hash of the token, or of the session's secret, with which they were admitted; None if none was needed
+    expires: when their session ends; None for everybody without one
     """
 
     name: str
     role: Role
     token: str | None = field(default=None, compare=False, repr=False)
+    expires: datetime | None = field(default=None, compare=False)
 
     @property
     def may_operate(self) -> bool:
         """Whether they may change something."""
-        return self.role == "operator"
+        return self.role != "viewer"
+
+    def owns(self, owners: Collection[str]) -> bool:
+        """Whether they are an owner of an arm whose configuration names `owners`; without names, every owner is one."""
+        return self.role == "admin" or (self.role == "owner" and (not owners or self.name in owners))
 
 
-LOCAL = Caller("local", "operator")
+LOCAL = Caller("local", "owner")
 """A user of this computer: they reach a service on loopback without a token and without a proxy."""
 
 
@@ -42,7 +50,7 @@ def caller_of(connection: HTTPConnection) -> Caller | None:
 
 def token_needed() -> ProblemError:
     """Returns a 401 for an anonymous caller."""
-    advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
+    advice = "sign in on the page, or send the header Authorization: Bearer TOKEN; `daq token add` makes one"
     return ProblemError(401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"})
 
 

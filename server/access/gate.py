@@ -24,6 +24,7 @@ from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
+from server.access.session_cookie import says_where_it_is_from, session_of
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.access.turns import Turns
@@ -39,6 +40,8 @@ MOST_SOCKETS = 100
 """Largest number of WebSockets of one caller, out of 500 connections."""
 LOOK_EVERY = 1.0
 """Time (s) between two checks whether the token of an open WebSocket has been revoked."""
+STOP_WAITS = 0.2
+"""Time (s) for which a stop waits for the database to say that a token is still valid."""
 log = logging.getLogger("server.access")
 
 
@@ -188,11 +191,7 @@ class Gate:
     async def _caller(self, scope: Scope, headers: Headers) -> Caller | None:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
-            known, caller = self.tokens.remembered(token.strip())
-            if caller is None and not self.tokens.was_known(token.strip()) and not _is_post(scope, STOP):
-                self._count(None, scope)  # before the database is read
-            if not known:
-                caller = await self._looked_up(token.strip())
+            caller = await self._known(scope, token.strip())
             if caller is None:
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
@@ -205,7 +204,34 @@ class Gate:
                     line = "this ticket was used, is too old, or its token was revoked"
                     raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
                 return caller
+        if secret := session_of(headers):
+            caller = await self._known(scope, secret)
+            if caller is not None and (not self.tokens.is_over(caller) or _is_post(scope, STOP)):
+                changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
+                if changes and not says_where_it_is_from(headers):
+                    line = (
+                        "a session changes something only from the page, and this request does not say where it is from"
+                    )
+                    raise ProblemError(403, "other-origin", line, "programs send a token")
+                return caller
         return LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
+
+    async def _known(self, scope: Scope, token: str) -> Caller | None:
+        """Returns the caller of a token or a session's secret; None for an unknown one. A stop does not wait for the
+        database if that had the token when it was last read. Raises a 429 and a 503."""
+        known, caller = self.tokens.remembered(token)
+        if known:
+            return caller
+        last = self.tokens.last_known(token)
+        if not _is_post(scope, STOP):
+            if last is None:
+                self._count(None, scope)  # before the database is read
+            return await self._looked_up(token)
+        reading = asyncio.ensure_future(self._looked_up(token))
+        if last is None or (await asyncio.wait({reading}, timeout=STOP_WAITS))[0]:
+            return await reading
+        reading.add_done_callback(lambda done: done.cancelled() or done.exception())  # somebody has to take its error
+        return last
 
     async def _looked_up(self, token: str) -> Caller | None:
         """Looks a token up in the database. Raises a 503 if that has never been read."""

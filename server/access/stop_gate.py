@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 
 from server.access.caller import LOCAL, Caller
 from server.access.origin import is_known_name, is_this_computers_user, name_of
+from server.access.session_cookie import says_where_it_is_from, session_of
 from server.problems import ProblemError
 
 
@@ -45,17 +46,27 @@ class StopGate:
             raise ProblemError(403, "other-origin", line, "use the page that this service serves")
         kind, _, token = headers.get("authorization", "").partition(" ")
         if not token or kind.lower() != "bearer":
+            caller = self._of_session(headers)
+            if caller is not None:
+                return caller
             if self.open_on_loopback and is_this_computers_user(headers):
                 return LOCAL
-            advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
+            advice = "sign in on the page, or send the header Authorization: Bearer TOKEN; `daq token add` makes one"
             raise ProblemError(401, "token-needed", "this service needs a token", advice)
-        known, caller = self.tokens.remembered(token.strip())
-        if not known:
-            caller = self.tokens.look_up(token.strip())
+        caller = self._known(token.strip())
         if caller is None:
             line = "this token is not known, or was revoked"
             raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name")
         return caller
+
+    def _of_session(self, headers: Mapping[str, str]) -> Caller | None:
+        """Returns the person who has signed in. Their request must come from the page."""
+        secret = session_of(headers)
+        return self._known(secret) if secret and says_where_it_is_from(headers) else None
+
+    def _known(self, token: str) -> Caller | None:
+        known, caller = self.tokens.remembered(token)
+        return caller if known else self.tokens.look_up(token)
 
     def is_from_here(self, headers: Mapping[str, str]) -> bool:
         """Whether a request comes from the service's own page, or from a program, which sends no origin."""

@@ -17,9 +17,10 @@ from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.errors import SpecError
-from daq.contracts.service.queue import Role
-from server.access.caller import Caller
+from daq.contracts.service.queue import Role, role_of
+from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
+from server.access.sessions import SessionStore
 from server.clock import Clock
 from server.database_errors import DamagedError
 from server.store.engine import Store
@@ -48,13 +49,16 @@ class TokenInfo:
 
 
 class TokenStore:
-    """Tokens in the database."""
+    """Tokens in the database; `callers` has the sessions of people, too."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self._sessions = SessionStore(store)
 
     def add(self, name: str, role: Role, now: datetime) -> str:
         """Makes a new token and returns it; it cannot be shown again. Raises SpecError if the name is taken."""
+        if name == LOCAL.name:
+            raise SpecError(f"token {name!r}: users of this computer have this name; choose another one")
         token = PREFIX + secrets.token_urlsafe(32)
         with self._store.writing() as session:
             if session.scalar(select(TokenRow).filter_by(name=name)) is not None:
@@ -75,14 +79,19 @@ class TokenStore:
         """Returns all tokens, including the revoked ones."""
         with self._store.reading() as session:
             rows = session.scalars(select(TokenRow).order_by(TokenRow.created))
-            return [TokenInfo(row.name, _role(row.role), row.created, row.revoked) for row in rows]
+            return [TokenInfo(row.name, role_of(row.role), row.created, row.revoked) for row in rows]
 
-    def callers(self) -> dict[str, Caller]:
-        """Returns the caller of each token that is not revoked, by the token's digest. It reads no other columns, so
-        that a damaged time keeps nobody out."""
+    def callers(self, now: datetime) -> dict[str, Caller]:
+        """Returns the caller of each token that is not revoked, by the token's digest, and of each session that may at
+        least stop the robot. Of tokens it reads no other columns, so that a damaged time keeps nobody out."""
         with self._store.reading() as session:
             rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
-            return {digest: Caller(name, _role(role), digest) for digest, name, role in rows}
+            tokens = {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
+        try:
+            return tokens | self._sessions.callers(now)
+        except CANNOT_BE_READ:  # damaged sessions take nobody's token
+            log.exception("sessions cannot be read")
+            return tokens
 
 
 @dataclass(frozen=True)
@@ -109,7 +118,27 @@ class KnownTokens:
 
     def was_known(self, token: str) -> bool:
         """Whether the token was valid when the database was last read, however long ago."""
-        return digest_of(token) in self._known.callers
+        return self.last_known(token) is not None
+
+    def last_known(self, token: str) -> Caller | None:
+        """Returns a token's caller as the database had it when it was last read, however long ago."""
+        return self._known.callers.get(digest_of(token))
+
+    def is_over(self, caller: Caller) -> bool:
+        """Whether the caller's session has ended. It may still stop the robot for a while."""
+        return caller.expires is not None and caller.expires <= self._clock.utc()
+
+    def add(self, caller: Caller) -> None:
+        """Notes a session that has just begun, and is in the database already."""
+        if caller.token is not None:
+            with self._reading:
+                self._known = _Known({**self._known.callers, caller.token: caller}, self._known.at)
+
+    def forget(self, caller: Caller) -> None:
+        """Forgets a session that was left, at once."""
+        with self._reading:
+            left = {digest: one for digest, one in self._known.callers.items() if digest != caller.token}
+            self._known = _Known(left, self._known.at)
 
     def look_up(self, token: str) -> Caller | None:
         """Returns a token's caller from the database. If that cannot be read, the tokens read last stay valid: nobody
@@ -121,6 +150,8 @@ class KnownTokens:
         """Whether the token with which a caller was admitted is still valid. Call this on the event loop."""
         if caller.token is None:
             return True
+        if self.is_over(caller):
+            return False
         known, found = self._remembered(caller.token)
         if not known:
             try:
@@ -141,7 +172,7 @@ class KnownTokens:
             if known:
                 return caller
             try:
-                self._known = _Known(self._tokens.callers(), self._clock.monotonic())
+                self._known = _Known(self._tokens.callers(self._clock.utc()), self._clock.monotonic())
             except CANNOT_BE_READ as error:
                 if self._known.at == -math.inf:
                     raise
@@ -151,7 +182,3 @@ class KnownTokens:
 
     def _age(self) -> float:
         return self._clock.monotonic() - self._known.at
-
-
-def _role(text: str) -> Role:
-    return "operator" if text == "operator" else "viewer"

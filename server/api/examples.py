@@ -15,6 +15,8 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive, Transfer
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.experiments import (
+    Approval,
+    ApprovalRequest,
     Experiment,
     ExperimentChange,
     ExperimentPreset,
@@ -72,7 +74,7 @@ from daq.contracts.service.robot import (
     Sample,
     StopResult,
 )
-from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
+from daq.contracts.service.system import Health, LoginWays, Me, OpenIdWay, SignedOut, StorageStatus, SystemStatus
 from daq.contracts.service.teaching import (
     CalibrationRequest,
     JogRequest,
@@ -98,6 +100,7 @@ ROBOT, TRACE, EXPERIMENT, JOB, MODEL = "ma2000", "3fa1c5d20b77", "c40d1a2b93ee",
 SPEC = ExperimentSpec(trajectory=Ramp(amplitude=0.377, duration=0.65), joints=(1, 2, 3), name="morning-ramp")
 PICK = Program(name="pick", instructions=(Absolute(angles={1: 3.14, 2: 1.4}), Gripper(closed=True), Wait(duration=1)))
 PROGRAM = ProgramEntry(name="pick", robot=ROBOT, revision=3, instructions=3, changed=NOON, changed_by="anna")
+CONTENT = "5f3c9a1be4d277885f3c9a1be4d277885f3c9a1be4d277885f3c9a1be4d27788"
 COULOMB = ParameterWords(joint=2, group="joint 2", short="Coulomb friction torque", label="J2 Coulomb friction torque")
 COULOMB_NOW = {"name": "joint2.coulomb_friction.torque", "unit": "N m"}
 QUEUE = QueueStatus(paused=False, reason="resumed by anna", since=NOON, queued=2, running=EXPERIMENT)
@@ -116,6 +119,8 @@ def _experiments() -> list[BaseModel]:
         at=NOON,
         submitted=NOON,
         submitted_by="anna",
+        owner="anna",
+        approval=Approval(by="bert", at=NOON, as_owner=False),
         started=NOON,
         progress=0.4,
         progress_text="120 of 300 samples",
@@ -126,6 +131,7 @@ def _experiments() -> list[BaseModel]:
         FleetExperimentRequest(request=request, robots=(ROBOT,)),
         FleetExperiments(experiments=(experiment,)),
         ExperimentChange(priority=5),
+        ApprovalRequest(content=CONTENT),
         experiment,
         ExperimentPreset(name="ramp", description="the ramp of the 1991 thesis", spec=SPEC),
         ScheduleRequest(spec=SPEC, every=86400, starts=NOON, count=30),
@@ -143,6 +149,8 @@ def _experiments() -> list[BaseModel]:
             next=NOON + timedelta(days=3),
             created=NOON,
             created_by="anna",
+            content=CONTENT,
+            approval=Approval(by="bert", at=NOON, as_owner=False),
         ),
         MotionPreview(
             time=(0.0, 0.02, 0.04),
@@ -480,7 +488,9 @@ def _system() -> list[BaseModel]:
     )
     return [
         Health(status="ok", version="0.1.0", checks={"database": "", "traces": "", f"robot {ROBOT}": ""}),
-        Me(name="anna", role="operator"),
+        Me(name="anna", role="owner", owner_of=(ROBOT,), session_until=NOON),
+        LoginWays(openid=OpenIdWay(label="the laboratory's accounts", start="/api/v1/login/start")),
+        SignedOut(provider="https://accounts.example/end_session"),
         SystemStatus(
             version="0.1.0",
             uptime=86400.0,

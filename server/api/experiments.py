@@ -10,6 +10,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import (
     ENDS,
+    ApprovalRequest,
     Experiment,
     ExperimentChange,
     ExperimentOrder,
@@ -17,6 +18,7 @@ from daq.contracts.service.experiments import (
     ExperimentState,
     MotionPreview,
 )
+from server.access.caller import Caller
 from server.api.dependencies import (
     CursorOf,
     IdempotencyKey,
@@ -109,21 +111,65 @@ async def get_experiment(
 
 @router.patch("/{experiment}")
 def change_experiment(
-    experiment: Identity, change: ExperimentChange, rig: RobotDep, services: ServicesDep, caller: Operator
+    experiment: Identity, change: ExperimentChange, rig: RobotDep, services: ServicesDep, caller: Operator, _turn: Turn
 ) -> Experiment:
-    """Changes the priority of an experiment that still waits."""
-    changed = services.experiments.set_priority(rig.robot.name, experiment, change.priority)
-    services.record_event(
-        rig.robot.name, "experiment", f"priority {change.priority}", actor=caller.name, experiment=experiment
-    )
+    """Changes an experiment that still waits: one's own, or, for owners of the robot, anybody's.
+
+    A new specification is checked like that of a new experiment, and ends its approval.
+    """
+    _require_own(services, rig, caller, experiment)
+    if change.spec is not None:
+        require_possible(services, rig, change.spec)
+    changed, ended = services.experiments.change(rig.robot.name, experiment, caller.name, change.priority, change.spec)
+    what = ["specification changed"] if change.spec is not None else []
+    what += [f"approval of {ended} ended"] if ended else []
+    what += [f"priority {change.priority}"] if change.priority is not None else []
+    services.record_event(rig.robot.name, "experiment", ", ".join(what), actor=caller.name, experiment=experiment)
     rig.queue.wake()
-    return changed
+    return rig.queue.with_progress(changed)
+
+
+@router.put("/{experiment}/approval")
+def approve_experiment(
+    experiment: Identity, request: ApprovalRequest, rig: RobotDep, services: ServicesDep, caller: Operator
+) -> Experiment:
+    """Approves exactly this content of a waiting experiment, so that it may move a real arm.
+
+    Whoever submitted or changed it cannot. It begins as soon as the queue lets it; a change ends the approval.
+    """
+    given = rig.approval(caller, request.content)
+    approved = services.experiments.approve(rig.robot.name, experiment, rig.queue.review, given, services.clock.utc())
+    services.record_event(rig.robot.name, "review", "approved", actor=caller.name, experiment=experiment)
+    rig.queue.wake()
+    return rig.queue.with_progress(approved)
+
+
+@router.delete("/{experiment}/approval")
+def withdraw_experiment_approval(
+    experiment: Identity, rig: RobotDep, services: ServicesDep, caller: Operator
+) -> Experiment:
+    """Ends the approval of an experiment that still waits. Every operator may."""
+    found, ended = services.experiments.withdraw_approval(rig.robot.name, experiment)
+    if ended is not None:
+        line = f"approval of {ended} withdrawn"
+        services.record_event(rig.robot.name, "review", line, actor=caller.name, experiment=experiment)
+    return rig.queue.with_progress(found)
 
 
 @router.post("/{experiment}/cancel")
-def cancel_experiment(experiment: Identity, rig: RobotDep, caller: Operator) -> Experiment:
-    """Cancels an experiment. One that runs is ended by a stop: the arm is frozen and needs a reset."""
+def cancel_experiment(experiment: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Experiment:
+    """Cancels an experiment: one's own, or, for owners of the robot, anybody's.
+
+    One that runs is ended by a stop: the arm is frozen and needs a reset.
+    """
+    _require_own(services, rig, caller, experiment)
     return rig.queue.cancel(experiment, caller.name)
+
+
+def _require_own(services: Services, rig: RobotServices, caller: Caller, experiment: str) -> None:
+    """Raises a 403 unless the caller may change this experiment, and a 404."""
+    found = services.experiments.get(rig.robot.name, experiment)
+    rig.require_own(caller, found.owner, f"experiment {found.spec.name or found.id}")
 
 
 def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:

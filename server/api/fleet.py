@@ -75,7 +75,8 @@ def submit_fleet_experiment(
     for rig, (experiment, is_new) in zip(rigs, made, strict=True):  # no queue begins before every one has it
         if is_new:
             rig.queue.submitted(experiment, caller.name)
-    return FleetExperiments(experiments=tuple(experiment for experiment, _ in made))
+    shown = [rig.queue.with_progress(experiment) for rig, (experiment, _) in zip(rigs, made, strict=True)]
+    return FleetExperiments(experiments=tuple(shown))
 
 
 @router.get("/comparison")

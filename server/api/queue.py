@@ -7,8 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Response
 
 from daq.contracts.service.base import Page
-from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
+from daq.contracts.service.experiments import ApprovalRequest, Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
+from server.access.caller import Caller
 from server.api.dependencies import (
     CursorOf,
     Identity,
@@ -23,6 +24,7 @@ from server.api.dependencies import (
 from server.api.experiments import require_possible
 from server.problems import PROBLEMS
 from server.queue.notices import Seen
+from server.services import RobotServices, Services
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 
@@ -44,7 +46,7 @@ async def get_queue(rig: RobotDep, _: Viewer) -> QueueStatus:
 @router.get("/queue/experiments", tags=["queue"])
 def list_queue(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[Experiment, ...]:
     """Lists the waiting experiments in the order in which they will run."""
-    return tuple(services.experiments.in_order(rig.robot.name))
+    return tuple(map(rig.queue.with_progress, services.experiments.in_order(rig.robot.name)))
 
 
 @router.post("/queue/pause", tags=["queue"])
@@ -78,7 +80,7 @@ def create_schedule(
     made = services.schedules.create(rig.robot.name, request, services.clock.utc(), caller.name)
     services.record_event(rig.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=caller.name)
     rig.queue.wake()
-    return made
+    return rig.queue.with_review(made)
 
 
 @router.get("/schedules", tags=["queue"])
@@ -86,33 +88,64 @@ def list_schedules(
     rig: RobotDep, services: ServicesDep, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
 ) -> Page[Schedule]:
     """Lists schedules, the newest first."""
-    return services.schedules.page(rig.robot.name, cursor, limit)
+    page = services.schedules.page(rig.robot.name, cursor, limit)
+    return page.model_copy(update={"items": tuple(map(rig.queue.with_review, page.items))})
 
 
 @router.get("/schedules/{schedule}", tags=["queue"])
 def get_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, _: Viewer) -> Schedule:
     """Returns one schedule."""
-    return services.schedules.get(rig.robot.name, schedule)
+    return rig.queue.with_review(services.schedules.get(rig.robot.name, schedule))
 
 
 @router.patch("/schedules/{schedule}", tags=["queue"])
 def change_schedule(
     schedule: Identity, change: ScheduleChange, rig: RobotDep, services: ServicesDep, caller: Operator
 ) -> Schedule:
-    """Switches a schedule on or off."""
+    """Switches a schedule on or off: one's own, or, for owners of the robot, anybody's."""
+    _require_own(services, rig, caller, schedule)
     changed = services.schedules.switch(rig.robot.name, schedule, active=change.active, now=services.clock.utc())
     state = "on" if change.active else "off"
     services.record_event(rig.robot.name, "schedule", f"schedule {schedule} switched {state}", actor=caller.name)
     rig.queue.wake()
-    return changed
+    return rig.queue.with_review(changed)
+
+
+@router.put("/schedules/{schedule}/approval", tags=["queue"])
+def approve_schedule(
+    schedule: Identity, request: ApprovalRequest, rig: RobotDep, services: ServicesDep, caller: Operator
+) -> Schedule:
+    """Approves exactly this content of a schedule: its later runs may move a real arm. Its maker cannot."""
+    given = rig.approval(caller, request.content)
+    approved = services.schedules.approve(rig.robot.name, schedule, rig.queue.review, given, services.clock.utc())
+    services.record_event(rig.robot.name, "review", f"schedule {schedule} approved", actor=caller.name)
+    rig.queue.wake()
+    return rig.queue.with_review(approved)
+
+
+@router.delete("/schedules/{schedule}/approval", tags=["queue"])
+def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Schedule:
+    """Ends the approval of a schedule. Runs that wait keep theirs. Every operator may."""
+    found, ended = services.schedules.withdraw_approval(rig.robot.name, schedule)
+    if ended is not None:
+        line = f"schedule {schedule}: approval of {ended} withdrawn"
+        services.record_event(rig.robot.name, "review", line, actor=caller.name)
+    return rig.queue.with_review(found)
 
 
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)
 def delete_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
-    """Deletes a schedule. The experiments that it has submitted are kept."""
+    """Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept."""
+    _require_own(services, rig, caller, schedule)
     services.schedules.remove(rig.robot.name, schedule)
     services.record_event(rig.robot.name, "schedule", f"schedule {schedule} deleted", actor=caller.name)
     return Response(status_code=204)
+
+
+def _require_own(services: Services, rig: RobotServices, caller: Caller, schedule: str) -> None:
+    """Raises a 403 unless the caller may change this schedule, and a 404."""
+    found = services.schedules.get(rig.robot.name, schedule)
+    rig.require_own(caller, found.created_by, f"schedule {found.spec.name or found.id}")
 
 
 @router.get("/control", tags=["control"])

@@ -59,9 +59,10 @@ def metrics(services: ServicesDep, _: Viewer) -> Response:
 
 
 @router.get("/me")
-async def get_me(caller: Viewer) -> Me:
+async def get_me(services: ServicesDep, caller: Viewer) -> Me:
     """Returns the name and the role of the caller."""
-    return Me(name=caller.name, role=caller.role)
+    owned = tuple(rig.robot.name for rig in services.robots() if caller.owns(rig.owners))
+    return Me(name=caller.name, role=caller.role, owner_of=owned, session_until=caller.expires)
 
 
 @router.get("/system")

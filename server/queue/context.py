@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from daq.contracts.service.experiments import Reviewer
 from server.clock import Clock
 from server.owner.messages import Answer
 from server.robot.control import ControlService
@@ -39,3 +40,5 @@ class QueueContext:
     add_unfinished_traces: Callable[[], None]
     """Called after a run whose trace could not be closed or added to the catalogue, to add what was written of it."""
     unattended: bool
+    reviewer: Reviewer | None = None
+    """Who must approve an experiment before it moves a real arm; None for nobody."""

@@ -64,7 +64,8 @@ class DueRuns:
             now,
             f"schedule {identity}",
             schedule=identity,
-            also=lambda session: context.schedules.count_run(session, name, identity, now),
+            owner=schedule.created_by,
+            also=lambda session, run: context.schedules.submit_run(session, name, identity, now, run),
         )
         self._left_out.discard(identity)
         context.record_event("experiment", f"queued by schedule {identity}", experiment=made.id)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from daq.contracts.consent import lacks_consent
+from daq.contracts.service.experiments import Reviewer
 from daq.contracts.service.robot import RobotIdentity
 from server.owner.messages import ArmReport
 
@@ -34,6 +35,14 @@ def why_paused(arm: ArmReport) -> str:
     if arm.arm not in ("stopped", "fault"):
         return ""
     return f"the arm is {arm.arm} ({arm.cause}): look at it, reset it, then resume the queue"
+
+
+def approval_missing(experiments: int, reviewer: Reviewer | None) -> str:
+    """Returns what so many experiments without an approval wait for; empty for none."""
+    if experiments == 0 or reviewer is None:
+        return ""
+    who = "an operator" if reviewer == "operator" else "an owner of the robot"
+    return f"the approval of {experiments} experiment{'s' * (experiments > 1)} by {who} who did not submit it"
 
 
 def what_is_missing(now: Circumstances) -> Missing | None:

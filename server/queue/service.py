@@ -11,10 +11,11 @@ from datetime import datetime, timedelta
 from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
-from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
+from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState, Schedule
 from daq.contracts.service.queue import QueueStatus
 from server.experiments.endings import Ending, ending_of
 from server.experiments.order import next_due
+from server.experiments.review import Given, Review
 from server.experiments.states import Event, IllegalEventError, advance
 from server.owner.messages import Answer, ArmReport, HaltRun, Opened, Report, RunExperiment
 from server.problems import ProblemError, conflict
@@ -22,7 +23,8 @@ from server.queue.attendance import Attendance
 from server.queue.context import QueueContext
 from server.queue.due_runs import DueRuns
 from server.queue.notices import Notices, Seen
-from server.queue.readiness import Circumstances, what_is_missing, why_paused
+from server.queue.readiness import Circumstances, approval_missing, what_is_missing, why_paused
+from server.store.experiments import NotApprovedError
 from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
@@ -39,6 +41,8 @@ class Running:
     progress: float = 0.0
     text: str = ""
     cancelled_by: str | None = None
+    reviewed: bool = False
+    """Whether it began with the approval that a real arm needs."""
     answer: Future[Answer] | None = None
 
 
@@ -72,6 +76,8 @@ class QueueService:
         self._ended: Ended | None = None
         """The last experiment, if its end could not be written yet: no other begins until it is."""
         self._runs = DueRuns(context)
+        self.review = Review.of(context.robot.name, context.robot.place.machine, context.reviewer)
+        """The rule by which experiments are approved before they move a real arm."""
         self._state = self._state_at_start()
         self._runs.leave_out_missed()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
@@ -198,11 +204,27 @@ class QueueService:
             running.progress, running.text = fraction, text
 
     def with_progress(self, experiment: Experiment) -> Experiment:
-        """Returns `experiment` with its progress, if it is running."""
+        """Returns `experiment` as clients see it: with its progress while it runs, and while it waits with its content
+        on this machine, and with whose approval it still needs."""
+        if experiment.state == "queued":
+            return experiment.model_copy(update=self._reviewed(experiment, experiment.owner))
         running = self._running
         if running is None or running.id != experiment.id or experiment.state != "running":
             return experiment
         return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
+
+    def with_review(self, schedule: Schedule) -> Schedule:
+        """Returns `schedule` as clients see it: with its content on this machine, and whose approval its runs need."""
+        return schedule.model_copy(update=self._reviewed(schedule, schedule.created_by))
+
+    def _reviewed(self, one: Experiment | Schedule, owner: str) -> dict[str, object]:
+        if self.review.reviewer is None:
+            return {}
+        content, approval = self.review.content(one.content), one.approval
+        # An approval whose content has changed is removed with the change, so whatever approval there is is for this.
+        given = None if approval is None else Given(content, approval.by, approval.as_owner)
+        lacks = self._needs_review() and not self.review.is_enough(given, content, (owner,))
+        return {"content": content, "needs_approval_of": self.review.reviewer if lacks else None}
 
     def status(self) -> QueueStatus:
         """Returns the status now. It waits neither for a disk nor for the lock, since the event loop calls this."""
@@ -238,6 +260,7 @@ class QueueService:
         interrupted = context.experiments.settle_after_restart(name, now)
         for one in interrupted:
             context.record_event("experiment", f"interrupted: {one.reason}", experiment=one.id)
+        self._end_outdated_approvals()
         waiting = context.experiments.count_waiting(name)
         before = context.queues.get(name)
         if before is not None and before.paused:
@@ -272,6 +295,10 @@ class QueueService:
 
     def _has_consent(self) -> bool:
         return self._consented_connection == self.notices.seen.connections
+
+    def _needs_review(self) -> bool:
+        robot = self._context.robot
+        return self.review.is_needed(robot.identity, robot.place.url)
 
     def _needs_attendance(self) -> bool:
         return lacks_consent(self._context.robot.identity, self._context.unattended)
@@ -313,10 +340,13 @@ class QueueService:
         """Takes control of the robot and begins the next experiment, which it returns; None if none may begin now."""
         context = self._context
         with self._lock:
-            now = context.clock.utc()
-            next_experiment = next_due(context.experiments.due(context.robot.name, now), now)
+            now, name = context.clock.utc(), context.robot.name
+            review = self.review if self._needs_review() else None
+            due = context.experiments.due(name, now, approved=review is not None)
+            next_experiment = next_due(due, now)
             if next_experiment is None:
-                self._waiting_for = ""
+                missing = 0 if review is None else context.experiments.count_not_approved(name, now)
+                self._waiting_for = approval_missing(missing, self.review.reviewer)
                 return None
             self._waiting_for = self._what_is_missing()
             if self._state.paused or self._waiting_for or self._closing:
@@ -328,15 +358,29 @@ class QueueService:
                 context.control.give_back_for_queue()
                 self.wake()
                 return None
-            self._running = Running(next_experiment.id)  # before it stops waiting, so that the queue never looks empty
+            # Before it stops waiting, so that the queue never looks empty.
+            self._running = Running(next_experiment.id, reviewed=review is not None)
             try:
-                return context.experiments.begin(context.robot.name, next_experiment.id, context.clock.utc())
+                return context.experiments.begin(name, next_experiment.id, context.clock.utc(), review)
             except BaseException as error:
                 self._running = None
                 context.control.give_back_for_queue()
-                if isinstance(error, IllegalEventError):  # it has just been cancelled
-                    return None
-                raise
+                if isinstance(error, NotApprovedError):  # its approval was withdrawn just now, or is for something else
+                    self._end_outdated_approvals()
+                    self.wake()
+                elif not isinstance(error, IllegalEventError):  # which means that it has just been cancelled
+                    raise
+                return None
+
+    def _end_outdated_approvals(self) -> None:
+        """Ends approvals that are for another content than what now waits: of before another machine file."""
+        context = self._context
+        for identity, by in context.experiments.void_outdated(context.robot.name, self.review):
+            line = f"approval of {by} ended: the experiment or the machine file is another one now"
+            context.record_event("review", line, experiment=identity)
+        for identity, by in context.schedules.void_outdated(context.robot.name, self.review):
+            line = f"schedule {identity}: approval of {by} ended: the machine file is another one now"
+            context.record_event("review", line)
 
     def _what_is_missing(self) -> str:
         robot = self._context.robot
@@ -412,6 +456,8 @@ class QueueService:
             assert running is not None
             if running.cancelled_by is not None:
                 return Ending(Event.STOPPED, "cancelled before it moved")
+            if self._needs_review() and not running.reviewed:  # a real arm has taken the place of a simulated one
+                return Ending(Event.REFUSED, "it is not approved, and a real arm was connected just before it began")
             answer = running.answer = context.robot.ask(
                 RunExperiment,
                 asked=context.clock.monotonic(),

@@ -14,7 +14,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
-from server.stopping.messages import NEWS, Begin, Known, Owned, Ready, Stopped
+from server.stopping.messages import NEWS, Begin, Joined, Known, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
 """Time (s) for the process to start on a busy computer."""
@@ -77,6 +77,12 @@ class StopDoor:
             self._begin = self._begin.model_copy(update={"tokens": tokens})
             self._send(Known(tokens=tokens))
 
+    def add(self, caller: Caller) -> None:
+        """Passes on a session that has just begun, so that its person can stop the robot whatever the database does."""
+        assert caller.token is not None
+        with self._lock:
+            self._send(Joined(digest=caller.token, name=caller.name, role=caller.role))
+
     def close(self) -> None:
         """Ends the process, after it has answered the requests under way."""
         self._closing.set()
@@ -103,7 +109,7 @@ class StopDoor:
             self._send(told)
         return process
 
-    def _send(self, message: Begin | Known | Owned) -> None:
+    def _send(self, message: Begin | Known | Joined | Owned) -> None:
         """If the process has died, the message is sent again to its successor."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError, ValueError):

@@ -36,6 +36,15 @@ class Known(FrozenRecord):
     tokens: dict[str, tuple[str, Role]]
 
 
+class Joined(FrozenRecord):
+    """A session that has just begun, by the digest of its secret."""
+
+    kind: Literal["joined"] = "joined"
+    digest: str
+    name: str
+    role: Role
+
+
 class Owned(FrozenRecord):
     """Which process owns a robot's port now; None if none does. `terminal`: the pseudo-terminal at which the robot was
     reached, by number, time of creation and holder, as `daq.transport` knows it."""
@@ -65,5 +74,7 @@ class Stopped(FrozenRecord):
     actor: str
 
 
-ORDER: TypeAdapter[Begin | Known | Owned] = TypeAdapter(Annotated[Begin | Known | Owned, Field(discriminator="kind")])
+ORDER: TypeAdapter[Begin | Known | Joined | Owned] = TypeAdapter(
+    Annotated[Begin | Known | Joined | Owned, Field(discriminator="kind")]
+)
 NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(Annotated[Ready | Stopped, Field(discriminator="kind")])

@@ -18,7 +18,7 @@ from server.access.stop_gate import StopGate
 from server.steady import keep_steady
 from server.stopping.arm import Reach, stop_arm
 from server.stopping.listener import StopListener
-from server.stopping.messages import ORDER, Begin, Known, Owned, Ready, Stopped
+from server.stopping.messages import ORDER, Begin, Joined, Known, Owned, Ready, Stopped
 from server.stopping.tokens import Callers, StopTokens, reader_of
 
 FIRST_READ_WITHIN = 1.0
@@ -75,6 +75,8 @@ def main() -> int:
             robots.set_owner(order)
         elif isinstance(order, Known):
             tokens.update(_callers(order.tokens) or {})
+        elif isinstance(order, Joined):
+            tokens.add(order.digest, Caller(order.name, order.role, order.digest))
     listener.close()
     tokens.close()
     return 0

@@ -9,10 +9,13 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import closing
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
 from server.access.digest import digest_of
+from server.access.session_cookie import STOPS_FOR
 
 READ_AGAIN_AFTER = 2.0
 """Time (s) between two reads, after which a revoked token is refused."""
@@ -26,6 +29,12 @@ BUSY_WITHIN = 0.4
 ANSWERED_WITHIN = 2
 """Time (s) for a database server to accept a connection, and to answer each statement."""
 log = logging.getLogger("server.stop")
+
+TOKENS = (
+    "SELECT digest, name, role FROM tokens WHERE revoked IS NULL "
+    "UNION ALL SELECT digest, name, role FROM sessions WHERE expires > :ended"
+)
+"""Everybody who may stop the robot, also those whose session has ended lately."""
 
 Callers = dict[str, Caller]
 """The caller of each token, by the token's digest, without revoked tokens."""
@@ -76,6 +85,11 @@ class StopTokens:
         """Takes the service's tokens if none have been read yet; tokens read from the database are as new or newer."""
         with self._changed:
             self._callers = self._callers or callers
+
+    def add(self, digest: str, caller: Caller) -> None:
+        """Takes a session that has just begun. It is in the database, so the next read has it, too."""
+        with self._changed:
+            self._callers = {**(self._callers or {}), digest: caller}
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
         """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
@@ -130,13 +144,18 @@ def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
     return (lambda: _of_file(sqlite)) if sqlite is not None else _of_database(database_url)
 
 
+def _ended() -> datetime:
+    """Returns the end (UTC, without zone, as the table has it) of the oldest session that still stops the robot."""
+    return datetime.now(UTC).replace(tzinfo=None) - timedelta(seconds=STOPS_FOR)
+
+
 def _of_file(file: Path) -> Callers:
     """Reads the tokens over a new connection. A suspended service that holds the write lock does not block readers
     (WAL)."""
     uri = f"{file.absolute().as_uri()}?mode=ro"
     with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_WITHIN)) as connection:
-        rows = connection.execute("SELECT digest, name, role FROM tokens WHERE revoked IS NULL").fetchall()
-    return {digest: Caller(name, "operator" if role == "operator" else "viewer", digest) for digest, name, role in rows}
+        rows = connection.execute(TOKENS.replace(":ended", "?"), [_ended().isoformat(" ", "microseconds")]).fetchall()
+    return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
 def _of_database(url: str) -> Callable[[], Callers]:
@@ -147,7 +166,7 @@ def _of_database(url: str) -> Callable[[], Callers]:
 
     def read() -> Callers:
         with engine.connect() as connection:
-            rows = connection.execute(text("SELECT digest, name, role FROM tokens WHERE revoked IS NULL")).all()
-        return {row[0]: Caller(row[1], "operator" if row[2] == "operator" else "viewer", row[0]) for row in rows}
+            rows = connection.execute(text(TOKENS), {"ended": _ended()}).all()
+        return {row[0]: Caller(row[1], role_of(row[2]), row[0]) for row in rows}
 
     return read

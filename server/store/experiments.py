@@ -16,14 +16,21 @@ from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
 from daq.traces.naming import new_trace_id
 from server.experiments.order import Waiting
+from server.experiments.review import Given, Review, digest_of
 from server.experiments.states import Event, IllegalEventError, advance, after_restart
 from server.problems import conflict, not_found
+from server.store.approvals import approval_of, approve, given_to, require_approvable, void
 from server.store.engine import Store
 from server.store.labels import experiment_label
 from server.store.pages import Cursor, newest_first, page_of
 from server.store.remembered import Remembered
-from server.store.submitted import digest_of, made_before, new_columns
+from server.store.submitted import digest_of as digest_of_request
+from server.store.submitted import made_before, new_columns
 from server.store.tables import ExperimentRow
+
+
+class NotApprovedError(Exception):
+    """An experiment may not begin: its approval is missing, or is for another content."""
 
 
 class ExperimentStore:
@@ -48,7 +55,7 @@ class ExperimentStore:
     def made_before(self, robot: str, request: ExperimentRequest, key: str | None) -> Experiment | None:
         """Returns the experiment that this key made before. Raises a 409 if the key was used for another request."""
         with self._store.reading() as session:
-            found = made_before(session, ExperimentRow, robot, key, digest_of(request))
+            found = made_before(session, ExperimentRow, robot, key, digest_of_request(request))
             return None if found is None else as_experiment(found)
 
     def submit(
@@ -59,25 +66,29 @@ class ExperimentStore:
         by: str,
         key: str | None = None,
         schedule: str | None = None,
-        also: Callable[[Session], None] = lambda _session: None,
+        owner: str | None = None,
+        also: Callable[[Session, ExperimentRow], None] = lambda _session, _row: None,
     ) -> tuple[Experiment, bool]:
         """Queues a new experiment, and returns it with True; or returns the one that the key made before, with False.
 
-        `also` is called in the transaction that makes the experiment, so that both are written or neither. Raises a 409
-        if the key was used for another request.
+        `owner` is who submits it, unless a schedule does, whose runs have its approval. `also` is called in the
+        transaction that makes the experiment, so that both are written or neither. Raises a 409 if the key was used for
+        another request.
         """
         with self._changing(robot) as session:
-            experiment, new = _submit(session, robot, request, now, by, key, schedule)
+            row, new = _submit(session, robot, request, now, by, key, schedule, owner)
             if new:
-                also(session)
-            return experiment, new
+                also(session, row)
+                session.flush()
+            return as_experiment(row), new
 
     def submit_to_each(
         self, robots: Sequence[str], request: ExperimentRequest, now: datetime, by: str, key: str | None = None
     ) -> list[tuple[Experiment, bool]]:
         """Does the same for several robots in one transaction: if one raises, no robot gets the experiment."""
         with self._changing(*robots) as session:
-            return [_submit(session, robot, request, now, by, key) for robot in robots]
+            made = [_submit(session, robot, request, now, by, key) for robot in robots]
+            return [(as_experiment(row), new) for row, new in made]
 
     def get(self, robot: str, identity: str) -> Experiment:
         """Returns an experiment. Raises a 404."""
@@ -110,14 +121,25 @@ class ExperimentStore:
         with self._store.reading() as session:
             return page_of(list(session.scalars(query)), limit, as_experiment, _place_by_end)
 
-    def due(self, robot: str, now: datetime) -> list[Waiting]:
-        """Returns the first experiment that is queued and due, if any. It reads one row, even if 100 000 wait."""
+    def due(self, robot: str, now: datetime, *, approved: bool = False) -> list[Waiting]:
+        """Returns the first experiment that is queued and due, if any; on request the first `approved` one. It reads
+        one row, even if 100 000 wait."""
         columns = (ExperimentRow.id, ExperimentRow.sequence, ExperimentRow.priority, ExperimentRow.at)
         query = select(*columns).filter_by(robot=robot, state="queued")
         query = query.where(or_(ExperimentRow.at.is_(None), ExperimentRow.at <= now))
+        if approved:
+            query = query.where(ExperimentRow.approved_by.is_not(None))
         query = query.order_by(ExperimentRow.priority.desc(), ExperimentRow.sequence).limit(1)
         with self._store.reading() as session:
             return [Waiting(*row) for row in session.execute(query)]
+
+    def count_not_approved(self, robot: str, now: datetime) -> int:
+        """Returns the number of experiments that are queued and due, and are not approved."""
+        query = select(func.count()).select_from(ExperimentRow)
+        query = query.filter_by(robot=robot, state="queued", approved_by=None)
+        query = query.where(or_(ExperimentRow.at.is_(None), ExperimentRow.at <= now))
+        with self._store.reading() as session:
+            return session.scalar(query) or 0
 
     def in_order(self, robot: str) -> list[Experiment]:
         """Returns the queued experiments in the order in which they will run."""
@@ -139,10 +161,13 @@ class ExperimentStore:
                 pass
         return self._waiting[robot]
 
-    def begin(self, robot: str, identity: str, now: datetime) -> Experiment:
-        """Marks an experiment as running. Raises IllegalEventError if it was cancelled meanwhile."""
+    def begin(self, robot: str, identity: str, now: datetime, review: Review | None = None) -> Experiment:
+        """Marks an experiment as running. Raises IllegalEventError if it was cancelled meanwhile, and NotApprovedError
+        if the review does not permit what it is now."""
         with self._changing(robot) as session:
             row = _row(session, robot, identity)
+            if review is not None and not _may_begin(row, review):
+                raise NotApprovedError
             row.state = advance(_state(row), Event.TAKEN)
             row.started = now
             session.flush()
@@ -169,16 +194,49 @@ class ExperimentStore:
                 "experiment-state", str(error), "see its state: only what is queued or running can end"
             ) from error
 
-    def set_priority(self, robot: str, identity: str, priority: int) -> Experiment:
-        """Changes the priority of a queued experiment. Raises a 409 for any other."""
+    def change(
+        self, robot: str, identity: str, by: str, priority: int | None, spec: ExperimentSpec | None
+    ) -> tuple[Experiment, str | None]:
+        """Changes a queued experiment, and returns it with the name of whoever had approved what it was before; None if
+        an approval stays, or there was none. Raises a 409 for an experiment that is not queued."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
-            if row.state != "queued":
-                line = f"{experiment_label(row)} is {row.state}"
-                raise conflict("experiment-state", line, "only an experiment that is queued has a priority")
-            row.priority = priority
+            row = _queued(session, robot, identity)
+            row.priority = row.priority if priority is None else priority
+            ended = None
+            if spec is not None:
+                row.spec, row.changed_by, ended = spec.model_dump(mode="json"), by, void(row)
+            session.flush()
+            return as_experiment(row), ended
+
+    def approve(self, robot: str, identity: str, review: Review, given: Given, now: datetime) -> Experiment:
+        """Notes an approval. Raises a 403 for one's own experiment, and a 409 if it is not queued, or not what the
+        approval is for."""
+        with self._store.writing() as session:
+            row = _queued(session, robot, identity)
+            require_approvable(given, _content(review, row), _authors(row), experiment_label(row))
+            approve(row, given, now)
             session.flush()
             return as_experiment(row)
+
+    def withdraw_approval(self, robot: str, identity: str) -> tuple[Experiment, str | None]:
+        """Ends the approval of a queued experiment, and returns who had given it. Raises a 409 for any other."""
+        with self._store.writing() as session:
+            row = _queued(session, robot, identity)
+            ended = void(row)
+            session.flush()
+            return as_experiment(row), ended
+
+    def void_outdated(self, robot: str, review: Review) -> list[tuple[str, str]]:
+        """Ends approvals of queued experiments that are not enough any more: those of another content, such as of
+        another machine file. Returns each experiment with the name of whoever had approved it."""
+        with self._store.writing() as session:
+            rows = session.scalars(
+                select(ExperimentRow)
+                .filter_by(robot=robot, state="queued")
+                .where(ExperimentRow.approved_by.is_not(None))
+            )
+            outdated = [row for row in rows if not _may_begin(row, review)]
+            return [(row.id, void(row) or "") for row in outdated]
 
     def settle_after_restart(self, robot: str, now: datetime) -> list[Experiment]:
         """Marks experiments that ran when the service ended as interrupted, and returns them."""
@@ -217,11 +275,12 @@ def _submit(
     by: str,
     key: str | None,
     schedule: str | None = None,
-) -> tuple[Experiment, bool]:
-    """Adds an experiment and returns it with True; or returns the one that the key made before, with False."""
-    digest = digest_of(request)
+    owner: str | None = None,
+) -> tuple[ExperimentRow, bool]:
+    """Adds an experiment and returns its row with True; or returns that which the key made before, with False."""
+    digest = digest_of_request(request)
     if (found := made_before(session, ExperimentRow, robot, key, digest)) is not None:
-        return as_experiment(found), False
+        return found, False
     row = ExperimentRow(
         **new_columns(robot, key, digest, now, by),
         spec=request.spec.model_dump(mode="json"),
@@ -229,31 +288,57 @@ def _submit(
         at=request.at,
         schedule=schedule,
         trace=new_trace_id(),
+        owner=owner or by,
     )
     session.add(row)
     session.flush()
-    return as_experiment(row), True
+    return row, True
 
 
 def as_experiment(row: ExperimentRow) -> Experiment:
-    """Converts a row to what clients see. The trace's number is included once there may be a trace."""
+    """Converts a row to what clients see. The trace's number is included once there may be a trace. `content` is not
+    yet bound to the robot's machine."""
     has_trace = row.outcome is not None or row.state == "running"
+    spec = ExperimentSpec.model_validate(row.spec)
     return Experiment(
         id=row.id,
         robot=row.robot,
-        spec=ExperimentSpec.model_validate(row.spec),
+        spec=spec,
         state=_state(row),
         priority=row.priority,
         at=row.at,
         schedule=row.schedule,
         submitted=row.submitted,
         submitted_by=row.submitted_by,
+        owner=row.owner,
+        content=digest_of(spec, row.at) if row.state == "queued" else "",
+        approval=approval_of(row),
         started=row.started,
         ended=row.ended,
         outcome=row.outcome,
         reason=row.reason,
         trace=row.trace if has_trace else None,
     )
+
+
+def _content(review: Review, row: ExperimentRow) -> str:
+    return review.content(digest_of(ExperimentSpec.model_validate(row.spec), row.at))
+
+
+def _authors(row: ExperimentRow) -> tuple[str, ...]:
+    return (row.owner, row.submitted_by, *([row.changed_by] if row.changed_by else []))
+
+
+def _may_begin(row: ExperimentRow, review: Review) -> bool:
+    return review.is_enough(given_to(row), _content(review, row), _authors(row))
+
+
+def _queued(session: Session, robot: str, identity: str) -> ExperimentRow:
+    row = _row(session, robot, identity)
+    if row.state != "queued":
+        line = f"{experiment_label(row)} is {row.state}"
+        raise conflict("experiment-state", line, "only an experiment that is queued can be changed or approved")
+    return row
 
 
 def _place_by_end(row: ExperimentRow) -> Cursor:

@@ -11,11 +11,13 @@ from sqlalchemy.orm import Session
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Schedule, ScheduleRequest
+from server.experiments.review import Given, Review, digest_of
 from server.experiments.schedule import Plan, following, is_due
 from server.problems import not_found
+from server.store.approvals import approval_of, approve, given_to, require_approvable, void
 from server.store.engine import Store
 from server.store.pages import newest_first
-from server.store.tables import ScheduleRow
+from server.store.tables import ExperimentRow, ScheduleRow
 
 
 class ScheduleStore:
@@ -66,6 +68,36 @@ class ScheduleStore:
             session.flush()
             return _schedule(row)
 
+    def approve(self, robot: str, identity: str, review: Review, given: Given, now: datetime) -> Schedule:
+        """Notes an approval, which all later runs have. Raises a 403 for one's own schedule, a 404, and a 409 if it is
+        not what the approval is for."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            schedule = _schedule(row)
+            what = f"the schedule of {schedule.spec.name or schedule.spec.trajectory.kind}"
+            require_approvable(given, review.content(schedule.content), (row.created_by,), what)
+            approve(row, given, now)
+            session.flush()
+            return _schedule(row)
+
+    def withdraw_approval(self, robot: str, identity: str) -> tuple[Schedule, str | None]:
+        """Ends an approval, and returns who had given it. Runs that wait keep theirs. Raises a 404."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            ended = void(row)
+            session.flush()
+            return _schedule(row), ended
+
+    def void_outdated(self, robot: str, review: Review) -> list[tuple[str, str]]:
+        """Ends approvals that are not enough any more, and returns each schedule with whoever had approved it."""
+        with self._store.writing() as session:
+            rows = session.scalars(
+                select(ScheduleRow).filter_by(robot=robot).where(ScheduleRow.approved_by.is_not(None))
+            )
+            found = [(row, review.content(_schedule(row).content)) for row in rows]
+            outdated = [row for row, now in found if not review.is_enough(given_to(row), now, (row.created_by,))]
+            return [(row.id, void(row) or "") for row in outdated]
+
     def remove(self, robot: str, identity: str) -> None:
         """Deletes a schedule; the experiments that it submitted stay. Raises a 404."""
         with self._store.writing() as session:
@@ -88,6 +120,14 @@ class ScheduleStore:
         with self._store.writing() as session:
             self.count_run(session, robot, identity, now)
 
+    def submit_run(self, session: Session, robot: str, identity: str, now: datetime, run: ExperimentRow) -> None:
+        """Counts the run that is due, and gives it the schedule's approval, in the transaction that makes it. Raises a
+        404."""
+        self.count_run(session, robot, identity, now)
+        row = _row(session, robot, identity)
+        if (given := given_to(row)) is not None and row.approved is not None:
+            approve(run, given, row.approved)
+
     def count_run(self, session: Session, robot: str, identity: str, now: datetime) -> None:
         """Counts the run that is due, in the transaction that makes it, and sets the next one. Raises a 404."""
         row = _row(session, robot, identity)
@@ -105,10 +145,11 @@ def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
 
 
 def _schedule(row: ScheduleRow) -> Schedule:
+    spec = ExperimentSpec.model_validate(row.spec)
     return Schedule(
         id=row.id,
         robot=row.robot,
-        spec=ExperimentSpec.model_validate(row.spec),
+        spec=spec,
         every=row.every,
         starts=row.starts,
         count=row.count,
@@ -118,6 +159,8 @@ def _schedule(row: ScheduleRow) -> Schedule:
         next=row.next if row.active else None,
         created=row.created,
         created_by=row.created_by,
+        content=digest_of(spec, None),
+        approval=approval_of(row),
     )
 
 

@@ -67,7 +67,16 @@ class Submitted:
     reason: Mapped[str] = mapped_column(Text, default="")
 
 
-class ExperimentRow(Submitted, Table):
+class Approvable:
+    """The columns of a review. `approved_content`: digest of what was approved; all are None without an approval."""
+
+    approved_content: Mapped[str | None] = mapped_column(String(64))
+    approved_by: Mapped[str | None]
+    approved_as_owner: Mapped[bool | None]
+    approved: Mapped[datetime | None]
+
+
+class ExperimentRow(Submitted, Approvable, Table):
     """One experiment."""
 
     __tablename__ = "experiments"
@@ -83,9 +92,13 @@ class ExperimentRow(Submitted, Table):
     outcome: Mapped[str | None] = mapped_column(String(16))
     trace: Mapped[str] = mapped_column(String(12), unique=True)
     """The number of its trace, chosen before it runs, so that the trace is found after a crash."""
+    owner: Mapped[str] = mapped_column(default="", server_default="")
+    """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule."""
+    changed_by: Mapped[str | None]
+    """Who wrote its present specification, if it was changed after it was submitted."""
 
 
-class ScheduleRow(Table):
+class ScheduleRow(Approvable, Table):
     """An experiment that is submitted at regular intervals."""
 
     __tablename__ = "schedules"
@@ -248,6 +261,30 @@ class EventRow(Table):
     text: Mapped[str] = mapped_column(Text)
     actor: Mapped[str | None]
     experiment: Mapped[str | None] = mapped_column(String(12))
+
+
+class SessionRow(Table):
+    """A session of a person who has signed in: the hash of its secret, their name and role, and when it ends."""
+
+    __tablename__ = "sessions"
+
+    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), index=True)
+    role: Mapped[str] = mapped_column(String(16))
+    created: Mapped[datetime]
+    expires: Mapped[datetime] = mapped_column(index=True)
+
+
+class PersonRow(Table):
+    """Somebody who has signed in, by the name of their first session. `subject`: the provider's number for them."""
+
+    __tablename__ = "people"
+    __table_args__ = (UniqueConstraint("issuer", "subject"),)
+
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    issuer: Mapped[str] = mapped_column(String(500))
+    subject: Mapped[str] = mapped_column(String(255))
+    since: Mapped[datetime]
 
 
 class TokenRow(Table):

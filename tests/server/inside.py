@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -61,12 +62,13 @@ def service_inside(
     monkeypatch: pytest.MonkeyPatch,
     database: str | None = None,
     archive: ArchiveSettings | None = None,
+    **robot: Any,
 ) -> Iterator[httpx.Client]:
     """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, in
-    `database`, and in `archive`."""
+    `database`, and in `archive`. robot: more of its section of the configuration."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder / "run"))
     settings = Settings(
-        robot=RobotSettings(port=MOCK),
+        robot=RobotSettings(**{"port": MOCK} | robot),
         traces=TraceSettings(folder=folder / "traces"),
         server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
         archive=archive or ArchiveSettings(),

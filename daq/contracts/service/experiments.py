@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, Field, StrictBool
+from pydantic import AwareDatetime, Field, StrictBool, model_validator
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.labels import Outcome
@@ -20,6 +20,9 @@ ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "in
 
 ExperimentOrder = Literal["submitted", "ended"]
 """Order of a list: the last submitted first; or only experiments that have ended, the last ended first."""
+
+Reviewer = Literal["operator", "owner"]
+"""Who must approve an experiment before it moves a real arm: another operator, or another owner of the robot."""
 
 Priority = Annotated[int, Field(ge=-100, le=100)]
 """Priority: the higher runs first; among equal ones, the one submitted first."""
@@ -44,9 +47,30 @@ class ExperimentPreset(Wire):
 
 
 class ExperimentChange(Wire):
-    """A new priority for a waiting experiment."""
+    """Changes of a waiting experiment; what is None stays. A new specification ends its approval."""
 
-    priority: Priority
+    priority: Priority | None = None
+    spec: ExperimentSpec | None = None
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> Self:
+        if self.priority is None and self.spec is None:
+            raise ValueError("changes nothing; give `priority` or `spec`")
+        return self
+
+
+class Approval(Wire):
+    """Who has approved an experiment or a schedule, and when. `as_owner`: whether they owned the robot."""
+
+    by: str
+    at: AwareDatetime
+    as_owner: bool
+
+
+class ApprovalRequest(Wire):
+    """Approves exactly the `content` that the caller has looked at: that of the experiment or schedule."""
+
+    content: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class Experiment(Wire):
@@ -62,6 +86,15 @@ class Experiment(Wire):
     """The schedule that submitted it."""
     submitted: AwareDatetime
     submitted_by: str
+    owner: str = ""
+    """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule. Empty at
+    an older service."""
+    content: str = ""
+    """While it waits: a digest of all that an approval is bound to. It changes with the specification, the start time,
+    the machine file and the limits."""
+    approval: Approval | None = None
+    needs_approval_of: Reviewer | None = None
+    """Whose approval it still needs before it may begin; None if it needs none, or has it."""
     started: AwareDatetime | None = None
     ended: AwareDatetime | None = None
     progress: float | None = None
@@ -109,6 +142,11 @@ class Schedule(Wire):
     """When the next run is due; None if there is none."""
     created: AwareDatetime
     created_by: str
+    content: str = ""
+    """A digest of all that an approval is bound to. Its runs have the approval of the schedule."""
+    approval: Approval | None = None
+    needs_approval_of: Reviewer | None = None
+    """Whose approval its runs still need; None if they need none, or have it."""
 
 
 class MotionPreview(Wire):

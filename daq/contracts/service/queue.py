@@ -8,7 +8,16 @@ from pydantic import AwareDatetime, StrictBool
 
 from daq.contracts.service.base import Wire
 
-Role = Literal["viewer", "operator"]
+Role = Literal["viewer", "operator", "owner", "admin"]
+"""Who may do what (docs/service.md): a viewer looks and stops; an operator moves the arm, and changes their own
+experiments; an owner is responsible for an arm, and changes everybody's; an admin is an owner of all arms."""
+ROLES: tuple[Role, ...] = ("viewer", "operator", "owner", "admin")
+"""All roles. Each may do everything that those before it may."""
+
+
+def role_of(text: str) -> Role:
+    """Returns the role of this name. One that this version does not know, but a newer one may, is a viewer."""
+    return next((role for role in ROLES if role == text), "viewer")
 
 
 class QueueStatus(Wire):

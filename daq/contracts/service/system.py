@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import AwareDatetime
+
 from daq.contracts.service.base import Wire
 from daq.contracts.service.queue import Role
 
@@ -26,6 +28,29 @@ class Me(Wire):
 
     name: str
     role: Role
+    owner_of: tuple[str, ...] = ()
+    """Robots of which they are an owner: there they may change and cancel everybody's experiments."""
+    session_until: AwareDatetime | None = None
+    """When they must sign in again; None for a token, and for a user of this computer."""
+
+
+class OpenIdWay(Wire):
+    """A provider of OpenID Connect. `start`: the address at this service that a browser opens to sign in."""
+
+    label: str
+    start: str
+
+
+class LoginWays(Wire):
+    """How people sign in besides by a token. `openid` is None where no provider is configured."""
+
+    openid: OpenIdWay | None = None
+
+
+class SignedOut(Wire):
+    """The session has ended. `provider`: where the provider's own session is left, if it has such an address."""
+
+    provider: str | None = None
 
 
 class StorageStatus(Wire):

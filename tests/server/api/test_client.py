@@ -142,7 +142,7 @@ def _why_lost(control: HeldControl) -> str:
 
 
 def test_what_the_service_is_and_who_calls(client: Client, robot: Robot) -> None:
-    assert client.me().role == "operator"
+    assert client.me().role == "owner"
     assert client.system().stop_port == int(client.url.rpartition(":")[2]) + 1
     assert robot.machine().name == "ma2000"
     assert set(robot.gains().gains) == {1, 2, 3, 4, 5, 6}

@@ -46,7 +46,7 @@ def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench) -> None:
 def test_an_experiment_is_made_only_with_the_count_of_its_run(bench: Bench) -> None:
     bench.queue = bench.begun_anew(look_every=AT_ONCE)
     schedule = bench.schedule()
-    bench.schedules.before("count_run", raising(FULL))
+    bench.schedules.before("submit_run", raising(FULL))
     bench.queue.start()
     bench.until(lambda event: "queued by schedule" in event)
     assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)

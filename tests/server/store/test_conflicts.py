@@ -74,5 +74,5 @@ def test_an_experiment_whose_priority_cannot_change_is_named(store: Store, name:
     experiments.begin(ROBOT, made.id, NOW)
     experiments.end(ROBOT, made.id, Event.COMPLETED, NOW, "", "complete")
     with pytest.raises(ProblemError) as refused:
-        experiments.set_priority(ROBOT, made.id, 1)
+        experiments.change(ROBOT, made.id, "anna", 1, None)
     assert str(refused.value) == f"experiment '{called}' of 2026-10-05 14:03 UTC is done"

@@ -633,9 +633,37 @@ export interface paths {
         head?: never;
         /**
          * Change Experiment
-         * @description Changes the priority of an experiment that still waits.
+         * @description Changes an experiment that still waits: one's own, or, for owners of the robot, anybody's.
+         *
+         *     A new specification is checked like that of a new experiment, and ends its approval.
          */
         patch: operations["change_experiment"];
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/experiments/{experiment}/approval": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Approve Experiment
+         * @description Approves exactly this content of a waiting experiment, so that it may move a real arm.
+         *
+         *     Whoever submitted or changed it cannot. It begins as soon as the queue lets it; a change ends the approval.
+         */
+        put: operations["approve_experiment"];
+        post?: never;
+        /**
+         * Withdraw Experiment Approval
+         * @description Ends the approval of an experiment that still waits. Every operator may.
+         */
+        delete: operations["withdraw_experiment_approval"];
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/v1/robots/{robot}/experiments/{experiment}/cancel": {
@@ -649,7 +677,9 @@ export interface paths {
         put?: never;
         /**
          * Cancel Experiment
-         * @description Cancels an experiment. One that runs is ended by a stop: the arm is frozen and needs a reset.
+         * @description Cancels an experiment: one's own, or, for owners of the robot, anybody's.
+         *
+         *     One that runs is ended by a stop: the arm is frozen and needs a reset.
          */
         post: operations["cancel_experiment"];
         delete?: never;
@@ -838,16 +868,40 @@ export interface paths {
         post?: never;
         /**
          * Delete Schedule
-         * @description Deletes a schedule. The experiments that it has submitted are kept.
+         * @description Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept.
          */
         delete: operations["delete_schedule"];
         options?: never;
         head?: never;
         /**
          * Change Schedule
-         * @description Switches a schedule on or off.
+         * @description Switches a schedule on or off: one's own, or, for owners of the robot, anybody's.
          */
         patch: operations["change_schedule"];
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/schedules/{schedule}/approval": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Approve Schedule
+         * @description Approves exactly this content of a schedule: its later runs may move a real arm. Its maker cannot.
+         */
+        put: operations["approve_schedule"];
+        post?: never;
+        /**
+         * Withdraw Schedule Approval
+         * @description Ends the approval of a schedule. Runs that wait keep theirs. Every operator may.
+         */
+        delete: operations["withdraw_schedule_approval"];
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/v1/robots/{robot}/control": {
@@ -1382,6 +1436,88 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/login": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Login Ways
+         * @description Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token.
+         */
+        get: operations["get_login_ways"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/login/start": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Start Login
+         * @description Sends the browser to the provider of OpenID Connect.
+         */
+        get: operations["start_login"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/login/callback": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Finish Login
+         * @description Takes the provider's answer, begins a session, and sends the browser to the page.
+         *
+         *     A refused answer leads to the page's sign-in, with the problem's kind in the address.
+         */
+        get: operations["finish_login"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/logout": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Log Out
+         * @description Ends the caller's session; a token stays. Returns where the provider's own session is left.
+         */
+        post: operations["log_out"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/me": {
         parameters: {
             query?: never;
@@ -1525,6 +1661,29 @@ export interface components {
             duration: number;
             /** Reason */
             reason: string;
+        };
+        /**
+         * Approval
+         * @description Who has approved an experiment or a schedule, and when. `as_owner`: whether they owned the robot.
+         */
+        Approval: {
+            /** By */
+            by: string;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** As Owner */
+            as_owner: boolean;
+        };
+        /**
+         * ApprovalRequest
+         * @description Approves exactly the `content` that the caller has looked at: that of the experiment or schedule.
+         */
+        ApprovalRequest: {
+            /** Content */
+            content: string;
         };
         /**
          * ArchiveOrder
@@ -2429,6 +2588,19 @@ export interface components {
             submitted: string;
             /** Submitted By */
             submitted_by: string;
+            /**
+             * Owner
+             * @default
+             */
+            owner?: string;
+            /**
+             * Content
+             * @default
+             */
+            content?: string;
+            approval?: components["schemas"]["Approval"] | null;
+            /** Needs Approval Of */
+            needs_approval_of?: ("operator" | "owner") | null;
             /** Started */
             started?: string | null;
             /** Ended */
@@ -2452,11 +2624,12 @@ export interface components {
         };
         /**
          * ExperimentChange
-         * @description A new priority for a waiting experiment.
+         * @description Changes of a waiting experiment; what is None stays. A new specification ends its approval.
          */
         ExperimentChange: {
             /** Priority */
-            priority: number;
+            priority?: number | null;
+            spec?: components["schemas"]["ExperimentSpec"] | null;
         };
         /**
          * ExperimentPreset
@@ -3701,6 +3874,13 @@ export interface components {
             messages: (components["schemas"]["SampleMessage"] | components["schemas"]["HistoryMessage"] | components["schemas"]["RecordEventMessage"] | components["schemas"]["RobotMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["QueueMessage"] | components["schemas"]["ProgressMessage"] | components["schemas"]["JobMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TeachingMessage"] | components["schemas"]["ThinnedMessage"] | components["schemas"]["RefusedMessage"])[];
         };
         /**
+         * LoginWays
+         * @description How people sign in besides by a token. `openid` is None where no provider is configured.
+         */
+        LoginWays: {
+            openid?: components["schemas"]["OpenIdWay"] | null;
+        };
+        /**
          * Machine
          * @description A machine file. `modelled_joints` are the joints (from 1) whose motion the model describes; the others are held
          *     and their mass is part of `load`, a point mass at the end of the last modelled link.
@@ -3753,7 +3933,14 @@ export interface components {
              * Role
              * @enum {string}
              */
-            role: "viewer" | "operator";
+            role: "viewer" | "operator" | "owner" | "admin";
+            /**
+             * Owner Of
+             * @default []
+             */
+            owner_of?: string[];
+            /** Session Until */
+            session_until?: string | null;
         };
         /**
          * MeasuredGain
@@ -4161,6 +4348,16 @@ export interface components {
             high: number;
             /** Changed */
             changed: boolean;
+        };
+        /**
+         * OpenIdWay
+         * @description A provider of OpenID Connect. `start`: the address at this service that a browser opens to sign in.
+         */
+        OpenIdWay: {
+            /** Label */
+            label: string;
+            /** Start */
+            start: string;
         };
         /**
          * OutputRequest
@@ -5264,6 +5461,14 @@ export interface components {
             created: string;
             /** Created By */
             created_by: string;
+            /**
+             * Content
+             * @default
+             */
+            content?: string;
+            approval?: components["schemas"]["Approval"] | null;
+            /** Needs Approval Of */
+            needs_approval_of?: ("operator" | "owner") | null;
         };
         /**
          * ScheduleChange
@@ -5409,6 +5614,14 @@ export interface components {
             after: number;
             /** Floor */
             floor: number;
+        };
+        /**
+         * SignedOut
+         * @description The session has ended. `provider`: where the provider's own session is left, if it has such an address.
+         */
+        SignedOut: {
+            /** Provider */
+            provider?: string | null;
         };
         /**
          * SimulateStudy
@@ -7260,6 +7473,58 @@ export interface operations {
             };
         };
     };
+    approve_experiment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ApprovalRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+        };
+    };
+    withdraw_experiment_approval: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+        };
+    };
     cancel_experiment: {
         parameters: {
             query?: never;
@@ -7568,6 +7833,58 @@ export interface operations {
                 "application/json": components["schemas"]["ScheduleChange"];
             };
         };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Schedule"];
+                };
+            };
+        };
+    };
+    approve_schedule: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                schedule: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ApprovalRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Schedule"];
+                };
+            };
+        };
+    };
+    withdraw_schedule_approval: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                schedule: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
@@ -8500,6 +8817,69 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Ticket"];
+                };
+            };
+        };
+    };
+    get_login_ways: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LoginWays"];
+                };
+            };
+        };
+    };
+    start_login: {
+        parameters: {
+            query?: {
+                /** @description What to show afterwards. */
+                robot?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: never;
+    };
+    finish_login: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: never;
+    };
+    log_out: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignedOut"];
                 };
             };
         };

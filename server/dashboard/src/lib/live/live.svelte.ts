@@ -99,7 +99,9 @@ class Live {
   isMissing: boolean = $derived(isMissing(this.socket, this.silence !== null));
   /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
   isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
-  isOperator: boolean = $derived(this.me?.role === 'operator');
+  isOperator: boolean = $derived(this.me !== null && this.me.role !== 'viewer');
+  /** Whether the caller may change what others have submitted to this robot. */
+  isOwner: boolean = $derived(this.me?.owner_of.includes(here().robot) ?? false);
   isRealArm: boolean = $derived(this.robot?.identity?.simulated === false);
   /** Whether something runs that is ended unless an operator says to be there. */
   needsAttendance: boolean = $derived(this.isRealArm && !this.isUnattended && !!this.queue?.running);
@@ -135,6 +137,11 @@ class Live {
   onMessage(call: (message: LiveMessage) => void): () => void {
     this.listeners.add(call);
     return () => this.listeners.delete(call);
+  }
+
+  /** Whether the caller may change and cancel what belongs to `owner`. */
+  mayChange(owner: string): boolean {
+    return this.isOperator && (this.isOwner || this.me?.name === owner);
   }
 
   /** Time of day at the service, ms since 1970. Reactive: it grows. */
@@ -198,7 +205,10 @@ class Live {
       ticket: () => {
         const ticket = given ?? newTicket();
         given = null;
-        return ticket;
+        return ticket.then(
+          (known) => this.admitted(known),
+          (error: unknown) => this.notAdmitted(error),
+        );
       },
       open: (ticket) => new WebSocket(`${location.origin.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
       wanted: () => ({
@@ -217,6 +227,18 @@ class Live {
         return () => clearTimeout(timer);
       },
     });
+  }
+
+  private admitted(ticket: string): string {
+    if (this.problem?.status === 401) this.problem = null;
+    return ticket;
+  }
+
+  /** A session that has ended, or a token that was revoked, leads to the sign-in. */
+  private notAdmitted(error: unknown): never {
+    const problem = asProblem(error);
+    if (problem.status === 401) this.problem = problem;
+    throw problem;
   }
 
   /** s of the past that this page does not have. */

@@ -71,6 +71,13 @@ export class QueueLists {
     this.loaded = true;
   }
 
+  /** Whether what waits at one place can be moved to another: all priorities that this changes are the caller's to change. */
+  mayMove(from: number, to: number): boolean {
+    if (to < 0 || to >= this.waiting.length) return false;
+    const owners = new Map(this.waiting.map((one) => [one.id, one.owner]));
+    return reordered(this.waiting, from, to)?.every(({ id }) => live.mayChange(owners.get(id) ?? '')) ?? true;
+  }
+
   /** Moves what waits at one place to another. */
   async move(from: number, to: number): Promise<void> {
     const changes = reordered(this.waiting, from, to);
@@ -92,6 +99,42 @@ export class QueueLists {
     const params = { path: { ...here(), experiment: id } };
     await this.change(() =>
       ask(api.POST('/api/v1/robots/{robot}/experiments/{experiment}/cancel', { params })),
+    );
+  }
+
+  /** Approves exactly what is shown: the service refuses it if it has changed meanwhile. */
+  async approve(one: Experiment | Schedule, isSchedule: boolean): Promise<void> {
+    const body = { content: one.content };
+    await this.change(() =>
+      isSchedule
+        ? ask(
+            api.PUT('/api/v1/robots/{robot}/schedules/{schedule}/approval', {
+              params: { path: { ...here(), schedule: one.id } },
+              body,
+            }),
+          )
+        : ask(
+            api.PUT('/api/v1/robots/{robot}/experiments/{experiment}/approval', {
+              params: { path: { ...here(), experiment: one.id } },
+              body,
+            }),
+          ),
+    );
+  }
+
+  async withdrawApproval(one: Experiment | Schedule, isSchedule: boolean): Promise<void> {
+    await this.change(() =>
+      isSchedule
+        ? ask(
+            api.DELETE('/api/v1/robots/{robot}/schedules/{schedule}/approval', {
+              params: { path: { ...here(), schedule: one.id } },
+            }),
+          )
+        : ask(
+            api.DELETE('/api/v1/robots/{robot}/experiments/{experiment}/approval', {
+              params: { path: { ...here(), experiment: one.id } },
+            }),
+          ),
     );
   }
 

@@ -1,0 +1,86 @@
+"""Sessions of people who have signed in: in the database, so that they outlast a restart, as hashes like tokens."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import delete, select
+
+from daq.contracts.service.queue import Role, role_of
+from server.access.caller import LOCAL, Caller
+from server.access.digest import digest_of
+from server.access.session_cookie import STOPS_FOR
+from server.problems import ProblemError
+from server.store.engine import Store
+from server.store.tables import PersonRow, SessionRow
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person as the provider names them. `subject`: the provider's own number, which never changes."""
+
+    issuer: str
+    subject: str
+    name: str
+    role: Role
+
+
+class SessionStore:
+    """Sessions, and the people who have ever signed in."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def begin(self, person: Person, now: datetime, lasts: timedelta) -> tuple[str, Caller]:
+        """Begins a session, and returns its secret, which is shown to nobody else, with its caller.
+
+        A person keeps the name of their first session. Raises a 403 for a name that somebody else has.
+        """
+        secret = secrets.token_urlsafe(32)
+        with self._store.writing() as session:
+            session.execute(delete(SessionRow).where(SessionRow.expires < now - timedelta(seconds=STOPS_FOR)))
+            row = session.scalar(select(PersonRow).filter_by(issuer=person.issuer, subject=person.subject))
+            if row is None:
+                if person.name == LOCAL.name or session.get(PersonRow, person.name) is not None:
+                    line = f"the name {person.name} belongs to somebody else"
+                    raise ProblemError(
+                        403, "name-taken", line, "choose another claim for names: server.oidc.name_claim"
+                    )
+                row = PersonRow(name=person.name, issuer=person.issuer, subject=person.subject, since=now)
+                session.add(row)
+            made = SessionRow(
+                digest=digest_of(secret), name=row.name, role=person.role, created=now, expires=now + lasts
+            )
+            session.add(made)
+            return secret, Caller(made.name, person.role, made.digest, made.expires)
+
+    def end(self, digest: str) -> None:
+        """Ends one session."""
+        with self._store.writing() as session:
+            session.execute(delete(SessionRow).where(SessionRow.digest == digest))
+
+    def end_all(self, name: str) -> int:
+        """Ends all sessions of a person, and returns how many there were."""
+        with self._store.writing() as session:
+            rows = list(session.scalars(select(SessionRow).filter_by(name=name)))
+            for row in rows:
+                session.delete(row)
+            return len(rows)
+
+    def all(self, now: datetime) -> list[Caller]:
+        """Returns the sessions that have not ended, the oldest first."""
+        query = select(SessionRow).where(SessionRow.expires > now).order_by(SessionRow.created)
+        with self._store.reading() as session:
+            return [_caller(row) for row in session.scalars(query)]
+
+    def callers(self, now: datetime) -> dict[str, Caller]:
+        """Returns the callers of all sessions by digest, also of those that have ended and may only stop the robot."""
+        query = select(SessionRow).where(SessionRow.expires > now - timedelta(seconds=STOPS_FOR))
+        with self._store.reading() as session:
+            return {row.digest: _caller(row) for row in session.scalars(query)}
+
+
+def _caller(row: SessionRow) -> Caller:
+    return Caller(row.name, role_of(row.role), row.digest, row.expires)

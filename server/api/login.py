@@ -1,0 +1,128 @@
+"""Routes of signing in by OpenID Connect, and of leaving."""
+
+from __future__ import annotations
+
+import logging
+from datetime import timedelta
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import RedirectResponse
+
+from daq.contracts.service.system import LoginWays, OpenIdWay, SignedOut
+from server.access.session_cookie import OVER_TLS, PLAIN
+from server.access.sign_in import GOOD_FOR
+from server.api.dependencies import ServicesDep, Viewer
+from server.problems import PROBLEMS, ProblemError, not_found
+from server.services import Services
+
+START = "/api/v1/login/start"
+ON_THE_WAY = "daq-sign-in"
+"""Name of the cookie that ties an answer of the provider to the browser that asked. It must come with a link from the
+provider's page, so it is `lax`; the session's cookie is `strict`."""
+router = APIRouter(tags=["system"], responses=PROBLEMS)
+log = logging.getLogger("server.access")
+
+
+@router.get("/login")
+async def get_login_ways(services: ServicesDep) -> LoginWays:
+    """Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token."""
+    if services.provider is None:
+        return LoginWays()
+    return LoginWays(openid=OpenIdWay(label=services.settings.server.oidc.label, start=START))
+
+
+@router.get("/login/start", status_code=303, response_class=RedirectResponse)
+async def start_login(
+    services: ServicesDep,
+    robot: Annotated[str, Query(pattern=r"^([a-z0-9][a-z0-9_-]{0,31})?$", description="What to show afterwards.")] = "",
+) -> Response:
+    """Sends the browser to the provider of OpenID Connect."""
+    provider = services.provider
+    if provider is None:
+        raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
+    try:
+        address, asked = await provider.ask(services.clock.monotonic())
+    except ProblemError as problem:
+        return _told(services, problem)
+    answer = RedirectResponse(address, 303)
+    word = services.sign_ins.begin(asked, robot)
+    _set_cookie(answer, services, ON_THE_WAY, word, int(GOOD_FOR), "lax", "/api/v1/login")
+    return answer
+
+
+@router.get("/login/callback", status_code=303, response_class=RedirectResponse)
+async def finish_login(services: ServicesDep, request: Request) -> Response:
+    """Takes the provider's answer, begins a session, and sends the browser to the page.
+
+    A refused answer leads to the page's sign-in, with the problem's kind in the address.
+    """
+    provider = services.provider
+    if provider is None:
+        raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
+    given = dict(request.query_params)
+    way = services.sign_ins.back(given.get("state", ""), request.cookies.get(ON_THE_WAY, ""))
+    if way is None:
+        line = "this answer of the provider was used, is too old, or was asked for by another browser"
+        return _told(services, ProblemError(403, "sign-in-unknown", line, "begin anew"))
+    try:
+        person = await provider.answered(way.asked, given, services.clock.monotonic())
+        lasts = timedelta(hours=services.settings.server.oidc.hours)
+        secret, caller = await run_in_threadpool(services.sessions.begin, person, services.clock.utc(), lasts)
+    except ProblemError as problem:
+        return _told(services, problem)
+    log.info("%s (%s) has signed in", caller.name, caller.role)
+    services.signed_in(caller)
+    answer = RedirectResponse(f"/?robot={way.robot}" if way.robot else "/", 303)
+    _forget_cookie(answer, services, ON_THE_WAY, "/api/v1/login")
+    _set_cookie(answer, services, session_cookie(services), secret, int(lasts.total_seconds()), "strict", "/")
+    return answer
+
+
+@router.post("/logout")
+async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> SignedOut:
+    """Ends the caller's session; a token stays. Returns where the provider's own session is left."""
+    address = None
+    if caller.expires is not None and caller.token is not None:
+        await run_in_threadpool(services.sessions.end, caller.token)
+        services.signed_out(caller)
+        log.info("%s has signed out", caller.name)
+        if services.provider is not None:
+            address = await services.provider.sign_out_address(services.clock.monotonic())
+    _forget_cookie(response, services, session_cookie(services), "/")
+    return SignedOut(provider=address)
+
+
+def session_cookie(services: Services) -> str:
+    """Returns the name of the session's cookie."""
+    return OVER_TLS if _is_over_tls(services) else PLAIN
+
+
+def _is_over_tls(services: Services) -> bool:
+    return (services.settings.server.oidc.address or "").startswith("https://")
+
+
+def _set_cookie(
+    answer: Response, services: Services, name: str, value: str, seconds: int, same_site: str, path: str
+) -> None:
+    answer.set_cookie(
+        name,
+        value,
+        max_age=seconds,
+        path=path,
+        secure=_is_over_tls(services),
+        httponly=True,
+        samesite=same_site,  # type: ignore[arg-type]
+    )
+
+
+def _forget_cookie(answer: Response, services: Services, name: str, path: str) -> None:
+    answer.delete_cookie(name, path=path, secure=_is_over_tls(services), httponly=True)
+
+
+def _told(services: Services, problem: ProblemError) -> Response:
+    """Sends the browser to the page's sign-in, which has words for each kind of problem; the log has the details."""
+    log.warning("sign-in: %s: %s", problem.kind, problem.detail)
+    services.metrics.count_refusal(problem.kind)
+    return RedirectResponse(f"/?sign-in={problem.kind}", 303)

@@ -1,0 +1,141 @@
+"""Roles and ownership, through HTTP: who may change and cancel whose experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from alembic import command
+from sqlalchemy import text
+
+from server.clock import SystemClock
+from server.problems import ProblemError
+from server.store.engine import Store, migrations
+from server.store.experiments import ExperimentStore
+from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at
+from tests.server.inside import service_inside
+
+PEOPLE = {"vera": "viewer", "anna": "operator", "bert": "operator", "olga": "owner", "ada": "admin"}
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
+    """A service whose robot every owner owns."""
+    with service_inside(tmp_path, SystemClock(), monkeypatch) as client:
+        yield client
+
+
+@pytest.fixture
+def people(robot: httpx.Client, tmp_path: Path) -> dict[str, Person]:
+    """One of each role, and a second operator."""
+    return people_at(robot, tmp_path, PEOPLE)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("name", "owned"), [("vera", []), ("anna", []), ("olga", ["ma2000"]), ("ada", ["ma2000"])])
+def test_everybody_is_told_their_role_and_their_arms(people: dict[str, Person], name: str, owned: list[str]) -> None:
+    assert people[name].me() == {"name": name, "role": PEOPLE[name], "owner_of": owned}
+
+
+def test_an_operator_changes_and_cancels_their_own(people: dict[str, Person]) -> None:
+    own = people["anna"].submit()
+    assert people["anna"].ask("PATCH", f"/experiments/{own}", {"priority": 7}).json()["priority"] == 7
+    assert people["anna"].ask("POST", f"/experiments/{own}/cancel").json()["state"] == "cancelled"
+
+
+@pytest.mark.parametrize("name", ["bert", "vera"])
+def test_others_change_nothing_of_it(people: dict[str, Person], name: str) -> None:
+    annas = people["anna"].submit()
+    kind = "operator-needed" if name == "vera" else "owner-needed"
+    assert kind_of(people[name].ask("PATCH", f"/experiments/{annas}", {"priority": 7})) == (403, kind)
+    assert kind_of(people[name].ask("POST", f"/experiments/{annas}/cancel")) == (403, kind)
+    found = people["anna"].ask("GET", f"/experiments/{annas}").json()
+    assert (found["state"], found["priority"], found["owner"]) == ("queued", 0, "anna")
+
+
+@pytest.mark.parametrize("name", ["olga", "ada"])
+def test_owners_and_admins_change_anybody_s(people: dict[str, Person], name: str) -> None:
+    annas = people["anna"].submit()
+    assert people[name].ask("PATCH", f"/experiments/{annas}", {"priority": -3}).status_code == 200
+    assert people[name].ask("POST", f"/experiments/{annas}/cancel").json()["state"] == "cancelled"
+
+
+def test_a_schedule_has_an_owner_too_and_so_have_its_runs(people: dict[str, Person]) -> None:
+    made = people["anna"].ask("POST", "/schedules", {"spec": SPEC, "every": 86400}).json()
+    while not (runs := people["bert"].ask("GET", f"/experiments?schedule={made['id']}").json()["items"]):
+        pass  # the queue submits it
+    assert (runs[0]["owner"], runs[0]["submitted_by"]) == ("anna", f"schedule {made['id']}")
+    path = f"/schedules/{made['id']}"
+    assert kind_of(people["bert"].ask("PATCH", path, {"active": False})) == (403, "owner-needed")
+    assert kind_of(people["bert"].ask("DELETE", path)) == (403, "owner-needed")
+    assert people["anna"].ask("PATCH", path, {"active": False}).json()["active"] is False
+    assert people["olga"].ask("DELETE", path).status_code == 204
+
+
+@pytest.mark.parametrize("name", PEOPLE)
+def test_everybody_who_may_look_may_stop(people: dict[str, Person], name: str) -> None:
+    assert people[name].ask("POST", "/stop").json()["note"] == "no robot is connected"
+
+
+def test_an_arm_may_name_its_owners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with service_inside(tmp_path, SystemClock(), monkeypatch, owners=("olga",)) as robot:
+        people = people_at(robot, tmp_path, {"olga": "owner", "otto": "owner", "ada": "admin", "anna": "operator"})
+        annas = people["anna"].submit()
+        assert people["otto"].me()["owner_of"] == []
+        assert kind_of(people["otto"].ask("POST", f"/experiments/{annas}/cancel")) == (403, "owner-needed")
+        assert kind_of(robot.post(f"/experiments/{annas}/cancel")) == (403, "owner-needed")  # a user of this computer
+        assert people["olga"].ask("PATCH", f"/experiments/{annas}", {"priority": 1}).status_code == 200
+        assert people["ada"].ask("POST", f"/experiments/{annas}/cancel").status_code == 200
+
+
+def test_a_user_of_this_computer_owns_the_arm_unless_it_names_its_owners(
+    robot: httpx.Client, people: dict[str, Person]
+) -> None:
+    assert robot.post(f"/experiments/{people['anna'].submit()}/cancel").status_code == 200
+
+
+def test_a_database_of_before_keeps_roles_and_its_experiments_get_their_owners(tmp_path: Path) -> None:
+    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    config = migrations()
+    with store.engine.connect() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0008")
+        new = "INSERT INTO tokens (id, name, role, digest, created) VALUES"
+        connection.execute(
+            text(f"{new} ('1', 'anna', 'operator', 'x', '2026-01-01'), ('2', 'vera', 'viewer', 'y', '2026-01-01')")
+        )
+        connection.execute(
+            text(
+                "INSERT INTO schedules (id, robot, spec, every, starts, priority, active, submitted_runs, created, "
+                "created_by) VALUES ('s', 'ma2000', '{}', 60, '2026-01-01', 0, 0, 1, '2026-01-01', 'bert')"
+            )
+        )
+        columns = "id, robot, state, submitted, submitted_by, reason, spec, priority, trace, schedule"
+        begun = f"INSERT INTO experiments ({columns})"
+        connection.execute(
+            text(
+                f"{begun} VALUES ('a', 'ma2000', 'queued', '2026-01-01', 'anna', '', '{{}}', 0, 'a', NULL), "
+                "('b', 'ma2000', 'done', '2026-01-01', 'schedule s', '', '{}', 0, 'b', 's'), "
+                "('c', 'ma2000', 'done', '2026-01-01', 'schedule t', '', '{}', 0, 'c', 't')"
+            )
+        )
+        connection.commit()
+    store.migrate()
+    with store.reading() as session:
+        assert dict(session.execute(text("SELECT name, role FROM tokens")).all()) == {  # type: ignore[arg-type]
+            "anna": "operator",
+            "vera": "viewer",
+        }
+    experiments = ExperimentStore(store)
+    assert [experiments.get("ma2000", one).owner for one in "abc"] == ["anna", "bert", "schedule t"]
+    with pytest.raises(ProblemError):
+        experiments.get("ma2000", "d")
+    store.close()
+
+
+def test_a_fleet_s_experiment_belongs_to_whoever_submits_it(people: dict[str, Person]) -> None:
+    url = people["anna"].robot.base_url.copy_with(path="/api/v1/fleet/experiments")
+    body = {"request": {"spec": SPEC, "at": LATER}}
+    made = people["anna"].robot.post(url, json=body, headers=people["anna"].headers).json()["experiments"]
+    assert [one["owner"] for one in made] == ["anna"]
