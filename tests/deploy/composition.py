@@ -1,6 +1,6 @@
 """deploy/compose.yaml as plain processes: its commands, environments, ports and order, without containers.
 
-A container's address is one of its own on the loopback network, so ports are those of the file; its volumes are folders.
+Each container's address is one of the loopback network, so ports are those of the file; its volumes are folders.
 The images that are not built here have stand-ins: PostgreSQL is Debian's server, the object store is moto's.
 """
 
@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import httpx
 import yaml
 
 from tests.repository.tracked import ROOT
@@ -28,7 +29,8 @@ FILE = ROOT / "deploy" / "compose.yaml"
 CONTAINERFILE = ROOT / "deploy" / "Containerfile"
 OWN_IMAGE = "localhost/ma2000-daq:0.1.0"
 SECRETS = {"DATABASE_PASSWORD": "of-a-test", "ARCHIVE_ACCESS_KEY": "AKIDOFATEST", "ARCHIVE_SECRET_KEY": "a-secret"}
-HEALTHY_WITHIN = 60.0
+RAMP = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.4}, "joints": [2], "settle": 0.2, "hold": 0.2}
+"""An experiment of a second."""
 ENDS_WITHIN = 30.0
 
 
@@ -194,6 +196,14 @@ STAND_INS: Mapping[str, Callable[[Composition, str], Any]] = {
     "docker.io/library/postgres": _database,
     "docker.io/versity/versitygw": _objects,
 }
+
+
+def ended(api: httpx.Client, path: str) -> dict[str, Any]:
+    """Waits until an experiment or a job has ended; the test's own time limit ends the wait."""
+    while True:
+        found: dict[str, Any] = api.get(path, params={"wait": 30}).json()
+        if found["state"] not in ("queued", "running"):
+            return found
 
 
 @contextmanager

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,62 +17,16 @@ import pytest
 from distributed import Client
 
 from daq.traces.reader import read_trace
-from tests.deploy.composition import OWN_IMAGE, SECRETS, Composition, as_processes, composition, image
+from tests.deploy.composition import OWN_IMAGE, RAMP, SECRETS, Composition, composition, ended, image
 from tests.repository.tracked import ROOT
-from tests.server import postgresql
 
 SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
-RAMP = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.4}, "joints": [2], "settle": 0.2, "hold": 0.2}
 LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 60.0}, "joints": [2]}
-MOCK = "mock://?lock_step=1&seed=3"
-"""What its arm does depends on no clock, however busy this computer is."""
-
-
-@pytest.fixture(scope="module")
-def composed() -> Iterator[Composition]:
-    """The composition, of which nothing runs yet."""
-    if postgresql.programs() is None:
-        pytest.skip("needs a PostgreSQL server: apt install postgresql")
-    with as_processes({"service": {"DAQ_ROBOT__PORT": MOCK}}) as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def token(composed: Composition) -> str:
-    """An operator's, made as the file's head says, before the service is there."""
-    head = (ROOT / "deploy" / "compose.yaml").read_text("utf-8").partition("\nname:")[0]
-    (command,) = re.findall(r"run --rm service (daq token add .*)", head)
-    return composed.run("service", *command.split()).split()[-1]
-
-
-@pytest.fixture(scope="module")
-def running(composed: Composition, token: str) -> Composition:
-    """The service of the file and all that it depends on, each started when the file says."""
-    composed.start("service")
-    composed.until_healthy("service")
-    return composed
-
-
-@pytest.fixture
-def api(running: Composition, token: str) -> Iterator[httpx.Client]:
-    """The robot's part of the API, its robot connected and its queue open."""
-    url = f"http://{running.address('service')}:8300/api/v1/robots/ma2000"
-    with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {token}"}, timeout=100) as client:
-        client.post("/connect").raise_for_status()
-        client.post("/queue/resume", json={}).raise_for_status()
-        yield client
-
-
-def _ended(api: httpx.Client, path: str) -> dict[str, Any]:
-    while True:
-        found: dict[str, Any] = api.get(path, params={"wait": 30}).json()
-        if found["state"] not in ("queued", "running"):
-            return found
 
 
 @pytest.mark.timeout(240)
 def test_an_experiment_is_recorded_archived_and_fitted_by_the_worker(running: Composition, api: httpx.Client) -> None:
-    made = _ended(api, f"/experiments/{api.post('/experiments', json={'spec': RAMP}).json()['id']}")
+    made = ended(api, f"/experiments/{api.post('/experiments', json={'spec': RAMP}).json()['id']}")
     assert made["state"] == "done", made
     while api.get(f"/traces/{made['trace']}/archive").json()["archived"] is None:
         assert running.processes["service"].poll() is None
@@ -83,7 +36,7 @@ def test_an_experiment_is_recorded_archived_and_fitted_by_the_worker(running: Co
     assert file.read_bytes() in stored.values()
 
     request = {"kind": "fit", "traces": [made["trace"]], "parameters": ["joint2.*viscous*"]}
-    job = _ended(api, f"/jobs/{api.post('/jobs', json=request).json()['id']}")
+    job = ended(api, f"/jobs/{api.post('/jobs', json=request).json()['id']}")
     assert job["state"] == "done", job
     with Client(f"tcp://{running.address('scheduler')}:8786", set_as_default=False) as dask:
         kept = dask.run_on_scheduler(_ends_of_tasks)
@@ -127,9 +80,9 @@ def test_a_killed_service_leaves_a_whole_trace_before_its_container_ends(
     assert list(traces.rglob("*.part")) == []
     running.start("service")
     running.until_healthy("service")
-    ended = api.get(f"/experiments/{made}").json()
-    assert ended["state"] == "interrupted"
-    (file,) = traces.rglob(f"*{ended['trace']}*.mcap")
+    interrupted = api.get(f"/experiments/{made}").json()
+    assert interrupted["state"] == "interrupted"
+    (file,) = traces.rglob(f"*{interrupted['trace']}*.mcap")
     assert len(read_trace(file).position) > 0
     assert api.get("/queue").json()["paused"]
 
@@ -173,7 +126,8 @@ def test_what_is_written_lies_in_a_volume_or_in_memory(name: str) -> None:
 def test_each_image_is_pinned_to_a_version() -> None:
     base = re.findall(r"^ARG BASE=(\S+)$", (ROOT / "deploy" / "Containerfile").read_text("utf-8"), re.MULTILINE)
     images = {*base, *(one["image"] for one in SERVICES.values())}
-    assert all(re.fullmatch(r"[a-z.]+/[a-z0-9/-]+:v?\d+\.\d+(\.\d+)?(-[a-z]+)?(@sha256:[0-9a-f]{64})?", one) for one in images)
+    pinned = re.compile(r"[a-z.]+/[a-z0-9/-]+:v?\d+\.\d+(\.\d+)?(-[a-z]+)?(@sha256:[0-9a-f]{64})?")
+    assert [one for one in images if not pinned.fullmatch(one)] == []
 
 
 def test_the_image_has_the_version_of_the_package() -> None:
@@ -184,7 +138,8 @@ def test_the_image_has_the_version_of_the_package() -> None:
 def test_linters_of_others_find_nothing() -> None:
     hadolint = shutil.which("hadolint", path=Path(sys.executable).parent)
     schema = shutil.which("check-jsonschema", path=Path(sys.executable).parent)
-    assert hadolint and schema
+    assert hadolint
+    assert schema
     for command in (
         [hadolint, "--failure-threshold", "style", "deploy/Containerfile"],
         [schema, "--builtin-schema", "vendor.compose-spec", "deploy/compose.yaml"],
