@@ -32,7 +32,7 @@ def token(composed: Composition) -> str:
     return composed.run("service", *command.split()).split()[-1]
 
 
-@pytest.fixture
+@pytest.fixture(scope="package")
 def running(composed: Composition, token: str) -> Composition:
     """The service of the file and all that it depends on, each started when the file says."""
     composed.start("service")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -16,12 +14,10 @@ import psycopg
 import pytest
 from distributed import Client
 
-from daq.traces.reader import read_trace
 from tests.deploy.composition import OWN_IMAGE, RAMP, SECRETS, Composition, composition, ended, image
 from tests.repository.tracked import ROOT
 
 SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
-LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 60.0}, "joints": [2]}
 
 
 @pytest.mark.timeout(240)
@@ -62,35 +58,6 @@ def test_who_has_no_token_is_refused_and_the_stop_listener_answers(running: Comp
     assert httpx.post(stop).status_code == 401
     assert httpx.post(stop, headers=api.headers).json()["confirmed"]
     assert api.post("/reset", json={}).is_success
-
-
-@pytest.mark.timeout(240)
-def test_a_killed_service_leaves_a_whole_trace_before_its_container_ends(
-    running: Composition, api: httpx.Client
-) -> None:
-    made = api.post("/experiments", json={"spec": LONG}).json()["id"]
-    while " of " not in api.get(f"/experiments/{made}", params={"wait": 0.2}).json()["progress_text"]:
-        assert running.processes["service"].poll() is None
-    first = running.processes.pop("service")
-    children = Path(f"/proc/{first.pid}/task/{first.pid}/children").read_text("utf-8").split()
-    (service,) = (int(child) for child in children if b"serve" in Path(f"/proc/{child}/cmdline").read_bytes())
-    os.kill(service, signal.SIGKILL)
-    assert first.wait(30) == 128 + signal.SIGKILL
-    traces = running.folder / "data" / "traces"
-    assert list(traces.rglob("*.part")) == []
-    running.start("service")
-    running.until_healthy("service")
-    interrupted = api.get(f"/experiments/{made}").json()
-    assert interrupted["state"] == "interrupted"
-    (file,) = traces.rglob(f"*{interrupted['trace']}*.mcap")
-    assert len(read_trace(file).position) > 0
-    assert api.get("/queue").json()["paused"]
-
-
-def test_it_ends_with_its_container_in_order(running: Composition) -> None:
-    running.start("service")
-    running.until_healthy("service")
-    assert running.end("service") == 0
 
 
 @pytest.mark.parametrize("name", SERVICES)
