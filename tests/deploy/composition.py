@@ -115,9 +115,8 @@ class Composition:
         """As `compose run --rm NAME COMMAND`: what it has printed."""
         self._start_needed(name)
         words = self.words(name, [*image()["entrypoint"], *command])
-        done = subprocess.run(
-            words, env=self.environment(name), cwd=self.folder, capture_output=True, text=True, timeout=60, check=False
-        )
+        environment = self.environment(name)
+        done = subprocess.run(words, env=environment, cwd=self.folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done
         return done.stdout
 
@@ -129,7 +128,7 @@ class Composition:
         service = self.services[name]
         if service["image"] == OWN_IMAGE:
             words = self.words(name, [*image()["entrypoint"], *service.get("command", image()["command"])])
-            process = subprocess.Popen(words, env=self.environment(name), cwd=self.folder, stdout=subprocess.DEVNULL)
+            process = subprocess.Popen(words, env=self.environment(name), cwd=self.folder, stdout=subprocess.PIPE)
             self.processes[name] = process
             self.ended.callback(_end, process)
         else:
@@ -149,12 +148,17 @@ class Composition:
             assert condition == "service_started"
 
     def until_healthy(self, name: str) -> None:
-        """Carries out a service's health check until it succeeds; the test's own time limit ends the wait."""
+        """Carries out a service's health check until it succeeds; the test's own time limit ends the wait. Ours says a
+        line when it is ready: before that there is nothing to check."""
+        process = self.processes.get(name)
+        if process is not None and process.stdout is not None and not process.stdout.closed:
+            process.stdout.readline()
+            process.stdout.close()
         _cmd, *command = self.services[name]["healthcheck"]["test"]
         assert _cmd == "CMD"
         words, environment = self.words(name, command), self.environment(name)
         while subprocess.run(words, env=environment, cwd=self.folder, capture_output=True, check=False).returncode:
-            assert name not in self.processes or self.processes[name].poll() is None, f"{name} has ended"
+            assert process is None or process.poll() is None, f"{name} has ended"
 
     def end(self, name: str) -> int:
         """As `compose stop NAME`: the exit code."""
@@ -164,6 +168,8 @@ class Composition:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
+    assert process.stdout is not None
+    process.stdout.close()
     process.terminate()
     try:
         process.wait(ENDS_WITHIN)

@@ -20,7 +20,7 @@ from tests.repository.tracked import ROOT
 SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(400)
 def test_an_experiment_is_recorded_archived_and_fitted_by_the_worker(running: Composition, api: httpx.Client) -> None:
     made = ended(api, f"/experiments/{api.post('/experiments', json={'spec': RAMP}).json()['id']}")
     assert made["state"] == "done", made
