@@ -161,7 +161,7 @@ def test_a_real_prometheus_reads_the_service_and_evaluates_everything(
     program = shutil.which("prometheus")
     if program is None:
         pytest.skip("needs Prometheus: apt install prometheus")
-    address = f"{running.network}.250:9090"
+    address = f"{running.network}.250:19090"
     file = _configuration(tmp_path, f"{running.address('service')}:8300", token)
     words = [f"--config.file={file}", f"--storage.tsdb.path={tmp_path / 'data'}", f"--web.listen-address={address}"]
     with subprocess.Popen([program, *words], stderr=subprocess.DEVNULL) as process:

@@ -38,7 +38,7 @@ def test_a_killed_service_leaves_a_whole_trace_before_its_container_ends(
     running.until_healthy("service")
     interrupted = api.get(f"/experiments/{made}").json()
     assert interrupted["state"] == "interrupted"
-    (file,) = traces.rglob(f"*{interrupted['trace']}*.mcap")
+    file = traces / api.get(f"/traces/{interrupted['trace']}").json()["entry"]["file"]
     assert len(read_trace(file).position) > 0
     assert api.get("/queue").json()["paused"]
     assert running.end("service") == 0
