@@ -14,6 +14,7 @@ AGAINST_THE_CLOCK = (
     "daq_cli",
     "daq/client",
     "daq/transport",
+    "deploy",
     "mock/process",
     "server",
 )
@@ -21,7 +22,7 @@ AGAINST_THE_CLOCK = (
 fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. They
 are tried again, and the summary names each that was: one that comes up again and again is a race, not a busy machine.
 What runs on a real arm is never repeated by itself."""
-ONE_WORKER = ("server/dashboard", "server/jobs", "server", "model/thesis")
+ONE_WORKER = ("server/dashboard", "server/jobs", "server", "deploy", "model/thesis")
 """Folders whose tests share a service, a browser or a reproduction of the thesis, each costly to make: one worker runs
 the whole folder."""
 

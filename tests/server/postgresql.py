@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 DEBIAN = Path("/usr/lib/postgresql")
-FAST = ("fsync=off", "synchronous_commit=off", "full_page_writes=off", "listen_addresses=")
+FAST = ("fsync=off", "synchronous_commit=off", "full_page_writes=off")
 """Settings of a server whose data nobody needs after a power cut."""
 
 
@@ -26,10 +26,12 @@ def programs() -> Path | None:
 
 
 class PostgresServer:
-    """A running server. PostgreSQL refuses to run as root, who starts it as the user `postgres`, then."""
+    """A running server. PostgreSQL refuses to run as root, who starts it as the user `postgres`, then. It listens at a
+    socket, and at `host` and `port` where these are given."""
 
-    def __init__(self, folder: Path, programs: Path) -> None:
+    def __init__(self, folder: Path, programs: Path, host: str = "", port: int = 5432) -> None:
         self._programs = programs
+        self._settings = (*FAST, f"listen_addresses={host}", f"port={port}")
         self._data, self._sockets = folder / "data", folder / "sockets"
         self._user = "postgres" if os.geteuid() == 0 else None
         self.name = self._user or pwd.getpwuid(os.geteuid()).pw_name
@@ -37,13 +39,24 @@ class PostgresServer:
             made.mkdir(mode=0o700)
             if self._user is not None:
                 shutil.chown(made, self._user)
-        self._run("initdb", "--pgdata", str(self._data), "--auth", "trust", "--encoding", "UTF8", "--no-sync")
+        self._run(
+            "initdb",
+            "--pgdata",
+            str(self._data),
+            "--auth",
+            "trust",
+            "--auth-host",
+            "scram-sha-256",
+            "--encoding",
+            "UTF8",
+            "--no-sync",
+        )
         self._made = 0
         self.start()
 
     def start(self) -> None:
         """Starts the server, and waits until it takes connections."""
-        options = " ".join(f"-c {setting}" for setting in (*FAST, f"unix_socket_directories={self._sockets}"))
+        options = " ".join(f"-c {setting}" for setting in (*self._settings, f"unix_socket_directories={self._sockets}"))
         self._ctl("start", "--wait", "--silent", "--options", options, "--log", str(self._sockets / "log"))
 
     def stop(self) -> None:
@@ -57,6 +70,12 @@ class PostgresServer:
         self._run("createdb", "--host", str(self._sockets), "--template", template, name)
         return self.address(name)
 
+    def make(self, user: str, password: str, database: str) -> None:
+        """Makes a user, and a database that belongs to it."""
+        role = f"CREATE ROLE {user} LOGIN PASSWORD '{password}'"
+        for line in (role, f"CREATE DATABASE {database} OWNER {user}"):
+            self._run("psql", "--host", str(self._sockets), "--dbname", "postgres", "--command", line)
+
     def address(self, name: str) -> str:
         """Returns the address of a database of this server."""
         return f"postgresql+psycopg://{self.name}@/{name}?host={self._sockets}"
@@ -66,7 +85,7 @@ class PostgresServer:
 
     def _run(self, program: str, *arguments: str) -> None:
         command = [str(self._programs / program), *arguments]
-        if self._user is not None and program == "createdb":
+        if self._user is not None and program in ("createdb", "psql"):
             command[1:1] = ["--username", self._user]
         ended = subprocess.run(
             command, user=self._user, cwd="/", capture_output=True, text=True, check=False, env={"LC_ALL": "C.UTF-8"}
@@ -76,11 +95,11 @@ class PostgresServer:
 
 
 @contextmanager
-def running_postgresql(programs: Path) -> Iterator[PostgresServer]:
+def running_postgresql(programs: Path, host: str = "", port: int = 5432) -> Iterator[PostgresServer]:
     """A server in a folder of its own, which is gone afterwards. A socket's path must be short."""
     with tempfile.TemporaryDirectory(prefix="pg-", ignore_cleanup_errors=True) as folder:
         Path(folder).chmod(0o755)
-        server = PostgresServer(Path(folder), programs)
+        server = PostgresServer(Path(folder), programs, host, port)
         try:
             yield server
         finally:

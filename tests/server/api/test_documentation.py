@@ -22,25 +22,3 @@ def test_every_setting_is_in_the_guide() -> None:
     section = GUIDE.split("[server]\n")[1].split("```")[0]
     named = set(re.findall(r"^(\w+) =", section, re.MULTILINE))
     assert named == set(ServiceSettings.model_fields) - {"database"}
-
-
-def test_the_unit_keeps_what_the_guide_says() -> None:
-    unit = (ROOT / "deploy" / "ma2000-daq.service").read_text("utf-8")
-    # Else the owner of the port would freeze an idle arm at every stop of the service (control-group), or be killed
-    # before it has frozen a moving one (mixed).
-    assert "KillMode=process" in unit
-    assert "DAQ_RUNTIME_FOLDER=/run/ma2000-daq" in unit
-    assert "UMask=0077" in unit
-
-
-def test_the_stop_command_of_the_guide_is_that_of_the_unit() -> None:
-    unit = (ROOT / "deploy" / "ma2000-daq.service").read_text("utf-8")
-    started = re.search(r"^ExecStart=(.*) serve$", unit, re.MULTILINE)
-    folder = re.search(r"^Environment=(.*)$", unit, re.MULTILINE)
-    user = re.search(r"^User=(.*)$", unit, re.MULTILINE)
-    assert started is not None
-    assert folder is not None
-    assert user is not None
-    escaped = folder[1].replace("=", r"\=")  # as sudoers(5) wants it
-    assert f"sudo -u {user[1]} env {folder[1]} {started[1]} stop\n" in GUIDE
-    assert f"ALL=({user[1]}) NOPASSWD: /usr/bin/env {escaped} {started[1]} stop\n" in GUIDE
