@@ -15,6 +15,7 @@ from server import problems
 from server.access.gate import Gate
 from server.api import (
     archive,
+    audit,
     controller,
     description,
     experiments,
@@ -89,6 +90,7 @@ def bare_app(services: Services | None) -> FastAPI:
         traces,
         archive,
         jobs,
+        audit,
         live,
         system,
     ):

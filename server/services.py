@@ -28,6 +28,10 @@ from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.archive.bucket import Bucket, open_bucket
 from server.archive.service import ArchiveContext, ArchiveService
+from server.audit.configuration import begun
+from server.audit.log import AuditLog
+from server.audit.request import Audit
+from server.audit.writer import AuditWriter
 from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
@@ -65,6 +69,8 @@ from server.store.traces import TraceStore
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
 robot's port finishes alone if it needs longer."""
+AUDIT_KEPT, AUDIT_WITHIN = "audit-waiting.jsonl", 0.5
+"""File of the rows that could not be written before the service ended, and the time (s) to write them then."""
 log = logging.getLogger("server")
 
 
@@ -84,6 +90,7 @@ class RobotServices:
     models: Models
     unattended: bool
     archive: ArchiveService | None
+    audit: Audit
 
     def status(self) -> RobotStatus:
         """The status of the robot now."""
@@ -123,6 +130,8 @@ class Services:
         self.programs = ProgramStore(self.store)
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
+        self.audit_log = AuditLog(self.store)
+        self.audit = Audit(AuditWriter(self.audit_log, self.folder / AUDIT_KEPT), self.clock.utc)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
         self.stop_port = 0
@@ -140,6 +149,7 @@ class Services:
         self.comparisons = Comparisons(self.jobs)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
+        self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
         """Returns all robots, in the order of the configuration."""
@@ -183,6 +193,7 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
+        self.audit.writer.close(AUDIT_WITHIN)
         self.store.close()
 
     def end_processes(self) -> None:
@@ -241,6 +252,7 @@ class Services:
             models=models,
             archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
             unattended=settings.server.unattended,
+            audit=self.audit,
         )
 
     def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:

@@ -72,7 +72,7 @@ def service_inside(
         archive=archive or ArchiveSettings(),
     )
     services = Services(settings, clock)
-    gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True)
+    gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, audit=services.audit)
     server = _Server(uvicorn.Config(make_app(services, gate), log_config=None, lifespan="on"))
     with socket.create_server(("127.0.0.1", 0)) as listener:
         thread = threading.Thread(target=server.run, args=([listener],), name="service")
