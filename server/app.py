@@ -22,6 +22,7 @@ from server.api import (
     fleet,
     jobs,
     live,
+    notifications,
     presets,
     programs,
     queue,
@@ -91,6 +92,7 @@ def bare_app(services: Services | None) -> FastAPI:
         archive,
         jobs,
         audit,
+        notifications,
         live,
         system,
     ):

@@ -18,8 +18,10 @@ from daq.config.settings import Settings
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
+from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
+from daq.contracts.service.notifications import Notification, Topic
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
 from daq.trajectories import control_period
@@ -45,6 +47,10 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
+from server.notifications.destinations import destinations_of
+from server.notifications.occasions import Faults, of_experiment, of_job, of_pause
+from server.notifications.outbox import Outbox
+from server.notifications.service import Notifier
 from server.owner.messages import Answer
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
@@ -69,8 +75,10 @@ from server.store.traces import TraceStore
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
 robot's port finishes alone if it needs longer."""
-AUDIT_KEPT, AUDIT_WITHIN = "audit-waiting.jsonl", 0.5
-"""File of the rows that could not be written before the service ended, and the time (s) to write them then."""
+AUDIT_KEPT = "audit-waiting.jsonl"
+"""File of the rows of the audit log that could not be written before the service ended."""
+ENDING = 0.5
+"""Time (s) to write the last rows of the audit log and of the outbox when the service ends."""
 log = logging.getLogger("server")
 
 
@@ -147,6 +155,7 @@ class Services:
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
         self.comparisons = Comparisons(self.jobs)
+        self.notifier = self._make_notifier(settings)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
         self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
@@ -163,6 +172,7 @@ class Services:
 
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
+        self.notifier.start()
         for rig in self.robots():
             try:
                 found = rig.catalogue.bring_up_to_date()
@@ -193,7 +203,7 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
-        self.audit.writer.close(AUDIT_WITHIN)
+        _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING)])
         self.store.close()
 
     def end_processes(self) -> None:
@@ -220,8 +230,10 @@ class Services:
             return self._robots[name].status()
 
         hub = Hub(self.clock, history, status)
+        faults = Faults()
         robot.listeners.append(hub.on_report)
         robot.listeners.append(lambda report: self.metrics.count_report(name, report))
+        robot.listeners.append(lambda report: self._tell(faults.new(name, report, self.clock.utc())))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobService(
@@ -280,6 +292,40 @@ class Services:
         for rig in rigs:
             lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
+        return [*found, *self.notifier.warnings()]
+
+    def _make_notifier(self, settings: Settings) -> Notifier:
+        """Returns what tells people elsewhere. Raises SpecError."""
+        return Notifier(
+            destinations_of(settings.notifications),
+            Outbox(self.store),
+            self.clock,
+            attempts=settings.notifications.attempts,
+            look=self._what_lasts,
+            given_up=lambda line: log.error("notifications: %s", line),
+            count=self.metrics.count_notification,
+        )
+
+    def _tell(self, notification: Notification | None) -> None:
+        if notification is not None:
+            self.notifier.tell(notification)
+
+    def _what_lasts(self) -> dict[str, Notification]:
+        """Returns what needs somebody for as long as it lasts, by a key that stays the same meanwhile."""
+
+        def attention(topic: Topic, text: str, robot: str | None = None) -> Notification:
+            return Notification(topic=topic, kind="attention", at=self.clock.utc(), text=text, robot=robot)
+
+        found = {}
+        if lines := self.storage_warnings():
+            found["storage"] = attention("storage.warning", "; ".join(lines))
+        for rig in self.robots():
+            name, queue = rig.robot.name, rig.queue.status()
+            if rig.archive is not None and (problem := rig.archive.status().problem):
+                found[f"archive {name}"] = attention("archive.away", f"{name}: {problem}", name)
+            if queue.waiting_for:
+                line = f"{name}: {queue.queued} experiments wait: {queue.waiting_for}"
+                found[f"held {name}"] = attention("queue.held", line, name)
         return found
 
     def storage_warnings(self) -> list[str]:
@@ -311,6 +357,10 @@ class Services:
                 add_trace=add_trace,
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=unattended,
+                paused=lambda reason: self.notifier.tell(of_pause(robot.name, reason, self.clock.utc())),
+                ended=lambda identity, state, reason: self.notifier.tell(
+                    of_experiment(robot.name, identity, state, reason, self.clock.utc())
+                ),
             )
         )
         robot.listeners.append(queue.on_report)
@@ -339,6 +389,8 @@ class Services:
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
         self.metrics.count_job(job)
+        if job.state in ENDS:
+            self.notifier.tell(of_job(job, self.clock.utc()))
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:

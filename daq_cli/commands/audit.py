@@ -39,7 +39,8 @@ def audit(
     from server.audit.log import AuditSearch
 
     search = AuditSearch(actor, robot, action, outcome=outcome, since=None if since is None else since.astimezone())
-    log, found, cursor = _log(invocation(context)), [], None
+    found: list[AuditEntry] = []
+    log, cursor = _log(invocation(context)), None
     while len(found) < number:
         page = log.page(search, cursor, min(500, number - len(found)))
         found += page.items

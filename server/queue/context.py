@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from daq.contracts.service.experiments import ExperimentState
 from server.clock import Clock
 from server.owner.messages import Answer
 from server.robot.control import ControlService
@@ -39,3 +40,7 @@ class QueueContext:
     add_unfinished_traces: Callable[[], None]
     """Called after a run whose trace could not be closed or added to the catalogue, to add what was written of it."""
     unattended: bool
+    paused: Callable[[str], None] = lambda _reason: None
+    """Called with the reason when the queue pauses by itself. It must not wait."""
+    ended: Callable[[str, ExperimentState, str], None] = lambda _experiment, _state, _reason: None
+    """Called with the end of each experiment: its number, its state, and why. It must not wait."""

@@ -1,4 +1,4 @@
-"""The audit log, whose rows the database itself refuses to change."""
+"""The audit log, whose rows the database itself refuses to change; and the outbox of notifications."""
 
 from __future__ import annotations
 
@@ -60,13 +60,30 @@ def upgrade() -> None:
     )
     op.create_index("audit_by_actor", "audit", ["actor", "sequence"])
     op.create_index("audit_by_robot", "audit", ["robot", "sequence"])
+    op.create_table(
+        "outbox",
+        sa.Column("sequence", sa.Integer(), autoincrement=True, nullable=False),
+        sa.Column("id", sa.String(length=40), nullable=False),
+        sa.Column("destination", sa.String(length=48), nullable=False),
+        sa.Column("payload", sa.Text(), nullable=False),
+        sa.Column("created", sa.DateTime(), nullable=False),
+        sa.Column("attempts", sa.Integer(), nullable=False),
+        sa.Column("next_attempt", sa.DateTime(), nullable=False),
+        sa.Column("state", sa.String(length=16), nullable=False),
+        sa.Column("problem", sa.Text(), nullable=False),
+        sa.Column("ended", sa.DateTime(), nullable=True),
+        sa.PrimaryKeyConstraint("sequence"),
+    )
+    op.create_index("outbox_by_destination", "outbox", ["destination", "state", "next_attempt"])
     dialect = op.get_bind().dialect.name
     for statement in SQLITE if dialect == "sqlite" else POSTGRESQL if dialect == "postgresql" else ():
         op.execute(statement)
 
 
 def downgrade() -> None:
-    """Undoes the upgrade. The log is lost."""
+    """Undoes the upgrade. The log is lost, and so is what waits to be sent."""
+    op.drop_index("outbox_by_destination", "outbox")
+    op.drop_table("outbox")
     op.drop_table("audit")
     if op.get_bind().dialect.name == "postgresql":
         op.execute("DROP FUNCTION refuse_audit_change()")
