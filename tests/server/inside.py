@@ -16,6 +16,7 @@ import uvicorn
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.config.archive import ArchiveSettings
+from daq.config.notifications import NotificationSettings
 from daq.config.service import ServiceSettings
 from daq.config.settings import RobotSettings, Settings, TraceSettings
 from server.access.gate import Gate
@@ -61,6 +62,7 @@ def service_inside(
     monkeypatch: pytest.MonkeyPatch,
     database: str | None = None,
     archive: ArchiveSettings | None = None,
+    notifications: NotificationSettings | None = None,
 ) -> Iterator[httpx.Client]:
     """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, in
     `database`, and in `archive`."""
@@ -70,6 +72,7 @@ def service_inside(
         traces=TraceSettings(folder=folder / "traces"),
         server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
         archive=archive or ArchiveSettings(),
+        notifications=notifications or NotificationSettings(),
     )
     services = Services(settings, clock)
     gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, audit=services.audit)
