@@ -292,7 +292,7 @@ class Services:
         for rig in rigs:
             lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
-        return [*found, *self.notifier.warnings()]
+        return found
 
     def _make_notifier(self, settings: Settings) -> Notifier:
         """Returns what tells people elsewhere. Raises SpecError."""
