@@ -47,7 +47,7 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
-from server.notifications.destinations import destinations_of
+from server.notifications.destinations import Destination, destinations_of
 from server.notifications.occasions import Faults, of_experiment, of_job, of_pause
 from server.notifications.outbox import Outbox
 from server.notifications.service import Notifier
@@ -127,6 +127,7 @@ class Services:
         self.clock = clock or SystemClock()
         parse_service_address(settings.server.executor)
         bucket = open_bucket(settings.archive)
+        destinations = destinations_of(settings.notifications)
         self.store = Store(settings.server.database_url)
         self.store.migrate()
         self.store.require_sound()
@@ -155,7 +156,7 @@ class Services:
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
         self.comparisons = Comparisons(self.jobs)
-        self.notifier = self._make_notifier(settings)
+        self.notifier = self._make_notifier(settings, destinations)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
         self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
@@ -294,10 +295,10 @@ class Services:
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
         return found
 
-    def _make_notifier(self, settings: Settings) -> Notifier:
-        """Returns what tells people elsewhere. Raises SpecError."""
+    def _make_notifier(self, settings: Settings, destinations: list[Destination]) -> Notifier:
+        """Returns what tells people elsewhere."""
         return Notifier(
-            destinations_of(settings.notifications),
+            destinations,
             Outbox(self.store),
             self.clock,
             attempts=settings.notifications.attempts,

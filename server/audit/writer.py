@@ -57,8 +57,8 @@ class AuditWriter:
         self._trouble = ""
         self._closing = self._closed = False
         self._take_in()
-        self._thread = threading.Thread(target=self._work, name="audit", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
+        """Started with the first note, so that a service that cannot start leaves none."""
 
     def note(self, note: AuditNote) -> Future[None]:
         """Adds a note. The future ends when its row is on the disk."""
@@ -91,7 +91,8 @@ class AuditWriter:
             for note in self._repeats.rest():
                 self._put(note, None)
             self._changed.notify()
-        self._thread.join(within)
+        if self._thread is not None:
+            self._thread.join(within)
         self._keep_rest()
 
     def _put(self, note: AuditNote, written: Future[None] | None) -> None:
@@ -101,6 +102,9 @@ class AuditWriter:
             return
         self._notes.append((note, written))
         self.waiting = len(self._notes)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="audit", daemon=True)
+            self._thread.start()
 
     def _work(self) -> None:
         while True:

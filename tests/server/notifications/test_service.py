@@ -69,10 +69,13 @@ def test_a_command_tries_every_destination(
             f'secret = "{table["secret"]}"\n[notifications.webhooks.far]\nurl = "https://127.1/x"\nsecret = "secret"\n',
             "utf-8",
         )
-        told = daq("notify", "test", "lab")
+        page = Path(__file__).parents[3] / "docs" / "notifications.md"
+        commands = [line[6:] for line in page.read_text("utf-8").splitlines() if line.startswith("$ daq ")]
+        assert commands == ["notify test", "notify test lab"]
+        told = daq(*commands[1].split())
         assert (told.code, told.out.startswith("webhook lab: answered 204")) == (0, True)
         assert Witness(SECRET).verify(there.posted[0].body, there.posted[0].headers)
-        told = daq("notify", "test", "--json")
+        told = daq(*commands[0].split(), "--json")
         assert told.code == 3
         problems = {one["destination"]: one["problem"] for one in json.loads(told.out)}
         assert problems["webhook lab"] == ""
