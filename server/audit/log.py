@@ -115,9 +115,11 @@ def append_in(session: Session, notes: Iterable[AuditNote]) -> Head:
         # Two transactions must not both follow the same row. On SQLite only one of them writes at a time anyway.
         session.execute(text("LOCK TABLE audit IN SHARE ROW EXCLUSIVE MODE"))
     head = _head(session)
-    for entry in chained(head, notes):
-        session.execute(insert(AuditRow).values(sequence=entry.number, **entry.model_dump(exclude={"number"})))
-        head = Head(entry.number, entry.digest)
+    entries = list(chained(head, notes))
+    if entries:
+        rows = [{"sequence": entry.number, **entry.model_dump(exclude={"number"})} for entry in entries]
+        session.execute(insert(AuditRow), rows)
+        head = Head(entries[-1].number, entries[-1].digest)
     return head
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -152,3 +154,16 @@ def test_the_log_is_restored_with_a_backup_which_is_in_it(
     assert "3 rows, each as it was written" in daq("audit", "verify").out
     against = daq("audit", "verify", "--head", replaced["head"])
     assert (against.code, against.out.startswith("row 3 does not fit: its digest was")) == (5, True)
+
+
+def test_a_stop_is_answered_while_the_log_cannot_be_written_and_its_row_comes_later(
+    tmp_path: Path, robot: httpx.Client
+) -> None:
+    with closing(sqlite3.connect(tmp_path / "service" / "service.sqlite", isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        assert robot.post("stop").status_code == 200
+        rows = other.execute("SELECT count(*) FROM audit WHERE action = 'stop_robot'").fetchone()
+        assert rows == (0,)
+        other.execute("ROLLBACK")
+    while not newest(robot, action="stop_robot"):  # each answer waits a while for the rows that are noted
+        pass
