@@ -43,6 +43,8 @@ def _digests(settings: Settings) -> dict[str, str]:
         if name == "server":
             # Without its password, which somebody could guess and try against the digest.
             said |= {"database": masked(parse_address(settings.server.database_url))}
+        if name == "notifications":
+            said |= {"hosts": {one: webhook.host for one, webhook in settings.notifications.webhooks.items()}}
         text = json.dumps(said, sort_keys=True, default=_plain)
         found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
     return found

@@ -118,7 +118,7 @@ class AskedRequest:
         return self._audit.writer.note(note)
 
     def _action(self) -> str:
-        return str(getattr(self._scope.get("route"), "name", "unknown"))
+        return str(getattr(self._scope.get("route"), "name", "unknown"))[:64]
 
     def _made(self, action: str) -> AuditNote:
         scope, answer = self._scope, self._told()
@@ -127,9 +127,9 @@ class AskedRequest:
         client = scope.get("client")
         return AuditNote(
             at=self._at,
-            actor=None if caller is None else caller.name,
+            actor=None if caller is None else line_of(caller.name)[:200],
             role=None if caller is None else caller.role,
-            origin=line_of(client[0]) if client else "unknown",
+            origin=line_of(client[0])[:200] if client else "unknown",
             action=action,
             request=line_of(f"{scope['method']} {scope['path']}"),
             robot=robot[1] if robot else None,

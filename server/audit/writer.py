@@ -126,8 +126,8 @@ class AuditWriter:
                 for _ in some:
                     self._notes.popleft()
                 self.waiting = len(self._notes)
-                if not self.waiting:
-                    self._kept.unlink(missing_ok=True)  # what it had has a row now
+                if self._taken_in and not self.waiting:
+                    self._forget_kept()
                 self._changed.notify_all()
             for _, written in some:
                 if written is not None and written.set_running_or_notify_cancel():
@@ -157,7 +157,8 @@ class AuditWriter:
             if not is_value(error):
                 raise
             # One of them has what this database cannot hold. It shall not keep the others out.
-            log.exception("audit: a row without its words")
+            for note in notes:
+                log.warning("audit: a row without its words: %s", note.model_dump_json(exclude_none=True))
             head = self._audit.append([note.model_copy(update=_WITHOUT_WORDS) for note in notes])
         self.written += len(notes)
         log.debug("audit: %s", head)
@@ -170,10 +171,17 @@ class AuditWriter:
                     self._notes.append((AuditNote.model_validate_json(line), None))
                 except ValidationError:  # the power failed while the line was written
                     log.warning("audit: %s: a line cannot be read: %.200s", self._kept, line)
+        self._taken_in = bool(self._notes)
         if self._notes and self._write([note for note, _ in self._notes]):
             self._notes.clear()
-            self._kept.unlink(missing_ok=True)
+            self._forget_kept()
         self.waiting = len(self._notes)
+
+    def _forget_kept(self) -> None:
+        """Removes the file, since what it had has rows now. If that fails, they have rows twice after the next start."""
+        self._taken_in = False
+        with suppress(OSError):
+            self._kept.unlink(missing_ok=True)
 
     def _keep_rest(self) -> None:
         with self._changed:
@@ -197,4 +205,7 @@ _OF_SERVICE: dict[str, object] = {
     **dict.fromkeys(("actor", "role", "robot", "subject", "content", "request_id", "status")),
     **{"origin": "service", "request": "", "outcome": "failed", "count": 1},
 }
-_WITHOUT_WORDS: dict[str, object] = {"detail": "its words could not be written", "content": None, "subject": None}
+_WITHOUT_WORDS: dict[str, object] = {
+    **dict.fromkeys(("actor", "role", "robot", "subject", "content", "request_id")),
+    **{"origin": "unknown", "request": "", "detail": "its words could not be written: the service's log has them"},
+}

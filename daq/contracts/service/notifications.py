@@ -16,7 +16,6 @@ Topic = Literal[
     "arm.fault",
     "queue.paused",
     "queue.held",
-    "review.asked",
     "storage.warning",
     "archive.away",
     "test",
