@@ -15,6 +15,7 @@ from server import problems
 from server.access.gate import Gate
 from server.api import (
     archive,
+    audit,
     controller,
     description,
     experiments,
@@ -22,6 +23,7 @@ from server.api import (
     jobs,
     live,
     login,
+    notifications,
     presets,
     programs,
     queue,
@@ -90,6 +92,8 @@ def bare_app(services: Services | None) -> FastAPI:
         traces,
         archive,
         jobs,
+        audit,
+        notifications,
         live,
         login,
         system,

@@ -13,12 +13,14 @@ import uvicorn
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
 from daq.contracts.errors import SpecError
+from daq.contracts.service.audit import AuditNote
 from server.access.caller import Caller
 from server.access.connections import Connection
 from server.access.gate import Gate
 from server.access.origin import is_loopback
 from server.access.tokens import KnownTokens
 from server.app import make_app
+from server.audit.words import line_of
 from server.ending import EndInTime
 from server.listening import listening
 from server.services import Services
@@ -97,7 +99,16 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
     metrics = services.metrics
-    return Gate(known, services.tickets, local, names, stop_port, metrics.count_request, metrics.count_refusal)
+    return Gate(
+        known,
+        services.tickets,
+        local,
+        names,
+        stop_port,
+        metrics.count_request,
+        metrics.count_refusal,
+        audit=services.audit,
+    )
 
 
 def _is_open_here(section: ServiceSettings) -> bool:
@@ -119,6 +130,23 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
     )
 
 
+def _note_of_stop(news: Stopped) -> AuditNote:
+    """Returns the audit log's note of a stop at the listener. It is done, whatever the arm has answered: `detail` says
+    that."""
+    return AuditNote(
+        at=news.at,
+        actor=news.actor,
+        role=news.role,
+        origin=news.origin,
+        action="stop_fleet" if news.address.endswith("/fleet/stop") else "stop_robot",
+        request=line_of(f"POST {news.address} at the stop listener"),
+        robot=news.robot,
+        outcome="done",
+        status=200,
+        detail=line_of(news.text),
+    )
+
+
 def _connect(services: Services, door: StopDoor, listener: socket.socket) -> None:
     """Connects the service and the stop listener: stops go to the service, and each robot's port to the listener."""
 
@@ -126,6 +154,7 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
         services.robot(news.robot).queue.stop_asked(news.actor)
         with suppress(RuntimeError):  # the service is ending, and records no more events
             services.record_event_later(news.robot, "stop", news.text, actor=news.actor)
+        services.audit.writer.note(_note_of_stop(news))
 
     services.stop_port = listener.getsockname()[1]
     door.stopped = stopped

@@ -21,8 +21,10 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.extras import require_extra
 from daq.contracts.service.events import ServiceEvent
+from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
+from daq.contracts.service.notifications import Notification, Topic
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
 from daq.trajectories import control_period
@@ -34,6 +36,10 @@ from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.archive.bucket import Bucket, open_bucket
 from server.archive.service import ArchiveContext, ArchiveService
+from server.audit.configuration import begun
+from server.audit.log import AuditLog
+from server.audit.request import Audit
+from server.audit.writer import AuditWriter
 from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
@@ -48,6 +54,10 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
+from server.notifications.destinations import Destination, destinations_of
+from server.notifications.occasions import Faults, of_experiment, of_job, of_pause
+from server.notifications.outbox import Outbox
+from server.notifications.service import Notifier
 from server.owner.messages import Answer
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
@@ -75,6 +85,10 @@ if TYPE_CHECKING:
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
 robot's port finishes alone if it needs longer."""
+AUDIT_KEPT = "audit-waiting.jsonl"
+"""File of the rows of the audit log that could not be written before the service ended."""
+ENDING = 0.5
+"""Time (s) to write the last rows of the audit log and of the outbox when the service ends."""
 log = logging.getLogger("server")
 
 
@@ -94,6 +108,7 @@ class RobotServices:
     models: Models
     unattended: bool
     archive: ArchiveService | None
+    audit: Audit
     owners: tuple[str, ...] = ()
     """Names of this robot's owners; empty: every owner."""
 
@@ -143,6 +158,7 @@ class Services:
         self.clock = clock or SystemClock()
         parse_service_address(settings.server.executor)
         bucket = open_bucket(settings.archive)
+        destinations = destinations_of(settings.notifications)
         self.store = Store(settings.server.database_url)
         self.store.migrate()
         self.store.require_sound()
@@ -154,6 +170,8 @@ class Services:
         self.programs = ProgramStore(self.store)
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
+        self.audit_log = AuditLog(self.store)
+        self.audit = Audit(AuditWriter(self.audit_log, self.folder / AUDIT_KEPT), self.clock.utc)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
         self.stop_port = 0
@@ -175,8 +193,10 @@ class Services:
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.comparisons = Comparisons(self.jobs)
+        self.notifier = self._make_notifier(settings, destinations)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
+        self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
         """Returns all robots, in the order of the configuration."""
@@ -190,6 +210,7 @@ class Services:
 
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
+        self.notifier.start()
         for rig in self.robots():
             try:
                 found = rig.catalogue.bring_up_to_date()
@@ -220,6 +241,7 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
+        _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING)])
         self.store.close()
 
     def end_processes(self) -> None:
@@ -246,8 +268,10 @@ class Services:
             return self._robots[name].status()
 
         hub = Hub(self.clock, history, status)
+        faults = Faults()
         robot.listeners.append(hub.on_report)
         robot.listeners.append(lambda report: self.metrics.count_report(name, report))
+        robot.listeners.append(lambda report: self._tell(faults.new(name, report, self.clock.utc())))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobService(
@@ -278,6 +302,7 @@ class Services:
             models=models,
             archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
             unattended=settings.server.unattended,
+            audit=self.audit,
             owners=settings.robot.owners,
         )
 
@@ -306,6 +331,40 @@ class Services:
         for rig in rigs:
             lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
+        return found
+
+    def _make_notifier(self, settings: Settings, destinations: list[Destination]) -> Notifier:
+        """Returns what tells people elsewhere."""
+        return Notifier(
+            destinations,
+            Outbox(self.store),
+            self.clock,
+            attempts=settings.notifications.attempts,
+            look=self._what_lasts,
+            given_up=lambda line: log.error("notifications: %s", line),
+            count=self.metrics.count_notification,
+        )
+
+    def _tell(self, notification: Notification | None) -> None:
+        if notification is not None:
+            self.notifier.tell(notification)
+
+    def _what_lasts(self) -> dict[str, Notification]:
+        """Returns what needs somebody for as long as it lasts, by a key that stays the same meanwhile."""
+
+        def attention(topic: Topic, text: str, robot: str | None = None) -> Notification:
+            return Notification(topic=topic, kind="attention", at=self.clock.utc(), text=text, robot=robot)
+
+        found = {}
+        if lines := self.storage_warnings():
+            found["storage"] = attention("storage.warning", "; ".join(lines))
+        for rig in self.robots():
+            name, queue = rig.robot.name, rig.queue.status()
+            if rig.archive is not None and (problem := rig.archive.status().problem):
+                found[f"archive {name}"] = attention("archive.away", f"{name}: {problem}", name)
+            if queue.waiting_for:
+                line = f"{name}: {queue.queued} experiments wait: {queue.waiting_for}"
+                found[f"held {name}"] = attention("queue.held", line, name)
         return found
 
     def storage_warnings(self) -> list[str]:
@@ -338,6 +397,10 @@ class Services:
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
                 reviewer=None if settings.robot.review == "off" else settings.robot.review,
+                paused=lambda reason: self.notifier.tell(of_pause(robot.name, reason, self.clock.utc())),
+                ended=lambda identity, state, reason: self.notifier.tell(
+                    of_experiment(robot.name, identity, state, reason, self.clock.utc())
+                ),
             )
         )
         robot.listeners.append(queue.on_report)
@@ -366,6 +429,8 @@ class Services:
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
         self.metrics.count_job(job)
+        if job.state in ENDS:
+            self.notifier.tell(of_job(job, self.clock.utc()))
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:

@@ -18,6 +18,7 @@ from pydantic_settings import (
 
 from daq.config.archive import ArchiveSettings
 from daq.config.limits import merged_limits
+from daq.config.notifications import NotificationSettings
 from daq.config.oidc import OidcSettings
 from daq.config.service import ServiceSettings, TrueOrFalse
 from daq.contracts.documents import parse_toml, read_text, shown
@@ -121,6 +122,7 @@ class Settings(BaseSettings):
     traces: TraceSettings = TraceSettings()
     server: ServiceSettings = ServiceSettings()
     archive: ArchiveSettings = ArchiveSettings()
+    notifications: NotificationSettings = NotificationSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
     """Who runs the experiments; recorded in every trace."""
 
@@ -268,6 +270,8 @@ def _is_secret(where: tuple[int | str, ...]) -> bool:
     wrong place shall not find it in a log."""
     if where[:2] == ("server", "oidc"):
         return where[-1] not in OidcSettings.model_fields
+    if where[:1] == ("notifications",):
+        return where[-1] not in ("about", "attempts", "host", "port", "sender", "tls", "to", "user")
     return where[:1] == ("archive",) and where[-1] not in ArchiveSettings.model_fields.keys() - {"endpoint"}
 
 

@@ -27,6 +27,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "serve": ("daq_cli.commands.serve", "Serve experiments and traces to people and programs."),
     "queue": ("daq_cli.commands.queue", "Show, pause and resume the queue of a server's robot."),
     "token": ("daq_cli.commands.token", "Make, list and revoke tokens of the service."),
+    "audit": ("daq_cli.commands.audit", "Show who asked the service for what; check the log of it."),
+    "notify": ("daq_cli.commands.notify", "Try the notifications of the configuration."),
     "backup": ("daq_cli.commands.backup", "Save everything that a service keeps in one file."),
     "restore": ("daq_cli.commands.restore", "Restore a backup."),
     "traces": ("daq_cli.commands.traces", "List, show, plot, convert and verify traces."),
@@ -52,6 +54,8 @@ HERE = frozenset(
         "ports",
         "serve",
         "token",
+        "audit",
+        "notify",
         "backup",
         "restore",
         "config",
@@ -71,7 +75,7 @@ HERE = frozenset(
 )
 """Subcommands about this computer alone: `--server` is refused, and DAQ_SERVER is ignored."""
 
-ALL_ROBOTS = frozenset(["serve", "token", "backup", "restore"])
+ALL_ROBOTS = frozenset(["serve", "token", "audit", "notify", "backup", "restore"])
 """Subcommands about everything that one service has: `--robot` is refused."""
 
 

@@ -9,7 +9,7 @@ from daq.contracts.extras import Extra
 MODEL = frozenset(
     ["batch", "blind", "compare", "design", "diagnose", "fit", "sensitivity", "simulate", "thesis", "validate"]
 )
-SERVER = frozenset(["backup", "restore", "serve", "token"])
+SERVER = frozenset(["audit", "backup", "notify", "restore", "serve", "token"])
 WITH_A_VALUE = frozenset(["--config", "--port", "--robot", "--server"])
 """Options before the subcommand that are followed by their value."""
 

@@ -37,10 +37,11 @@ def add(
     ] = "viewer",
 ) -> None:
     """Make a token. It is shown only once; its hash is stored."""
+    from server.audit.command import computers_user
     from server.clock import SystemClock
 
     _require_name(name)
-    token = _tokens(invocation(context)).add(name, role, SystemClock().utc())
+    token = _tokens(invocation(context)).add(name, role, SystemClock().utc(), computers_user())
     console().print(f"token of {name} ({role}); it is not shown again:")
     print(token)
 
@@ -60,10 +61,11 @@ def ls(context: typer.Context, json: JsonOption = False) -> None:
 @app.command()
 def revoke(context: typer.Context, name: NameArgument) -> None:
     """Revoke a token; within two seconds it is no longer accepted."""
+    from server.audit.command import computers_user
     from server.clock import SystemClock
 
     _require_name(name)
-    _tokens(invocation(context)).revoke(name, SystemClock().utc())
+    _tokens(invocation(context)).revoke(name, SystemClock().utc(), computers_user())
     print(f"token of {name} revoked")
 
 

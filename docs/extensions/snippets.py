@@ -14,11 +14,13 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
 RUN: Mapping[tuple[str, str], str] = {
+    ("audit.md", "console"): "tests/server/audit/test_page.py",
     ("batches.md", "console"): "tests/daq_cli/test_batches_page.py",
     ("batches.md", "python"): "tests/daq_cli/test_batches_page.py",
     ("fleet.md", "console"): "tests/server/fleet/test_page.py",
     ("fleet.md", "python"): "tests/server/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",
+    ("notifications.md", "console"): "tests/server/notifications/test_service.py",
     ("one-joint-rig.md", "python"): "tests/repository/test_snippets.py",
     ("own-effect.md", "python"): "tests/model/effects/test_own_effect.py",
     ("python.md", "python"): "tests/ma2000/test_public_interface.py",

@@ -28,6 +28,7 @@ from server.access.session_cookie import says_where_it_is_from, session_of
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.access.turns import Turns
+from server.audit.request import Audit
 from server.database_errors import DamagedError
 from server.problems import ProblemError, of_damage, of_database, response
 
@@ -67,6 +68,8 @@ class Gate:
     """Number of open WebSockets by caller's name."""
     turns: Turns = field(default_factory=Turns)
     look_every: float = LOOK_EVERY
+    audit: Audit | None = None
+    """Notes what is asked; None where nothing is noted."""
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """Returns `app` behind this gate."""
@@ -100,20 +103,25 @@ class Gate:
                 secure(headers, scope["path"], stop_listener)
             await send(message)
 
+        uploads = _is_post(scope, UPLOADS)
+        asked = None if self.audit is None else self.audit.watched(scope, with_content=not uploads)
+        answer = secured if asked is None else asked.send(secured)
         try:
             try:
                 state["caller"] = await self._admit(scope)
             except ProblemError as problem:
                 self.refused(problem.kind)
-                await response(Request(scope), problem)(scope, receive, secured)
+                await response(Request(scope), problem)(scope, receive, answer)
                 return
-            state["turn"] = turn = await self.turns.taken(scope, secured)
+            state["turn"] = turn = await self.turns.taken(scope, answer)
             try:
-                body = receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY)
-                await app(scope, body, turn.send)
+                body = receive if uploads else counted(receive, LARGEST_BODY)
+                await app(scope, body if asked is None else asked.receive(body), turn.send)
             finally:
                 turn.end()
         finally:
+            if asked is not None:
+                asked.end()
             seconds = time.perf_counter() - begun
             self.observed(scope["method"], status, seconds)
             self._log(scope, state.get("caller"), status, seconds)

@@ -21,6 +21,8 @@ from daq.contracts.service.queue import Role, role_of
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.sessions import SessionStore
+from server.audit.command import by_command
+from server.audit.log import append_in
 from server.clock import Clock
 from server.database_errors import DamagedError
 from server.store.engine import Store
@@ -55,8 +57,9 @@ class TokenStore:
         self._store = store
         self._sessions = SessionStore(store)
 
-    def add(self, name: str, role: Role, now: datetime) -> str:
-        """Makes a new token and returns it; it cannot be shown again. Raises SpecError if the name is taken."""
+    def add(self, name: str, role: Role, now: datetime, by: str = "unknown") -> str:
+        """Makes a new token and returns it; it cannot be shown again. `by`: who makes it, for the audit log. Raises
+        SpecError if the name is taken."""
         if name == LOCAL.name:
             raise SpecError(f"token {name!r}: users of this computer have this name; choose another one")
         token = PREFIX + secrets.token_urlsafe(32)
@@ -65,15 +68,18 @@ class TokenStore:
                 raise SpecError(f"token {name!r}: a token of this name exists, or was revoked; choose another name")
             row = TokenRow(id=secrets.token_hex(6), name=name, role=role, digest=digest_of(token), created=now)
             session.add(row)
+            append_in(session, [by_command(now, by, "add_token", f"daq token add --role {role}", name)])
         return token
 
-    def revoke(self, name: str, now: datetime) -> None:
-        """Revokes a token; its name stays taken. Raises SpecError if there is no token of this name."""
+    def revoke(self, name: str, now: datetime, by: str = "unknown") -> None:
+        """Revokes a token; its name stays taken. `by`: who does it, for the audit log. Raises SpecError if there is no
+        token of this name."""
         with self._store.writing() as session:
             row = session.scalar(select(TokenRow).filter_by(name=name))
             if row is None:
                 raise SpecError(f"token {name!r}: does not exist; `daq token ls` lists all tokens")
             row.revoked = row.revoked or now
+            append_in(session, [by_command(now, by, "revoke_token", "daq token revoke", name)])
 
     def all(self) -> list[TokenInfo]:
         """Returns all tokens, including the revoked ones."""

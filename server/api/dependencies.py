@@ -79,6 +79,8 @@ Arrived = Annotated[float, Depends(_arrived)]
 """When the request arrived (s, monotonic), before it waited for anything."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
+Auditor = Operator
+"""Who may read the audit log, which names people and their computers: the highest role."""
 
 
 def _require_cursor(cursor: str | None) -> str | None:

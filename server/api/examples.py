@@ -13,6 +13,7 @@ from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.figures import JointFigureSet
 from daq.contracts.machine import load_machine
 from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive, Transfer
+from daq.contracts.service.audit import AuditEntry
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.experiments import (
     Approval,
@@ -59,6 +60,7 @@ from daq.contracts.service.jobs import (
     ValidateRequest,
 )
 from daq.contracts.service.live import LiveFrame, RobotMessage, SampleMessage, Ticket
+from daq.contracts.service.notifications import DestinationStatus, NotificationStatus
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
 from daq.contracts.service.robot import (
     Done,
@@ -288,6 +290,39 @@ def _robot() -> list[BaseModel]:
         GripperRequest(closed=True),
         ProcessState(inputs=(False,) * 8, outputs=(True, *(False,) * 7), gripper="closed"),
         ServiceEvent(number=17, at=NOON, kind="queue", text="resumed", actor="anna"),
+        AuditEntry(
+            number=18,
+            at=NOON,
+            actor="anna",
+            role="operator",
+            origin="192.168.1.20",
+            action="resume_queue",
+            request="POST /api/v1/robots/ma2000/queue/resume",
+            robot="ma2000",
+            outcome="done",
+            status=200,
+            content='{"moves_real_arm":true}',
+            request_id="0f3c9a1be4d27788",
+            previous="5d" * 32,
+            digest="7a" * 32,
+        ),
+        NotificationStatus(
+            destinations=(
+                DestinationStatus(
+                    name="lab",
+                    channel="webhook",
+                    host="hooks.example",
+                    about=("fault", "attention"),
+                    waiting=1,
+                    sent=12,
+                    failed=2,
+                    given_up=0,
+                    last_sent=NOON,
+                    problem="hooks.example: answered 503",
+                    next_attempt=NOON + timedelta(minutes=5),
+                ),
+            )
+        ),
         LiveFrame(now=512.35, utc=NOON.timestamp(), messages=(message, robot)),
         Ticket(ticket="q8d1mV", seconds=30.0),
         load_machine("ma2000"),

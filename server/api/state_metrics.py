@@ -37,6 +37,7 @@ class StateMetrics(Collector):
         yield from self._of_jobs()
         yield from self._of_disks()
         yield from self._of_archives()
+        yield from self._of_records()
 
     def _of_robots(self) -> Iterable[Metric]:
         link = CounterMetricFamily("daq_link", "Counts of the link since it was opened.", labels=("robot", "counter"))
@@ -99,6 +100,18 @@ class StateMetrics(Collector):
         yield GaugeMetricFamily("daq_storage_warnings", warnings, value=len(self._services.warnings()))
         reserve = "Free room on the disk of traces below which no experiment is taken."
         yield GaugeMetricFamily("daq_disk_reserve_bytes", reserve, value=RESERVE)
+
+    def _of_records(self) -> Iterable[Metric]:
+        writer = self._services.audit.writer
+        written = CounterMetricFamily("daq_audit_rows", "Rows of the audit log written since the service started.")
+        written.add_metric((), writer.written)
+        yield written
+        yield GaugeMetricFamily("daq_audit_waiting", "Rows of the audit log not written yet.", value=writer.waiting)
+        waiting = GaugeMetricFamily("daq_notifications_waiting", "Notifications that wait.", labels=("destination",))
+        with suppress(SQLAlchemyError, DamagedError):
+            for destination, count in self._services.notifier.waiting().items():
+                waiting.add_metric((destination,), count)
+        yield waiting
 
     def _of_archives(self) -> Iterable[Metric]:
         reached = GaugeMetricFamily("daq_archive_reached", "1 while the archive answers.", labels=("robot",))

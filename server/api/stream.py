@@ -11,10 +11,12 @@ from fastapi.concurrency import run_in_threadpool
 from pydantic import ValidationError
 
 from daq.contracts.errors import DaqError
+from daq.contracts.service.audit import AuditNote, Outcome
 from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
 from firmware_protocol.invalid import first_invalid
 from server.access.caller import Caller
 from server.access.limits import Bucket
+from server.audit.words import line_of
 from server.live.hub import Client
 from server.live.outbox import Outbox
 from server.problems import ProblemError, field_of
@@ -41,13 +43,15 @@ async def stream(socket: WebSocket, rig: RobotServices, caller: Caller, look_eve
     await socket.accept()
     client = Client(Outbox(rig.robot.clock.monotonic()), caller.name)
     rig.hub.join(client)
+    address = getattr(socket, "client", None)
+    origin = "unknown" if address is None else str(address.host)
     heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
     dropping = asyncio.create_task(_drop_if_hopeless(rig, client, look_every))
     tasks = [
         dropping,
         asyncio.create_task(_send(socket, rig, client)),
         asyncio.create_task(_receive(socket, rig, client, heard)),
-        asyncio.create_task(_carry_out(rig, client, caller, heard)),
+        asyncio.create_task(_carry_out(rig, client, caller, origin, heard)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -103,14 +107,16 @@ async def _receive(socket: WebSocket, rig: RobotServices, client: Client, heard:
             _refuse(rig, client, f"{WAITING_MESSAGES} messages wait already: this one is left out", "send fewer")
 
 
-async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: asyncio.Queue[Heard]) -> None:
+async def _carry_out(
+    rig: RobotServices, client: Client, caller: Caller, origin: str, heard: asyncio.Queue[Heard]
+) -> None:
     while True:
         text, said = await heard.get()
         if text is None:
             _refuse(rig, client, "a message is text, not bytes", ADVICE)
             continue
         try:
-            await _take(LiveRequest.model_validate_json(text), rig, client, caller, said)
+            await _take(LiveRequest.model_validate_json(text), rig, client, caller, origin, said)
         except ValidationError as error:
             first = first_invalid(error)
             where = field_of(first.place) if first.place else "message"
@@ -121,7 +127,9 @@ async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: 
             _refuse(rig, client, str(error), "")
 
 
-async def _take(request: LiveRequest, rig: RobotServices, client: Client, caller: Caller, said: float) -> None:
+async def _take(
+    request: LiveRequest, rig: RobotServices, client: Client, caller: Caller, origin: str, said: float
+) -> None:
     now = rig.robot.clock.monotonic()
     if request.rate is not None:
         client.every = BASE_RATE // request.rate
@@ -136,11 +144,36 @@ async def _take(request: LiveRequest, rig: RobotServices, client: Client, caller
     if client.outbox:
         client.something.set()
     if request.jog is not None:
-        await run_in_threadpool(_jog, request.jog, rig, caller, said)
+        await run_in_threadpool(_noted_jog, request.jog, rig, caller, origin, said)
 
 
 def _past(rig: RobotServices, begin: float, points: int) -> str:
     return rig.hub.history.since(begin, points).model_dump_json()
+
+
+def _noted_jog(command: JogCommand, rig: RobotServices, caller: Caller, origin: str, said: float) -> None:
+    """Jogs, and counts that in the audit log, which has the first of many commands and then a row a minute."""
+    outcome: Outcome = "done"
+    detail = ""
+    try:
+        _jog(command, rig, caller, said)
+    except (ProblemError, DaqError) as error:
+        outcome, detail = "refused", line_of(error)
+        raise
+    finally:
+        rig.audit.writer.count(
+            AuditNote(
+                at=rig.audit.utc(),
+                actor=caller.name,
+                role=caller.role,
+                origin=origin,
+                action="jog_robot",
+                request="a message of the live WebSocket",
+                robot=rig.robot.name,
+                outcome=outcome,
+                detail=detail,
+            )
+        )
 
 
 def _jog(command: JogCommand, rig: RobotServices, caller: Caller, said: float) -> None:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Container
-from contextlib import closing
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
 from alembic.script import ScriptDirectory
+from sqlalchemy.exc import DatabaseError
 
+from daq.contracts.service.audit import AuditNote
+from server.audit.chain import Head
+from server.audit.log import AuditLog
 from server.backup.places import BackupError
-from server.store.engine import BUSY_TIMEOUT_MS, migrations
+from server.database_errors import line_of
+from server.store.engine import BUSY_TIMEOUT_MS, Store, migrations
 
 
 def copy_database(source: Path, target: Path) -> None:
@@ -84,6 +89,30 @@ def robots_of_traces(database: Path) -> dict[str, str]:
             return dict(found)
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
+
+
+def head_of_audit(database: Path) -> str:
+    """Returns the last row of a database's audit log, `NUMBER:DIGEST`; `nothing` if it has none, or is damaged."""
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
+        row = connection.execute("SELECT sequence, digest FROM audit ORDER BY sequence DESC LIMIT 1").fetchone()
+        if row is not None:
+            return str(Head(*row))
+    return "nothing"
+
+
+def add_to_audit(database: Path, note: AuditNote) -> None:
+    """Adds a row to a database's audit log; one of an older version, which has none, stays as it is. Raises
+    BackupError."""
+    with closing(sqlite3.connect(database)) as connection:
+        if not _has_table(connection, "audit"):
+            return
+    store = Store(f"sqlite:///{database}")
+    try:
+        AuditLog(store).append([note])
+    except DatabaseError as error:
+        raise BackupError(f"database {database.name}: its audit log cannot be written: {line_of(error)}") from error
+    finally:
+        store.close()
 
 
 def _has_table(connection: sqlite3.Connection, name: str) -> bool:

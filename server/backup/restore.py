@@ -17,7 +17,15 @@ from pathlib import Path
 
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
-from server.backup.database import hold_queue, require_known, revision_of, robots_of_traces
+from server.audit.command import by_command, computers_user
+from server.backup.database import (
+    add_to_audit,
+    head_of_audit,
+    hold_queue,
+    require_known,
+    revision_of,
+    robots_of_traces,
+)
 from server.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
 from server.backup.places import DATABASE, BackupError, Places, is_trace
 from server.backup.write import RESERVE
@@ -64,6 +72,7 @@ def restore(
         staged = _Staged(archive, places, now, reserve)
         try:
             staged.write(manifest, lambda f, text: progress(CHECK_SHARE + (WRITE_SHARE - CHECK_SHARE) * f, text))
+            staged.note_in_audit_log(manifest)
             aside = _put_aside(there, now)
             staged.move_in()
         except OSError as error:
@@ -120,6 +129,15 @@ class _Staged:
             line = "restored from a backup: look at the arm, then resume the queue"
             for robot in self._places.traces:
                 hold_queue(self._staged(DATABASE), robot, line, self._now)
+
+    def note_in_audit_log(self, manifest: Manifest) -> None:
+        """Notes in the restored audit log which log it takes the place of: rows that the backup does not have are in
+        the database that is put aside."""
+        ended = head_of_audit(self._places.database)
+        detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z} takes the place of a log that ended with {ended}"
+        command = f"daq restore {self._archive.name}"
+        note = by_command(self._now, computers_user(), "restore", command, self._archive.name, detail)
+        add_to_audit(self._staged(DATABASE), note)
 
     def move_in(self) -> None:
         """Moves every file into its place, and writes the folders to the disk."""

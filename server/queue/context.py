@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from daq.contracts.service.experiments import Reviewer
+from daq.contracts.service.experiments import ExperimentState, Reviewer
 from server.clock import Clock
 from server.owner.messages import Answer
 from server.robot.control import ControlService
@@ -42,3 +42,7 @@ class QueueContext:
     unattended: bool
     reviewer: Reviewer | None = None
     """Who must approve an experiment before it moves a real arm; None for nobody."""
+    paused: Callable[[str], None] = lambda _reason: None
+    """Called with the reason when the queue pauses by itself. It must not wait."""
+    ended: Callable[[str, ExperimentState, str], None] = lambda _experiment, _state, _reason: None
+    """Called with the end of each experiment: its number, its state, and why. It must not wait."""

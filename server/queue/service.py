@@ -126,6 +126,8 @@ class QueueService:
             paused = self._pause(reason, anew=by is not None)
         if paused:
             self._context.record_event("queue", f"paused: {reason}", actor=by)
+            if by is None:
+                self._context.paused(reason)
 
     def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
         """Resumes the queue with the operator's consent that it may move the arm. A notice newer than what the operator
@@ -260,6 +262,7 @@ class QueueService:
         interrupted = context.experiments.settle_after_restart(name, now)
         for one in interrupted:
             context.record_event("experiment", f"interrupted: {one.reason}", experiment=one.id)
+            context.ended(one.id, "interrupted", one.reason)
         self._end_outdated_approvals()
         waiting = context.experiments.count_waiting(name)
         before = context.queues.get(name)
@@ -431,6 +434,7 @@ class QueueService:
                 self._running = None
         if paused:
             context.record_event("queue", f"paused: {why}")
+            context.paused(why)
 
     def _write_end(self) -> None:
         """Writes the end of the last experiment, under the lock. If the database raises an error, the end is kept."""
@@ -445,6 +449,7 @@ class QueueService:
         self._ended = None
         what = "completed" if ending.event is Event.COMPLETED else state
         context.record_event("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
+        context.ended(ended.id, state, ending.reason)
         if ending.trace_not_in_catalogue:
             context.add_unfinished_traces()  # the database can be written to again, so its folder can be read
 

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -39,7 +40,18 @@ ANSWERED_WITHIN = 2.0
 log = logging.getLogger("server.stop")
 
 Stop = Callable[[], StopResult]
-OnStop = Callable[[str, StopResult, Caller], None]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Who asked for a stop, from which computer, and at which address of this listener."""
+
+    caller: Caller
+    origin: str
+    address: str
+
+
+OnStop = Callable[[str, StopResult, Asked], None]
 
 
 class StopListener:
@@ -99,7 +111,7 @@ class _Server(ThreadingHTTPServer):
                 with suppress(OSError):  # it has been closed meanwhile
                     request.shutdown(socket.SHUT_RD)
 
-    def stop_all(self, robots: Sequence[str], caller: Caller) -> dict[str, StopResult]:
+    def stop_all(self, robots: Sequence[str], asked: Asked) -> dict[str, StopResult]:
         """Stops robots at the same time, so that an arm that does not answer delays no other's stop.
 
         `on_stop` is called for each as soon as its result is there, on several threads at once: before the answer,
@@ -110,7 +122,7 @@ class _Server(ThreadingHTTPServer):
         def stop(name: str) -> None:
             found[name] = self.stops[name]()  # never raises
             try:
-                self.on_stop(name, found[name], caller)
+                self.on_stop(name, found[name], asked)
             except Exception:  # the arm has been stopped, and the other arms and the client still count on the answer
                 log.exception("stop listener: the stop of %s is not told", name)
 
@@ -193,7 +205,7 @@ class _Handler(BaseHTTPRequestHandler):
         except ProblemError as problem:
             self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
             return
-        results = self.server.stop_all(robots, caller)
+        results = self.server.stop_all(robots, Asked(caller, str(self.client_address[0]), self.path))
         self._answer(200, together(results) if self.path == ALL else results[robots[0]], "application/json")
 
     def do_OPTIONS(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import AwareDatetime, Field, TypeAdapter
 
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.queue import Role
@@ -72,6 +72,12 @@ class Stopped(FrozenRecord):
     text: str
     confirmed: bool
     actor: str
+    role: Role
+    origin: str
+    """Address of the computer that sent the request."""
+    address: str
+    """Address that was requested."""
+    at: AwareDatetime
 
 
 ORDER: TypeAdapter[Begin | Known | Joined | Owned] = TypeAdapter(

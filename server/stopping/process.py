@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import socket
 import sys
-from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import partial
 
 from daq.contracts.service.queue import Role
@@ -17,13 +16,16 @@ from server.access.caller import Caller
 from server.access.stop_gate import StopGate
 from server.steady import keep_steady
 from server.stopping.arm import Reach, stop_arm
-from server.stopping.listener import StopListener
+from server.stopping.listener import Asked, StopListener
 from server.stopping.messages import ORDER, Begin, Joined, Known, Owned, Ready, Stopped
+from server.stopping.teller import Teller
 from server.stopping.tokens import Callers, StopTokens, reader_of
 
 FIRST_READ_WITHIN = 1.0
 """Time (s) to wait for the first read of the tokens before the service is told that the listener is ready. The
 database may not exist yet."""
+TOLD_WITHIN = 0.5
+"""Time (s) to tell the service of the last stops when the listener ends."""
 
 
 class Robots:
@@ -58,17 +60,28 @@ def main() -> int:
     robots = Robots(begin.urls)
     tokens = StopTokens(reader_of(begin.database_url, begin.sqlite), _callers(begin.tokens))
     gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port)
-    os.set_blocking(sys.stdout.fileno(), False)
+    teller = Teller(sys.stdout.fileno())
 
-    def told(robot: str, result: StopResult, caller: Caller) -> None:
-        _tell(Stopped(robot=robot, text=result.text, confirmed=result.confirmed, actor=caller.name))
+    def told(robot: str, result: StopResult, asked: Asked) -> None:
+        teller.tell(
+            Stopped(
+                robot=robot,
+                text=result.text,
+                confirmed=result.confirmed,
+                actor=asked.caller.name,
+                role=asked.caller.role,
+                origin=asked.origin,
+                address=asked.address,
+                at=datetime.now(UTC),
+            )
+        )
 
     stops = {name: partial(robots.stop, name) for name in robots.names()}
     listener = StopListener(socket.socket(fileno=begin.descriptor), gate, stops, told)
     keep_steady()
     if begin.tokens is None:
         tokens.wait_read(FIRST_READ_WITHIN)
-    _tell(Ready())
+    teller.tell(Ready())
     for line in lines:
         order = ORDER.validate_json(line)
         if isinstance(order, Owned):
@@ -78,16 +91,10 @@ def main() -> int:
         elif isinstance(order, Joined):
             tokens.add(order.digest, Caller(order.name, order.role, order.digest))
     listener.close()
+    teller.close(TOLD_WITHIN)
     tokens.close()
     return 0
 
 
 def _callers(tokens: dict[str, tuple[str, Role]] | None) -> Callers | None:
     return None if tokens is None else {digest: Caller(*who, digest) for digest, who in tokens.items()}
-
-
-def _tell(news: Ready | Stopped) -> None:
-    """Writes a line without blocking, so that a service that does not read delays no stop. A line that fits into the
-    pipe is written completely or not at all; the service finds what the pipe holds when it reads again."""
-    with suppress(OSError):
-        os.write(sys.stdout.fileno(), news.model_dump_json().encode() + b"\n")

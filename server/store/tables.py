@@ -298,3 +298,51 @@ class TokenRow(Table):
     digest: Mapped[str] = mapped_column(String(64), unique=True)
     created: Mapped[datetime]
     revoked: Mapped[datetime | None]
+
+
+class AuditRow(Table):
+    """One row of the audit log. Triggers refuse to change or delete it, and to insert one anywhere but at the end."""
+
+    __tablename__ = "audit"
+    __table_args__ = (
+        Index("audit_by_actor", "actor", "sequence"),
+        Index("audit_by_robot", "robot", "sequence"),
+    )
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    at: Mapped[datetime]
+    actor: Mapped[str | None]
+    role: Mapped[str | None] = mapped_column(String(16))
+    origin: Mapped[str]
+    action: Mapped[str] = mapped_column(String(64))
+    request: Mapped[str] = mapped_column(Text)
+    robot: Mapped[str | None] = mapped_column(String(64))
+    subject: Mapped[str | None]
+    outcome: Mapped[str] = mapped_column(String(16))
+    status: Mapped[int | None]
+    detail: Mapped[str] = mapped_column(Text)
+    content: Mapped[str | None] = mapped_column(Text)
+    request_id: Mapped[str | None] = mapped_column(String(16))
+    count: Mapped[int]
+    previous: Mapped[str] = mapped_column(String(64))
+    digest: Mapped[str] = mapped_column(String(64))
+
+
+class OutboxRow(Table):
+    """A notification for one destination."""
+
+    __tablename__ = "outbox"
+    __table_args__ = (Index("outbox_by_destination", "destination", "state", "next_attempt"),)
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    id: Mapped[str] = mapped_column(String(40))
+    """The number of the message, which is the same for all its destinations."""
+    destination: Mapped[str] = mapped_column(String(48))
+    payload: Mapped[str] = mapped_column(Text)
+    created: Mapped[datetime]
+    attempts: Mapped[int] = mapped_column(default=0)
+    next_attempt: Mapped[datetime]
+    state: Mapped[str] = mapped_column(String(16))
+    """`waiting`, `sent` or `given-up`."""
+    problem: Mapped[str] = mapped_column(Text, default="")
+    ended: Mapped[datetime | None]

@@ -17,6 +17,7 @@ import uvicorn
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.config.archive import ArchiveSettings
+from daq.config.notifications import NotificationSettings
 from daq.config.service import ServiceSettings
 from daq.config.settings import RobotSettings, Settings, TraceSettings
 from server.access.gate import Gate
@@ -62,6 +63,7 @@ def service_inside(
     monkeypatch: pytest.MonkeyPatch,
     database: str | None = None,
     archive: ArchiveSettings | None = None,
+    notifications: NotificationSettings | None = None,
     **robot: Any,
 ) -> Iterator[httpx.Client]:
     """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, in
@@ -72,9 +74,10 @@ def service_inside(
         traces=TraceSettings(folder=folder / "traces"),
         server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
         archive=archive or ArchiveSettings(),
+        notifications=notifications or NotificationSettings(),
     )
     services = Services(settings, clock)
-    gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True)
+    gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, audit=services.audit)
     server = _Server(uvicorn.Config(make_app(services, gate), log_config=None, lifespan="on"))
     with socket.create_server(("127.0.0.1", 0)) as listener:
         thread = threading.Thread(target=server.run, args=([listener],), name="service")

@@ -10,11 +10,10 @@ import httpx
 import pytest
 
 from daq.contracts.service.robot import FleetStopResult, StopResult
-from server.access.caller import Caller
 from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens, TokenStore
 from server.stopping.arm import together
-from server.stopping.listener import OnStop, Stop, StopListener
+from server.stopping.listener import Asked, OnStop, Stop, StopListener
 from server.store.engine import Store
 from tests.server.clocks import HandClock
 
@@ -32,8 +31,8 @@ def test_all_arms_are_stopped_at_the_same_time_and_every_stop_is_told(tmp_path: 
         at_once.wait(60)  # nobody gets further before all are asked
         return FROZEN
 
-    def on_stop(robot: str, result: StopResult, caller: Caller) -> None:
-        told.append((robot, result.confirmed, caller.name))
+    def on_stop(robot: str, result: StopResult, asked: Asked) -> None:
+        told.append((robot, result.confirmed, asked.caller.name))
 
     answer = stop_of_all(tmp_path, dict.fromkeys(("a", "b", "c"), stop), on_stop)
     assert answer.confirmed

@@ -1396,6 +1396,49 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/audit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Audit
+         * @description Lists who asked for which change, from where, and what became of it, the newest first. Needs the role operator.
+         *
+         *     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+         */
+        get: operations["list_audit"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/notifications": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Notifications
+         * @description Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
+         *     is told; no request can add or change an address.
+         */
+        get: operations["get_notifications"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/live/frame": {
         parameters: {
             query?: never;
@@ -1766,6 +1809,61 @@ export interface components {
             residuals: components["schemas"]["daq__contracts__service__fleet__JointResidual"][];
             /** Numbers */
             numbers: components["schemas"]["FittedNumber"][];
+        };
+        /**
+         * AuditEntry
+         * @description One row of the log. `number` grows by 1 with each row.
+         */
+        AuditEntry: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** Actor */
+            actor?: string | null;
+            /** Role */
+            role?: string | null;
+            /** Origin */
+            origin: string;
+            /** Action */
+            action: string;
+            /**
+             * Request
+             * @default
+             */
+            request?: string;
+            /** Robot */
+            robot?: string | null;
+            /** Subject */
+            subject?: string | null;
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "done" | "refused" | "failed";
+            /** Status */
+            status?: number | null;
+            /**
+             * Detail
+             * @default
+             */
+            detail?: string;
+            /** Content */
+            content?: string | null;
+            /** Request Id */
+            request_id?: string | null;
+            /**
+             * Count
+             * @default 1
+             */
+            count?: number;
+            /** Number */
+            number: number;
+            /** Previous */
+            previous: string;
+            /** Digest */
+            digest: string;
         };
         /**
          * AwaitInput
@@ -2216,6 +2314,40 @@ export interface components {
             deviation: (number | null)[];
             /** Significance */
             significance: number;
+        };
+        /**
+         * DestinationStatus
+         * @description How far the messages to one destination are. Counts are since the service started, `waiting` is of now.
+         */
+        DestinationStatus: {
+            /** Name */
+            name: string;
+            /**
+             * Channel
+             * @enum {string}
+             */
+            channel: "webhook" | "email";
+            /** Host */
+            host: string;
+            /** About */
+            about: ("done" | "fault" | "attention")[];
+            /** Waiting */
+            waiting: number;
+            /** Sent */
+            sent: number;
+            /** Failed */
+            failed: number;
+            /** Given Up */
+            given_up: number;
+            /** Last Sent */
+            last_sent?: string | null;
+            /**
+             * Problem
+             * @default
+             */
+            problem?: string;
+            /** Next Attempt */
+            next_attempt?: string | null;
         };
         /**
          * DiagnoseRequest
@@ -4328,6 +4460,14 @@ export interface components {
             warning?: boolean;
         };
         /**
+         * NotificationStatus
+         * @description Every destination of the configuration.
+         */
+        NotificationStatus: {
+            /** Destinations */
+            destinations: components["schemas"]["DestinationStatus"][];
+        };
+        /**
          * NumberChange
          * @description A number that two fits of one robot have determined. `low` to `high`: 95 % interval of the difference.
          */
@@ -4400,6 +4540,13 @@ export interface components {
             simulated: (number | null)[][][];
             /** Residual */
             residual: (number | null)[][][];
+        };
+        /** Page[AuditEntry] */
+        Page_AuditEntry_: {
+            /** Items */
+            items: components["schemas"]["AuditEntry"][];
+            /** Next */
+            next?: string | null;
         };
         /** Page[CatalogueEntry] */
         Page_CatalogueEntry_: {
@@ -8772,6 +8919,65 @@ export interface operations {
                 };
                 content: {
                     "application/json": Record<string, never>;
+                };
+            };
+        };
+    };
+    list_audit: {
+        parameters: {
+            query?: {
+                /** @description Only rows with this name of a token. */
+                actor?: string | null;
+                /** @description Only rows with this robot. */
+                robot?: string | null;
+                /** @description Only rows with this action. */
+                action?: string | null;
+                /** @description Only rows with this subject. */
+                subject?: string | null;
+                /** @description Only rows with this outcome. */
+                outcome?: ("done" | "refused" | "failed") | null;
+                /** @description Only rows from this moment on. */
+                since?: string | null;
+                /** @description Only rows before this moment. */
+                until?: string | null;
+                /** @description Length of this part of the list. */
+                limit?: number;
+                /** @description `next` of the previous part. */
+                cursor?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_AuditEntry_"];
+                };
+            };
+        };
+    };
+    get_notifications: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NotificationStatus"];
                 };
             };
         };

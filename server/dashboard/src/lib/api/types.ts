@@ -14,11 +14,13 @@ export type Told<T> = T extends readonly (infer Item)[]
     ? { [Key in keyof T]-?: Told<T[Key]> }
     : T;
 
+export type AuditEntry = Told<Schemas['AuditEntry']>;
 export type CatalogueEntry = Told<Schemas['CatalogueEntry']>;
 export type ComparisonData = Told<Schemas['ComparisonData']>;
 export type Control = Told<Schemas['Control']>;
 export type ControlLease = Told<Schemas['ControlLease']>;
 export type Dependence = Told<Schemas['Dependence']>;
+export type Destination = Told<Schemas['DestinationStatus']>;
 export type DiagnosisData = Told<Schemas['DiagnosisData']>;
 export type DiagnosisStep = Told<Schemas['DiagnosisStep']>;
 export type Experiment = Told<Schemas['Experiment']>;

@@ -1,19 +1,41 @@
 /** What is asked of the service about itself, all at once. */
 
-import { api, ask, here, readiness } from '../api';
+import { api, ask, here, Problem, readiness } from '../api';
+import type { AuditEntry } from '../api';
 import type { Seen } from './service_look.svelte';
 
 /** Events that are shown. */
 export const EVENTS = 30;
+/** Rows of the audit log that are shown. */
+const AUDIT = 8;
+
+/** The newest rows of the audit log; null for whoever may not read it. */
+async function newestAudit(): Promise<readonly AuditEntry[] | null> {
+  try {
+    return (await ask(api.GET('/api/v1/audit', { params: { query: { limit: AUDIT } } }))).items;
+  } catch (error) {
+    if (error instanceof Problem && error.status === 403) return null;
+    throw error;
+  }
+}
 
 export async function lookAtService(): Promise<Seen> {
   const path = here();
   const ofJobs = { path, query: { state: ['queued', 'running'] as ('queued' | 'running')[], limit: 50 } };
-  const [system, health, jobs, events] = await Promise.all([
+  const [system, health, jobs, events, audit, notifications] = await Promise.all([
     ask(api.GET('/api/v1/system')),
     readiness(),
     ask(api.GET('/api/v1/robots/{robot}/jobs', { params: ofJobs })),
     ask(api.GET('/api/v1/robots/{robot}/events', { params: { path, query: { limit: EVENTS } } })),
+    newestAudit(),
+    ask(api.GET('/api/v1/notifications')),
   ]);
-  return { system, health, jobs: jobs.items, events: events.items };
+  return {
+    system,
+    health,
+    jobs: jobs.items,
+    events: events.items,
+    audit,
+    destinations: notifications.destinations,
+  };
 }

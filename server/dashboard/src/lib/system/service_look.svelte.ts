@@ -1,7 +1,7 @@
 /** The service as it was when it was last looked at: its health, its jobs, what happened. What asks is handed in. */
 
 import { asProblem, type Problem } from '../api/problem';
-import type { Health, Job, ServiceEvent, SystemStatus } from '../api/types';
+import type { AuditEntry, Destination, Health, Job, ServiceEvent, SystemStatus } from '../api/types';
 
 /** What is known of it at one moment. */
 export interface Seen {
@@ -11,6 +11,10 @@ export interface Seen {
   readonly jobs: readonly Job[];
   /** The newest first. */
   readonly events: readonly ServiceEvent[];
+  /** The newest rows of the audit log, the newest first; null for whoever may not read it. */
+  readonly audit: readonly AuditEntry[] | null;
+  /** Who is told what, and how far that is. */
+  readonly destinations: readonly Destination[];
 }
 
 export class ServiceLook {

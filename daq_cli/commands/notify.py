@@ -1,0 +1,59 @@
+"""`daq notify`: tries the notifications of the configuration."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from daq.contracts import exit_codes
+from daq.contracts.documents import shown
+from daq.contracts.errors import SpecError
+from daq_cli.app.context import JsonOption, invocation, print_json
+
+app = typer.Typer(add_completion=False, help="Try the notifications of the configuration.", no_args_is_help=True)
+
+
+@app.callback()
+def notify() -> None:
+    """Notifications by webhook and e-mail."""
+
+
+@app.command("test")
+def try_all(
+    context: typer.Context,
+    name: Annotated[
+        str | None, typer.Argument(help="Name of one webhook or person; without it, all are told.", show_default=False)
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Send one message to each webhook and person, and say what was answered. Needs no running service."""
+    from time import perf_counter
+
+    from daq.contracts.service.notifications import Notification
+    from server.clock import SystemClock
+    from server.notifications.delivery import DeliveryError
+    from server.notifications.destinations import destinations_of
+    from server.notifications.service import message_of
+
+    destinations = destinations_of(invocation(context).configuration.notifications)
+    chosen = [one for one in destinations if name in (None, one.name)]
+    if not chosen:
+        there = ", ".join(one.name for one in destinations) or "none"
+        raise SpecError(f"notifications: no destination {'' if name is None else shown(name)}; there is {there}")
+    told = Notification(topic="test", kind="attention", at=SystemClock().utc(), text="a test: nothing has happened")
+    found, failed = [], False
+    for one in chosen:
+        begun, problem, answer = perf_counter(), "", ""
+        try:
+            answer = one.sender.send(message_of(told))
+        except DeliveryError as error:
+            failed, problem = True, str(error)
+        seconds = perf_counter() - begun
+        found.append({"destination": one.key, "answer": answer, "problem": problem, "seconds": round(seconds, 3)})
+        if not json:
+            print(f"{one.key}: {answer or problem} ({seconds:.2f} s)")
+    if json:
+        print_json(found)
+    if failed:
+        raise typer.Exit(exit_codes.NOT_REACHED)

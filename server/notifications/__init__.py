@@ -1,0 +1,1 @@
+"""Notifications by webhook and e-mail, from an outbox in the database that survives a restart."""

@@ -1,0 +1,42 @@
+"""The destinations of the configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from daq.config.notifications import NotificationSettings
+from daq.contracts.service.notifications import NotificationKind
+from server.notifications.delivery import Sender
+from server.notifications.mail import Mail
+from server.notifications.webhook import Webhook
+
+
+@dataclass(frozen=True)
+class Destination:
+    """A webhook, or a person with e-mail. `host`: who is connected to, for people."""
+
+    channel: Literal["webhook", "email"]
+    name: str
+    host: str
+    about: tuple[NotificationKind, ...]
+    sender: Sender
+
+    @property
+    def key(self) -> str:
+        """The name of its rows in the outbox."""
+        return f"{self.channel} {self.name}"
+
+
+def destinations_of(settings: NotificationSettings) -> list[Destination]:
+    """Returns all destinations. Raises SpecError for a file of a secret that cannot be used."""
+    found = [
+        Destination("webhook", name, one.host, one.about, Webhook(one, private_hosts=settings.private_hosts))
+        for name, one in settings.webhooks.items()
+    ]
+    if settings.smtp is not None:
+        smtp = settings.smtp
+        found += [
+            Destination("email", name, smtp.host, one.about, Mail(one, smtp)) for name, one in settings.email.items()
+        ]
+    return found
