@@ -25,8 +25,9 @@ BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
 EARLIEST, LATEST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 MOST_TERMS = 8
 """Number of pairs by which a text is looked for: more of them leave hardly fewer stretches out."""
-FIRST = 8
-"""Number of stretches that are read first, which is enough for a text that many traces have."""
+PARTS = (8, 64, 512, None)
+"""Number of stretches that are looked for, and read, one part after the other; None for all that are left. A text that
+many traces have is in the first ones."""
 MOST = 32
 """Number of ranges that PostgreSQL is asked for at once: one first, then four times as many each time."""
 AT_A_TIME = 500

@@ -19,8 +19,8 @@ from server.store.pages import Cursor, page_of
 from server.store.remembered import Remembered
 from server.store.stretches import (
     EARLIEST,
-    FIRST,
     LATEST,
+    PARTS,
     note_terms,
     ranges_of,
     read_within,
@@ -187,17 +187,28 @@ class TraceStore:
             return list(session.scalars(of_robot.limit(count)))
         until = min(search.until or LATEST, LATEST if place is None else place.moment)
         oldest, newest = stretch_of(search.since or EARLIEST), stretch_of(until)
-        stretches = stretches_with(session, robot, terms, (oldest, newest), FIRST)
-        rows = read_within(session, of_robot, ranges_of(stretches), count)
-        if len(rows) == count or len(stretches) < FIRST:
-            return rows
-        few = self._few_with(session, search.text.lower()) if search.text else None
-        if few is not None:
-            # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads the whole index.
-            of_few = query.where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
-            return list(session.scalars(of_few.limit(count))) if few else []
-        left = stretches_with(session, robot, terms, (oldest, stretches[-1] - 1))
-        return rows + read_within(session, of_robot, ranges_of(left), count - len(rows))
+        rows: list[TraceRow] = []
+        for at_once in PARTS:
+            stretches = stretches_with(session, robot, terms, (oldest, newest), at_once)
+            rows += read_within(session, of_robot, ranges_of(stretches), count - len(rows))
+            if len(rows) == count or at_once is None or len(stretches) < at_once:
+                return rows
+            newest = stretches[-1] - 1
+            few = self._few_of(session, search) if at_once == PARTS[0] else None
+            if few is not None:
+                # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads all of it.
+                of_few = query.where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
+                return list(session.scalars(of_few.limit(count))) if few else []
+        return rows
+
+    def _few_of(self, session: Session, search: TraceSearch) -> list[str] | None:
+        """Returns the identities of all traces with the text, or with the tag, of a search, if they are FEW at most."""
+        if search.tag is not None:
+            tagged = select(TraceTagRow.trace).filter_by(tag=search.tag).limit(FEW + 1)
+            found = list(session.scalars(tagged))
+            if len(found) <= FEW:
+                return found
+        return self._few_with(session, search.text.lower()) if search.text else None
 
     def _few_with(self, session: Session, searched: str) -> list[str] | None:
         """Returns the identities of all traces with this text, which an index of trigrams finds. None if they are more
