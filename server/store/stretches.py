@@ -100,9 +100,7 @@ def ranges_of(stretches: Iterable[int]) -> Iterator[Range]:
         yield _time_of(oldest), _time_of(newest + 1)
 
 
-def read_within(
-    session: Session, query: Select[tuple[TraceRow]], ranges: Iterable[Range], count: int
-) -> list[TraceRow]:
+def read_within(session: Session, query: Select[TraceRow], ranges: Iterable[Range], count: int) -> list[TraceRow]:
     """Returns the first `count` rows of a query that lie in ranges of time; rows and ranges have the list's order."""
     rows: list[TraceRow] = []
     left, at_once = iter(ranges), 1
@@ -115,11 +113,11 @@ def read_within(
     return rows
 
 
-def _one(query: Select[tuple[TraceRow]], within: Range) -> Select[tuple[TraceRow]]:
+def _one(query: Select[TraceRow], within: Range) -> Select[TraceRow]:
     return query.where(TraceRow.created >= within[0], TraceRow.created < within[1])
 
 
-def _each(query: Select[tuple[TraceRow]], ranges: Sequence[Range]) -> Select[tuple[TraceRow]]:
+def _each(query: Select[TraceRow], ranges: Sequence[Range]) -> Select[TraceRow]:
     """Asks PostgreSQL for several ranges at once, each through the list's index: an answer takes longer to come than
     to find. (`OR` leaves it to the planner, which may read the whole list.)"""
     begins, beyonds = (

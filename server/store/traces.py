@@ -281,7 +281,7 @@ def _archived(session: Session, identities: list[str]) -> set[str]:
     return set(session.scalars(query))
 
 
-def _query(search: TraceSearch, place: Cursor | None, dialect: str) -> Select[tuple[TraceRow]]:
+def _query(search: TraceSearch, place: Cursor | None, dialect: str) -> Select[TraceRow]:
     """The traces of all robots that a search finds after a place of the list, the newest first."""
     query = select(TraceRow)
     for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
