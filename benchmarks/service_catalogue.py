@@ -24,6 +24,7 @@ from sqlalchemy import insert, text
 from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.service_process import DATABASES, ROBOT, RunningService, database_of, dice, started_service
 from server.store.engine import Store
+from server.store.stretches import note_terms
 from server.store.tables import TraceRow, TraceTagRow
 
 TARGET_MS = 50.0
@@ -54,6 +55,11 @@ WORDS = [
 ]
 TAGS = tuple(f"week {number}" for number in range(40))
 RARE = "brass bush replaced"
+FIRST, LAST = "night shift", "workshop"
+"""Operators of the oldest and of the newest traces alone: a list that is read from its newest trace on finds the one
+late, an index that is read in the order of writing the other."""
+SPAN = 0.05
+"""Share of the traces that each of them recorded."""
 BATCH = 5000
 
 
@@ -66,6 +72,7 @@ def rows(count: int, random_: random.Random) -> Iterator[dict[str, Any]]:
         file = f"{moment:%Y%m%dT%H%M%SZ}_{ROBOT}_{kind}_{identity}.mcap"
         notes = RARE if number % 9973 == 0 else " ".join(random_.choices(WORDS, k=6))
         outcome = random_.choice(OUTCOMES)
+        operator = FIRST if number < SPAN * count else LAST if number >= (1 - SPAN) * count else "anna"
         yield {
             "id": identity,
             "robot": ROBOT,
@@ -79,10 +86,10 @@ def rows(count: int, random_: random.Random) -> Iterator[dict[str, Any]]:
             "samples": 1500,
             "duration": 30.0,
             "size": 900_000,
-            "operator": "anna",
+            "operator": operator,
             "experiment": None,
             "notes": notes,
-            "searched": "\n".join((identity, file, f"study {number % 300}", kind, "anna", notes, outcome)).lower(),
+            "searched": "\n".join((identity, file, f"study {number % 300}", kind, operator, notes, outcome)).lower(),
             "missing": False,
         }
 
@@ -96,9 +103,13 @@ def fill(folder: Path, database: str, count: int) -> None:
     made = list(rows(count, random_))
     for first in range(0, count, BATCH):
         part = made[first : first + BATCH]
+        tags = [{"trace": row["id"], "tag": random_.choice(TAGS)} for row in part]
+        for row, tag in zip(part, tags, strict=True):
+            row["searched"] += f"\n{tag['tag']}"
         with store.writing() as session:
             session.execute(insert(TraceRow), part)
-            session.execute(insert(TraceTagRow), [{"trace": row["id"], "tag": random_.choice(TAGS)} for row in part])
+            session.execute(insert(TraceTagRow), tags)
+            note_terms(session, ROBOT, ((row["created"], row["searched"]) for row in part))
         for row in part:
             (folder / "traces" / row["file"]).touch()
     with store.engine.execution_options(isolation_level="AUTOCOMMIT").connect() as connection:
@@ -119,8 +130,8 @@ def listed(service: RunningService, times: int) -> list[float]:
     return found
 
 
-def searched(service: RunningService, times: int) -> dict[str, list[float]]:
-    """Times (ms) of searches by what they look for."""
+def searched(service: RunningService, times: int, count: int) -> dict[str, list[float]]:
+    """Times (ms) of searches among so many traces, by what they look for."""
     random_ = dice(2)
     kinds: dict[str, list[float]] = {}
     for _ in range(times):
@@ -128,7 +139,18 @@ def searched(service: RunningService, times: int) -> dict[str, list[float]]:
             "a word that many have": {"q": random_.choice(WORDS)},
             "words that few have": {"q": RARE},
             "what nothing has": {"q": f"{random_.getrandbits(40):x} nowhere"},
-            "two letters": {"q": random_.choice(("qx", "be", "72"))},
+            "the oldest traces alone": {"q": FIRST},
+            "the newest alone, from further back": {"q": LAST, "until": _somewhere(random_, count)},
+            "one letter": {"q": random_.choice(("a", "7", "_", "ß"))},
+            "two letters": {"q": random_.choice(("be", "72", "st"))},
+            "two letters, from further back": {"q": random_.choice(("be", "72")), "until": _somewhere(random_, count)},
+            "two letters that nothing has": {"q": random_.choice(("qx", "jq", "€%"))},
+            "two letters that few have": {"q": "bu"},
+            "two letters of the oldest alone": {"q": "gh", "until": _somewhere(random_, count)},
+            "two letters and a kind": {"q": "be", "kind": random_.choice(KINDS)},
+            "two letters and a tag": {"q": "72", "tag": random_.choice(TAGS)},
+            "two letters of runs that failed": {"q": "72", "outcome": "fault"},
+            "a kind that nothing has": {"kind": "nothing"},
             "one tag": {"tag": random_.choice(TAGS)},
             "one kind": {"kind": random_.choice(KINDS)},
             "runs that failed": {"outcome": random_.choice(("fault", "interrupted"))},
@@ -138,6 +160,11 @@ def searched(service: RunningService, times: int) -> dict[str, list[float]]:
         for name, question in questions.items():
             kinds.setdefault(name, []).append(_timed(service, question | {"limit": 50})[0])
     return kinds
+
+
+def _somewhere(random_: random.Random, count: int) -> str:
+    """A time in the middle of the list, whose traces are 465 s apart on average."""
+    return (START + timedelta(seconds=465 * count * random_.uniform(0.1, 0.9))).isoformat()
 
 
 def _timed(service: RunningService, query: dict[str, Any]) -> tuple[float, dict[str, Any]]:
@@ -156,7 +183,7 @@ def measure(kind: str, count: int, times: int) -> tuple[list[float], dict[str, l
         begun = time.perf_counter()
         with started_service(folder, "mock://") as service:
             start = time.perf_counter() - begun
-            return listed(service, 10 * times), searched(service, times), start
+            return listed(service, 10 * times), searched(service, times, count), start
 
 
 def main() -> int:

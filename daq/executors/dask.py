@@ -26,6 +26,9 @@ from daq.executors.workers import BlamedError, Workers
 PATIENCE = 20.0
 """Time (s) within which a scheduler must answer, and have a worker."""
 LOST = "the connection to Dask's scheduler was lost, and with it the jobs; the same command goes on"
+CONFIGURATION = {"distributed.worker.profile.enabled": False, "distributed.scheduler.work-stealing": False}
+"""Settings of a cluster that is started here: a worker's profiler looks at its threads a hundred times a second, and
+nobody looks at what it finds; no more is given to a worker than it can begin soon, so there is nothing to steal."""
 COUNT_EVERY = 5.0
 """Time (s) between two counts of the workers, which may come and go."""
 
@@ -36,6 +39,8 @@ class DaskWorkers(Workers):
     Args:
         cluster: what was started for this executor, and ends with it.
     """
+
+    together = 1.0
 
     def __init__(self, client: Client, cluster: Cluster | None = None) -> None:
         self._client = client
@@ -100,13 +105,14 @@ def dask_workers(address: Address, patience: float = PATIENCE) -> DaskWorkers:
     if address.place:
         scheme = "tls" if address.kind == "dask+tls" else "tcp"
         return connected(address.url, f"{scheme}://{address.place}", patience=patience)
-    cluster = LocalCluster(
-        n_workers=address.workers or cores(),
-        threads_per_worker=1,
-        host="127.0.0.1",
-        dashboard_address=None,
-        processes=True,
-    )
+    with dask.config.set(CONFIGURATION):
+        cluster = LocalCluster(
+            n_workers=address.workers or cores(),
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            processes=True,
+        )
     return connected(address.url, cluster.scheduler_address, cluster)
 
 

@@ -6,6 +6,7 @@ import contextlib
 from abc import abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor
+from typing import ClassVar
 
 
 class BlamedError(BrokenExecutor):
@@ -18,6 +19,10 @@ class Workers(Executor):
     A job whose worker has died ends with a `BrokenExecutor` exception, unless the executor has computed it again; the
     executor itself takes further jobs.
     """
+
+    together: ClassVar[float] = 0.0
+    """Time (s) that short jobs which are given as one should take together, where a job costs much to give; 0 to give
+    each by itself."""
 
     @abstractmethod
     def count(self) -> int:

@@ -183,6 +183,17 @@ class TraceTagRow(Table):
     tag: Mapped[str] = mapped_column(String(40), primary_key=True, index=True)
 
 
+class TraceStretchRow(Table):
+    """One character, or pair of neighbouring characters, that texts of a stretch of the list have (stretches.py)."""
+
+    __tablename__ = "trace_stretches"
+    __table_args__ = {"sqlite_with_rowid": False}
+
+    robot: Mapped[str] = mapped_column(String(32), primary_key=True)
+    term: Mapped[str] = mapped_column(String(2), primary_key=True)
+    stretch: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+
+
 class JobRow(Submitted, Table):
     """A computation in the background: a fit, a validation, a comparison."""
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import delete, func, select, text, tuple_, update
+from sqlalchemy import Select, delete, func, or_, select, text, update
 from sqlalchemy.orm import Session
 
 from daq.contracts.labels import Outcome, Source
@@ -17,6 +17,17 @@ from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, page_of
 from server.store.remembered import Remembered
+from server.store.stretches import (
+    EARLIEST,
+    LATEST,
+    PARTS,
+    note_terms,
+    ranges_of,
+    read_within,
+    stretch_of,
+    stretches_with,
+    terms_asked,
+)
 from server.store.tables import ArchivedRow, TraceRow, TraceTagRow, TraceUseRow
 
 TRIGRAM = 3
@@ -92,8 +103,8 @@ class TraceStore:
             else:
                 line = f"{new.label} is in the catalogue already, as {row.file}"
                 raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
-            row.searched = _searched(row, tags)
             session.add(row)
+            _write_searched(session, row, tags)
 
     def files(self, robot: str) -> set[str]:
         """Returns the names of all files of a robot in the table."""
@@ -151,32 +162,11 @@ class TraceStore:
 
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
-        few = self._few_with(search.text.lower()) if search.text else None
-        if few == []:  # else SQLite reads the whole index for a list that is empty
+        place = None if cursor is None else Cursor.parse(cursor)
+        if "\0" in (search.text or ""):  # which no database looks for
             return Page(items=())
-        if few is None:
-            query = select(TraceRow).where(TraceRow.robot == robot)
-        else:
-            # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads the whole index.
-            query = select(TraceRow).where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
-        for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
-            if wanted is not None:
-                query = query.where(getattr(TraceRow, column) == wanted)
-        if search.text:
-            searched = search.text.lower().replace("\0", "")
-            query = query.where(TraceRow.searched.contains(searched, autoescape=True))
-        if search.tag is not None:
-            query = query.where(TraceRow.id.in_(select(TraceTagRow.trace).filter_by(tag=search.tag)))
-        if search.since is not None:
-            query = query.where(TraceRow.created >= search.since)
-        if search.until is not None:
-            query = query.where(TraceRow.created < search.until)
-        if cursor is not None:
-            place = Cursor.parse(cursor)
-            query = query.where(tuple_(TraceRow.created, TraceRow.id) < tuple_(place.moment, place.identity))
-        query = query.order_by(TraceRow.created.desc(), TraceRow.id.desc()).limit(limit + 1)
         with self._store.reading() as session:
-            rows = list(session.scalars(query))
+            rows = self._rows(session, robot, search, place, limit + 1)
             tags = _tags(session, [row.id for row in rows])
             archived = _archived(session, [row.id for row in rows])
         return page_of(
@@ -186,24 +176,55 @@ class TraceStore:
             lambda row: Cursor(row.created.timestamp(), row.id),
         )
 
-    def _few_with(self, searched: str) -> list[str] | None:
+    def _rows(
+        self, session: Session, robot: str, search: TraceSearch, place: Cursor | None, count: int
+    ) -> list[TraceRow]:
+        """Returns the first rows that a search finds after a place of the list, the newest first."""
+        query = _query(search, place, session.get_bind().dialect.name)
+        of_robot = query.where(TraceRow.robot == robot)
+        terms = terms_asked(_texts(search))
+        if not terms:
+            return list(session.scalars(of_robot.limit(count)))
+        until = min(search.until or LATEST, LATEST if place is None else place.moment)
+        oldest, newest = stretch_of(search.since or EARLIEST), stretch_of(until)
+        rows: list[TraceRow] = []
+        for at_once in PARTS:
+            stretches = stretches_with(session, robot, terms, (oldest, newest), at_once)
+            rows += read_within(session, of_robot, ranges_of(stretches), count - len(rows))
+            if len(rows) == count or at_once is None or len(stretches) < at_once:
+                return rows
+            newest = stretches[-1] - 1
+            few = self._few_of(session, search) if at_once == PARTS[0] else None
+            if few is not None:
+                # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads all of it.
+                of_few = query.where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
+                return list(session.scalars(of_few.limit(count))) if few else []
+        return rows
+
+    def _few_of(self, session: Session, search: TraceSearch) -> list[str] | None:
+        """Returns the identities of all traces with the text, or with the tag, of a search, if they are FEW at most."""
+        if search.tag is not None:
+            tagged = select(TraceTagRow.trace).filter_by(tag=search.tag).limit(FEW + 1)
+            found = list(session.scalars(tagged))
+            if len(found) <= FEW:
+                return found
+        return self._few_with(session, search.text.lower()) if search.text else None
+
+    def _few_with(self, session: Session, searched: str) -> list[str] | None:
         """Returns the identities of all traces with this text, which an index of trigrams finds. None if they are more
         than FEW, so that reading the list in its order soon finds the first ones, and if there is no such index."""
-        if "\0" in searched:  # which no database looks for
-            return []
         if len(searched) < TRIGRAM:
             return None
-        with self._store.reading() as session:
-            match session.get_bind().dialect.name:
-                case "sqlite":
-                    phrase = '"' + searched.replace('"', '""') + '"'
-                    found = session.scalars(_FEW_OF_SQLITE, {"phrase": phrase, "most": FEW + 1})
-                case "postgresql":
-                    matching = TraceRow.searched.contains(searched, autoescape=True)
-                    found = session.scalars(select(TraceRow.id).where(matching).limit(FEW + 1))
-                case _:
-                    return None
-            identities = list(found)
+        match session.get_bind().dialect.name:
+            case "sqlite":
+                phrase = '"' + searched.replace('"', '""') + '"'
+                found = session.scalars(_FEW_OF_SQLITE, {"phrase": phrase, "most": FEW + 1})
+            case "postgresql":
+                matching = TraceRow.searched.contains(searched, autoescape=True)
+                found = session.scalars(select(TraceRow.id).where(matching).limit(FEW + 1))
+            case _:
+                return None
+        identities = list(found)
         return identities if len(identities) <= FEW else None
 
     def change(self, robot: str, identity: str, change: TraceChange) -> CatalogueEntry:
@@ -218,7 +239,7 @@ class TraceStore:
                     session.add(TraceTagRow(trace=row.id, tag=tag))
             session.flush()
             tags = _tags(session, [row.id]).get(row.id, ())
-            row.searched = _searched(row, tags)
+            _write_searched(session, row, tags)
             return _entry(row, tags, archived=bool(_archived(session, [row.id])))
 
     def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
@@ -258,6 +279,42 @@ def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]
 def _archived(session: Session, identities: list[str]) -> set[str]:
     query = select(ArchivedRow.trace).where(ArchivedRow.trace.in_(identities), ArchivedRow.deleting.is_(False))
     return set(session.scalars(query))
+
+
+def _query(search: TraceSearch, place: Cursor | None, dialect: str) -> Select[TraceRow]:
+    """The traces of all robots that a search finds after a place of the list, the newest first."""
+    query = select(TraceRow)
+    for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
+        if wanted is not None:
+            query = query.where(getattr(TraceRow, column) == wanted)
+    if search.text:
+        # The index of trigrams has another collation: else PostgreSQL may read it in place of a stretch of the list.
+        searched = TraceRow.searched.collate("C") if dialect == "postgresql" else TraceRow.searched
+        query = query.where(searched.contains(search.text.lower(), autoescape=True))
+    if search.tag is not None:
+        query = query.where(TraceRow.id.in_(select(TraceTagRow.trace).filter_by(tag=search.tag)))
+    if search.since is not None:
+        query = query.where(TraceRow.created >= search.since)
+    if search.until is not None:
+        query = query.where(TraceRow.created < search.until)
+    if place is not None:
+        # No comparison of pairs: PostgreSQL would begin to read there, though a stretch begins much later.
+        query = query.where(TraceRow.created <= place.moment)
+        query = query.where(or_(TraceRow.created < place.moment, TraceRow.id < place.identity))
+    return query.order_by(TraceRow.created.desc(), TraceRow.id.desc())
+
+
+def _texts(search: TraceSearch) -> list[str]:
+    """What a trace's text has if a search finds it: it holds what the filters compare, too, each in a line of its own
+    below the number."""
+    filters = (search.tag, search.source, search.outcome, search.kind)
+    return [one.lower() for one in (search.text, *(f"\n{one}" for one in filters if one)) if one]
+
+
+def _write_searched(session: Session, row: TraceRow, tags: Iterable[str]) -> None:
+    """Writes the text that a search looks at, and notes for its stretch of the list what it has."""
+    row.searched = _searched(row, tags)
+    note_terms(session, row.robot, [(row.created, row.searched)])
 
 
 def _searched(row: TraceRow, tags: Iterable[str]) -> str:

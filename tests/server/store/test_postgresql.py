@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 from alembic import command
-from sqlalchemy import text
+from sqlalchemy import insert, text
 
 from server.clock import SystemClock
 from server.stopping.tokens import reader_of
 from server.store.address import open_engine
 from server.store.engine import Store, StoreError, migrations
 from server.store.lock import InUseError, ServerLock, sole_use
+from server.store.tables import TraceRow
 from server.store.traces import TraceSearch, TraceStore
 from tests.server.inside import service_inside
 from tests.server.postgresql import PostgresServer
@@ -72,12 +73,24 @@ def test_an_older_database_is_brought_up_to_date_and_searched(postgresql: Postgr
         config.attributes["connection"] = connection
         command.downgrade(config, "0005")
         connection.commit()
-    traces = TraceStore(store)
-    traces.insert(new_trace(1, notes="brass bush"))
+    _insert_as_older_versions_did(store, "brass bush")
     store.migrate()
     store.require_sound()
-    assert [one.id for one in traces.page("ma2000", TraceSearch(text="ass bu"), None, 10).items] == [f"{1:012x}"]
+    traces = TraceStore(store)
+    for text_ in ("ass bu", "ss", "h"):
+        assert [one.id for one in traces.found("ma2000", TraceSearch(text=text_), None, 10).items] == [f"{1:012x}"]
     store.close()
+
+
+def _insert_as_older_versions_did(store: Store, notes: str) -> None:
+    row = {
+        **new_trace(1, notes=notes).__dict__,
+        "joints": [1, 2, 3],
+        "missing": False,
+        "searched": f"{1:012x}\n{notes}",
+    }
+    with store.writing() as session:
+        session.execute(insert(TraceRow), [row])
 
 
 def test_a_lost_extension_costs_speed_and_finds_the_same(postgresql: PostgresServer) -> None:
