@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from daq.contracts.errors import SpecError, TraceError
@@ -74,6 +76,20 @@ class RecordedMotion:
         """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
         smooth = low_pass(torque, self.cutoff, self.period)
         return np.ascontiguousarray(smooth[self.rows])
+
+    def driven(self, late: Floats) -> Floats:
+        """The drive (k, n) that acts at the grid's times, where it acts so long (n,), s, after its sample.
+
+        Between samples of the grid by cubic splines: a straight line would take 4 % of what moves at the cutoff.
+        """
+        if not late.any():
+            return self.drive
+        times = np.clip(self.time[:, None] - late, self.time[0], self.time[-1])
+        return np.stack([spline(times[:, j]) for j, spline in enumerate(self._drive_splines)], axis=1)
+
+    @cached_property
+    def _drive_splines(self) -> list[CubicSpline]:
+        return [CubicSpline(self.time, column) for column in self.drive.T]
 
     @property
     def turns(self) -> Mask:

@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
 from model.effects.library import library
+from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
@@ -227,9 +228,13 @@ def _limit(place: _Place) -> Iterator[Start]:
 
 def _delay(place: _Place) -> Iterator[Start]:
     controller = place.model.machine.controller
-    longest = np.inf if isinstance(controller, NoController) else 13 * controller.period.value
+    if isinstance(controller, NoController):
+        least = MOST * max(r.sampled for r in place.records)
+        for time in [t for t in DELAYS if t > least] or [1.5 * least]:
+            yield {"time": time}
+        return
     for time in DELAYS:
-        if time <= longest:
+        if time <= 13 * controller.period.value:
             yield {"time": time}
 
 

@@ -27,8 +27,9 @@ from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.verdict import verdict
+from model.inverse_dynamics.drive_timing import MOST, samples_late, timing_unknowns
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
-from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples, recorded_motions
+from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.repeats import repeated_noise
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
@@ -43,6 +44,8 @@ SUSPECTED = 10.0
 and still short of what naming it takes."""
 ROUNDED = 5.0
 """s to which the time that is still to be recorded is rounded up."""
+SLIGHTLY_LATE = 0.1
+"""Least lateness of a drive that is told, in samples."""
 ABOVE_NOISE = 1.2
 """Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
 removed."""
@@ -112,7 +115,7 @@ class _Workflow:
     def __post_init__(self) -> None:
         self.begin = self.model
         self.now = self._fit(self.model)
-        self.first = self.now.values
+        self.first = self.now
         source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE}
         self.notes.append(Note(kind="tolerance-source", values=source))
 
@@ -140,7 +143,8 @@ class _Workflow:
         known = {u.name for u in own}
         sizes = recorded_sizes(model, records)
         found = tuple(u for u in tolerances(model, self.added, sizes)[0] if u.name not in known)
-        return fit(TorqueBalance(model, self.case.records), (*own, *found), begin or {}, self.case.data)
+        unknowns = (*own, *found, *timing_unknowns(model))
+        return fit(TorqueBalance(model, self.case.records), unknowns, begin or {}, self.case.data)
 
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
@@ -155,11 +159,6 @@ class _Workflow:
             before, after = self._predicted(self.now, chosen.fit)
             removed = self._removed(chosen, before, after)
             holds = removed >= options.least_share
-            timing = self._timing(found, chosen) if holds else None
-            if timing is not None:
-                self._take(timing)
-                self.notes.append(_timing_note(timing, self.case.records))
-                return True
             self.steps.append(self._step(found, chosen, (before, after), removed, told, refused))
             if holds:
                 self._take(chosen)
@@ -215,23 +214,16 @@ class _Workflow:
 
     def _take(self, chosen: Fitted) -> None:
         self.added |= {p.name for p in chosen.parameters}
-        self.model = chosen.model.with_values(chosen.fit.values)
+        self.model = chosen.model.with_values(chosen.fit.model_values)
         self.now = self._fit(self.model, chosen.fit.values)
 
-    def _timing(self, found: Findings, chosen: Fitted) -> Fitted | None:
-        """A delay of less than a sample that explains as much as the chosen effect.
-
-        No record tells whether a recorded drive acted at its moment or until the next sample: such a delay is taken
-        into the model, and is no effect.
-        """
-        if holds_drive_between_samples(self.model.machine):
-            return None
-        least = min(record.sampled for record in self.case.records)
-        for other in found.fitted:
-            near = chosen.evidence - other.evidence < self.case.options.least_margin
-            if near and other.effect == "input_delay" and max(_delays(other)) < least:
-                return other
-        return None
+    def _timing(self) -> tuple[Note, ...]:
+        """How late the drives were found to act, which is taken for the way in which they are formed and held."""
+        late = samples_late(self.model, self.now.values)
+        if late.max() < SLIGHTLY_LATE:
+            return ()
+        period = min(record.sampled for record in self.case.records)
+        return (Note(kind="drive-timing", values={"delays": list(map(float, late * period)), "samples": MOST}),)
 
     def _predicted(self, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
@@ -328,10 +320,9 @@ class _Workflow:
             if not step.adopted or step.effect is None:
                 continue
             without = self.model.without_effect(step.effect, step.joints or None)
-            kept = {n: v for n, v in self.now.values.items() if n in without.by_name}
-            smaller = self._fit(without, kept)
+            smaller = self._fit(without, self.now.values)
             if evidence(smaller, self.now, self.now.noise.memory, len(step.parameters), 1) < 0:
-                self.model, self.now = without.with_values(smaller.values), smaller
+                self.model, self.now = without.with_values(smaller.model_values), smaller
                 self.added -= set(step.parameters)
                 gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
                 self.steps[index] = step.model_copy(update=gone)
@@ -355,8 +346,8 @@ class _Workflow:
         gives."""
         held = self.case.held_out
         records = held or self.case.records
-        before = holdout.relative_torque_error(self.begin.with_values(self.first), records)
-        after = holdout.relative_torque_error(self.model.with_values(self.now.values), records)
+        before = holdout.relative_torque_error(self.begin, self.first.values, records)
+        after = holdout.relative_torque_error(self.model, self.now.values, records)
         return Note(kind="torque-left", values={"held_out": bool(held), "before": before, "after": after})
 
     def _errors(self, records: tuple[RecordedMotion, ...]) -> tuple[SignalError, ...]:
@@ -372,11 +363,12 @@ class _Workflow:
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]
-        stated = on_stated_numbers((u for u in self.now.unknowns if u.name not in self.added), self.now.values)
+        own = [u for u in self.now.unknowns if not u.nuisance]
+        stated = on_stated_numbers((u for u in own if u.name not in self.added), self.now.values)
         lineage = Lineage(
             parent=self.begin.identity,
             traces=tuple(traces),
-            fit={"fitted": [u.name for u in self.now.unknowns]},
+            fit={"fitted": [u.name for u in own]},
             note="diagnosis",
         )
         fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
@@ -393,23 +385,14 @@ class _Workflow:
             candidates=self.tried,
             remaining=shapes,
             model_before=self.begin,
-            model_after=self.model.with_values(self.now.values).with_lineage(lineage),
+            model_after=self.model.with_values(self.now.model_values).with_lineage(lineage),
             traces=tuple(traces),
             holdout=tuple(held_out),
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
+            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
         )
-
-
-def _delays(found: Fitted) -> list[float]:
-    return [found.fit.values[p.name] for p in found.parameters]
-
-
-def _timing_note(found: Fitted, records: Sequence[RecordedMotion]) -> Note:
-    period = min(record.sampled for record in records)
-    return Note(kind="drive-timing", values={"delays": _delays(found), "period": period})
 
 
 def _assumptions(cutoff: float) -> tuple[Note, ...]:

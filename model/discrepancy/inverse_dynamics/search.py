@@ -11,11 +11,14 @@ from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
 from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.estimates import found_values
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.effects.library import effect as effect_of
+from model.inverse_dynamics.drive_timing import DELAY, MOST, timing_unknowns
+from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -79,7 +82,7 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
     """
     slopes = now.slopes()
     prober = prepare_probes(now, slopes)
-    fitted_model = model.with_values(now.values)
+    fitted_model = model.with_values(now.model_values)
     probes: list[Probe] = []
     for trial in list_trials(fitted_model, now, case):
         stop_if(cancel)
@@ -92,7 +95,18 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    return Findings(tuple(_weigh(found, now, places)), tuple(probes))
+    weighed = _weigh(found, now, places)
+    return Findings(tuple(f for f in weighed if not _is_drive_timing(f)), tuple(probes))
+
+
+def _is_drive_timing(found: Fitted) -> bool:
+    """Whether this is a delay that may be how the drive is formed and held: on some joint the lower end of its interval
+    is not beyond what such a drive may be late by."""
+    if found.effect != DELAY or holds_drive_between_samples(found.model.machine):
+        return False
+    most = MOST * max(record.sampled for record in found.fit.balance.records)
+    estimates = found_values(found.fit, found.parameters).values()
+    return any(e.low is None or e.low <= most for e in estimates)
 
 
 def _on(joints: tuple[int, ...]) -> str:
@@ -145,7 +159,9 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[
     wider = model.with_effect(effect, joints)
     own = tuple(p for probe in probes for p in probe.trial.parameters)
     start: Start = {name: value for p in probes for name, value in p.start.items()}
-    unknowns = (*now.unknowns, *(free_unknown(p) for p in own))
+    timing = {u.name for u in timing_unknowns(wider)}
+    kept = (u for u in now.unknowns if not u.nuisance or u.name in timing)
+    unknowns = (*kept, *(free_unknown(p) for p in own))
     balance = TorqueBalance(wider, now.balance.records)
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
     return Fitted(effect, joints, wider, own, fitted, 0.0)
