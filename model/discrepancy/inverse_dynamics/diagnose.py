@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
+from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
@@ -34,6 +35,7 @@ from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.repeats import repeated_noise
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
+from model.machine_model.parameter import Parameter
 
 CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
@@ -106,7 +108,7 @@ class _Workflow:
     case: TorqueCase
     progress: Progress
     cancel: Cancel
-    added: frozenset[str] = frozenset()
+    added: dict[str, Parameter] = field(default_factory=dict)
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
@@ -114,7 +116,7 @@ class _Workflow:
 
     def __post_init__(self) -> None:
         self.begin = self.model
-        self.now = self._fit(self.model)
+        self.now = self._fit(self.model, {}, self.added)
         self.first = self.now
         source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE}
         self.notes.append(Note(kind="tolerance-source", values=source))
@@ -124,7 +126,7 @@ class _Workflow:
         while len([s for s in self.steps if s.adopted]) < self.case.options.most_steps:
             done = len(self.steps)
             self._report(0.1, "what is missing")
-            found = search(self.model, self.now, self.case, self._report, self.cancel)
+            found = self._search()
             if not self._adopt(found):
                 self.tried = self._candidates(found)
                 self.suspicion = self._suspect(found)
@@ -132,19 +134,25 @@ class _Workflow:
             self._report(0.9, "what is not needed any more")
             self._prune(done)
 
+    def _search(self) -> Findings:
+        """What a step found, without what the records do not resolve."""
+        found = search(self.model, self.now, self.case, self._report, self.cancel)
+        return replace(found, fitted=tuple(f for f in found.fitted if is_resolved(f, self.now, self.case)))
+
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
         whole = self.case.options.most_steps
         self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
 
-    def _fit(self, model: Model, begin: dict[str, float] | None = None) -> BalanceFit:
-        records = self.case.records
-        own, _ = tolerances(self.begin, sizes=recorded_sizes(self.begin, records))
+    def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
+        """The model fitted again, with the parameters that the diagnosis has `added` without priors."""
+        records, names = self.case.records, frozenset(added)
+        own = [u for u in tolerances(self.begin, sizes=recorded_sizes(self.begin, records))[0] if u.name not in names]
         known = {u.name for u in own}
-        sizes = recorded_sizes(model, records)
-        found = tuple(u for u in tolerances(model, self.added, sizes)[0] if u.name not in known)
+        sizes = {**recorded_sizes(model, records), **added}
+        found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
         unknowns = (*own, *found, *timing_unknowns(model))
-        return fit(TorqueBalance(model, self.case.records), unknowns, begin or {}, self.case.data)
+        return fit(TorqueBalance(model, self.case.records), unknowns, begin, self.case.data)
 
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
@@ -213,9 +221,9 @@ class _Workflow:
         return holdout.evidence(self.now, chosen.fit, self.case.held_out)
 
     def _take(self, chosen: Fitted) -> None:
-        self.added |= {p.name for p in chosen.parameters}
+        self.added |= {p.name: p for p in chosen.parameters}
         self.model = chosen.model.with_values(chosen.fit.model_values)
-        self.now = self._fit(self.model, chosen.fit.values)
+        self.now = self._fit(self.model, chosen.fit.values, self.added)
 
     def _timing(self) -> tuple[Note, ...]:
         """How late the drives were found to act, which is taken for the way in which they are formed and held."""
@@ -319,14 +327,23 @@ class _Workflow:
         for index, step in enumerate(self.steps[:latest]):
             if not step.adopted or step.effect is None:
                 continue
-            without = self.model.without_effect(step.effect, step.joints or None)
-            smaller = self._fit(without, self.now.values)
+            kept = {name: p for name, p in self.added.items() if name not in step.parameters}
+            without = self._without(step)
+            smaller = self._fit(without, self.now.values, kept)
             if evidence(smaller, self.now, self.now.noise.memory, len(step.parameters), 1) < 0:
                 self.model, self.now = without.with_values(smaller.model_values), smaller
-                self.added -= set(step.parameters)
+                self.added = kept
                 gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
                 self.steps[index] = step.model_copy(update=gone)
                 self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
+
+    def _without(self, step: Step) -> Model:
+        """The model without the effect of a step, but for joints of which the file states it."""
+        stated = {j for name in step.parameters if name in self.begin.by_name for j in self.begin.parameter(name).joints}
+        joints = tuple(j for j in step.joints if j not in stated)
+        if step.effect is None or (step.joints and not joints):
+            return self.model
+        return self.model.without_effect(step.effect, joints or None)
 
     def _as_last_fitted(self) -> tuple[Step, ...]:
         """The steps with the parameters of the last fit: a step's own values are biased by effects that were found

@@ -47,7 +47,7 @@ class Prober:
     def probe(self, trial: Trial) -> Probe:
         """The best of a trial's starts."""
         balance = TorqueBalance(trial.model, self.now.balance.records)
-        null = {p.name: float(p.null) for p in trial.parameters if p.null is not None}
+        null = {p.name: float(p.null) for p in trial.parameters if p.null is not None} | dict(trial.origin)
         best = Probe(trial, 0.0, trial.starts[0])
         for start in trial.starts:
             columns = [self._column(balance, {**start, **null, name: start[name]}) for name in trial.amplitudes]

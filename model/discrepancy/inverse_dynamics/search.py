@@ -11,14 +11,12 @@ from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
 from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.estimates import found_values
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.effects.library import effect as effect_of
-from model.inverse_dynamics.drive_timing import DELAY, MOST, timing_unknowns
-from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
+from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -45,6 +43,8 @@ class Fitted:
     evidence: float
     cost: float = 0.0
     """Cost of its parameters and of the places searched, which the evidence has paid."""
+    stated: tuple[Parameter, ...] = ()
+    """Those of its parameters that the file states, as it states them; their priors are lifted."""
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -76,7 +76,7 @@ class Findings:
 
 
 def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, cancel: Cancel) -> Findings:
-    """Try every effect that the model lacks against the residuals of a fit.
+    """Try every effect that the model lacks, or that the file states, against the residuals of a fit.
 
     Raises CancelledError when asked to end.
     """
@@ -95,18 +95,7 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    weighed = _weigh(found, now, places)
-    return Findings(tuple(f for f in weighed if not _is_drive_timing(f)), tuple(probes))
-
-
-def _is_drive_timing(found: Fitted) -> bool:
-    """Whether this is a delay that may be how the drive is formed and held: on some joint the lower end of its interval
-    is not beyond what such a drive may be late by."""
-    if found.effect != DELAY or holds_drive_between_samples(found.model.machine):
-        return False
-    most = MOST * max(record.sampled for record in found.fit.balance.records)
-    estimates = found_values(found.fit, found.parameters).values()
-    return any(e.low is None or e.low <= most for e in estimates)
+    return Findings(tuple(_weigh(found, now, places)), tuple(probes))
 
 
 def _on(joints: tuple[int, ...]) -> str:
@@ -156,15 +145,17 @@ def _weighted_squares(now: BalanceFit) -> list[float]:
 def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe]) -> Fitted:
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet."""
     effect, joints = probes[0].trial.effect, _joints(probes)
-    wider = model.with_effect(effect, joints)
+    lacking = tuple(j for p in probes if not p.trial.stated for j in p.trial.joints)
+    wider = model if all(p.trial.stated for p in probes) else model.with_effect(effect, lacking)
     own = tuple(p for probe in probes for p in probe.trial.parameters)
+    free, stated = {p.name for p in own}, tuple(p for probe in probes for p in probe.trial.stated)
     start: Start = {name: value for p in probes for name, value in p.start.items()}
     timing = {u.name for u in timing_unknowns(wider)}
-    kept = (u for u in now.unknowns if not u.nuisance or u.name in timing)
+    kept = (u for u in now.unknowns if u.name not in free and (not u.nuisance or u.name in timing))
     unknowns = (*kept, *(free_unknown(p) for p in own))
     balance = TorqueBalance(wider, now.balance.records)
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
-    return Fitted(effect, joints, wider, own, fitted, 0.0)
+    return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
 
 
 def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted]:
@@ -179,7 +170,7 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
         replace(
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
-            cost=_cost(now, memory, len(f.parameters), places),
+            cost=cost_of(now, memory, len(f.parameters), places),
         )
         for f in found
     ]
@@ -189,10 +180,10 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
     fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    return fell + before.prior - after.prior - _cost(before, memory, parameters, places)
+    return fell + before.prior - after.prior - cost_of(before, memory, parameters, places)
 
 
-def _cost(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
+def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """k ln n for k parameters and n independent samples, and twice the logarithm of the places searched."""
     counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
     independent = max(float((counts / memory).sum()), 2.0)
