@@ -162,29 +162,40 @@ class _Workflow:
             told = self._evidence_held_out(chosen)
             if chosen.evidence <= 0 or chosen.evidence + told < self._needed(chosen):
                 continue
-            if not self._is_beyond_noise(chosen):
+            reference = self._reference(chosen)
+            if not self._is_beyond_noise(reference, chosen):
                 continue
-            before, after = self._predicted(self.now, chosen.fit)
-            removed = self._removed(chosen, before, after)
+            before, after = self._predicted(reference, chosen.fit)
+            removed = self._removed(reference, chosen, before, after)
             holds = removed >= options.least_share
-            self.steps.append(self._step(found, chosen, (before, after), removed, told, refused))
+            self.steps.append(self._step(found, chosen, reference, (before, after), removed, told, refused))
             if holds:
                 self._take(chosen)
                 return True
             refused.append(chosen)
         return False
 
+    def _reference(self, chosen: Fitted) -> BalanceFit:
+        """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
+        its prior, a number far off may be fitted as well as without."""
+        if not chosen.stated:
+            return self.now
+        held = {p.name: p.value for p in chosen.stated}
+        unknowns = [u for u in self.now.unknowns if u.name not in held]
+        balance = TorqueBalance(self.model.with_values({**self.now.model_values, **held}), self.case.records)
+        return fit(balance, unknowns, self.now.values, self.case.data, self.now.noise.memory)
+
     def _needed(self, chosen: Fitted) -> float:
         """Evidence from which a candidate is named."""
         return self.case.options.least_evidence + self.case.options.echo * self._collected(chosen.joints)
 
-    def _is_beyond_noise(self, chosen: Fitted) -> bool:
-        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+    def _is_beyond_noise(self, reference: BalanceFit, chosen: Fitted) -> bool:
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))
         return holdout.is_beyond_noise(fell, left, self.case.noise)
 
-    def _removed(self, chosen: Fitted, before: Floats, after: Floats) -> float:
+    def _removed(self, reference: BalanceFit, chosen: Fitted, before: Floats, after: Floats) -> float:
         """Share of the mean square that is gone on records not fitted to, from mean squares (n,) there."""
-        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))
         return holdout.share_removed(fell, left, before, after)
 
     def _suspect(self, found: Findings) -> Suspicion | None:
@@ -194,9 +205,13 @@ class _Workflow:
         """
         for chosen in found.fitted[:CHANCES]:
             total, needed = chosen.evidence + self._evidence_held_out(chosen), self._needed(chosen)
-            if chosen.evidence <= 0 or not SUSPECTED <= total < needed or not self._is_beyond_noise(chosen):
+            if chosen.evidence <= 0 or not SUSPECTED <= total < needed:
                 continue
-            if self._removed(chosen, *self._predicted(self.now, chosen.fit)) < self.case.options.least_share:
+            reference = self._reference(chosen)
+            if not self._is_beyond_noise(reference, chosen):
+                continue
+            elsewhere = self._predicted(reference, chosen.fit)
+            if self._removed(reference, chosen, *elsewhere) < self.case.options.least_share:
                 continue
             recorded = sum(float(np.ptp(r.time)) for r in (*self.case.records, *self.case.held_out))
             seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)
@@ -246,6 +261,7 @@ class _Workflow:
         self,
         found: Findings,
         chosen: Fitted,
+        reference: BalanceFit,
         elsewhere: tuple[Floats, Floats],
         removed: float,
         told: float,
@@ -254,6 +270,7 @@ class _Workflow:
         """The step that the chosen effect is.
 
         Args:
+            reference: the fit that it is held against.
             elsewhere: mean squares (n,) on records not fitted to, before and after. told: evidence that held-out ones
                 give. refused: candidates of this step that did not hold there; they are no rivals.
         """
@@ -265,7 +282,7 @@ class _Workflow:
         near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
         values = found_values(chosen.fit, chosen.parameters)
-        squares = [holdout.mean_squares(case.stretches, f.residual) for f in (self.now, chosen.fit)]
+        squares = [holdout.mean_squares(case.stretches, f.residual) for f in (reference, chosen.fit)]
         return Step(
             effect=chosen.effect,
             joints=chosen.joints,
