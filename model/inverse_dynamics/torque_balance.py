@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.arrays import Floats, Mask
+from model.arrays import Floats
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
@@ -94,7 +94,7 @@ class TorqueBalance:
                 gravity[i],
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
-            torque = _held_by_friction(torque, levels[i], motion.contact, record.turns)
+            torque = _held_by_friction(torque, levels[i], motion.contact, record)
             result.append(record.compared(torque))
         return result
 
@@ -225,11 +225,15 @@ def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:
     return out
 
 
-def _held_by_friction(left: Floats, level: Floats, contact: Floats, turns: Mask) -> Floats:
+def _held_by_friction(left: Floats, level: Floats, contact: Floats, record: RecordedMotion) -> Floats:
     """Residual torque (k, n) with Coulomb friction set-valued where a joint turns or stops for a moment: there it takes
-    any torque up to its level (k, n) that holds the joint, in place of a share that follows the speed."""
-    without = left - contact * level
-    return np.where(turns, without + np.clip(-without, -level, level), left)
+    any torque up to its level (k, n) that holds the joint, in place of a share that follows the speed.
+
+    What it has to hold is taken as a mean over the passage. Sample by sample, friction would take the noise that is
+    within its level and leave what is beyond: rectified noise, on the side to which the joint just turned.
+    """
+    without = record.mean_in_turn(left - contact * level)
+    return np.where(record.turns, without + np.clip(-without, -level, level), left)
 
 
 def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values
@@ -47,7 +49,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
 def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> float:
     """Evidence of an effect, as it was fitted, in torques low-passed at a share `SLOWER` of the cutoff."""
     data = found.fit.data
-    floor = data.floor * SLOWER**2.5
+    floor = np.asarray(case.noise * SLOWER**2.5)  # what noise alone leaves is not explained
     first, last = (_slower_residual(fit, case.records) for fit in (before, found.fit))
     memory = noise_model(data.stretches, last, floor).memory
     fell = [minus_twice_log_likelihood(data.stretches, r, memory, floor).sum() for r in (first, last)]
