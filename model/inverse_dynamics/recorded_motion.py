@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -93,6 +93,24 @@ class RecordedMotion:
     @cached_property
     def _drive_splines(self) -> list[CubicSpline]:
         return [CubicSpline(self.time, column) for column in self.drive.T]
+
+    def slower(self, share: float) -> RecordedMotion:
+        """The same motion for a comparison of torques below a share of the cutoff, at the same samples."""
+        cutoff = share * self.cutoff
+        position, speed, acceleration, drive = (
+            low_pass(signal, WIDER * cutoff, self.period)
+            for signal in (self.position, self.speed, self.acceleration, self.drive)
+        )
+        contact = np.clip(speed / self.turning, -1.0, 1.0)
+        return replace(
+            self,
+            position=position,
+            speed=speed,
+            acceleration=acceleration,
+            drive=drive,
+            contact=contact,
+            cutoff=cutoff,
+        )
 
     def mean_in_turn(self, torque: Floats) -> Floats:
         """Torques (k, n), each its mean over the same passage of `turns`, at most a period of the cutoff of it."""

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-
-import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import TorqueCase
@@ -49,7 +46,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
 def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> float:
     """Evidence of an effect, as it was fitted, in torques low-passed at a share `SLOWER` of the cutoff."""
     data = found.fit.data
-    floor = np.asarray(case.noise * SLOWER**2.5)  # what noise alone leaves is not explained
+    floor = data.floor * SLOWER**2.5
     first, last = (_slower_residual(fit, case.records) for fit in (before, found.fit))
     memory = noise_model(data.stretches, last, floor).memory
     fell = [minus_twice_log_likelihood(data.stretches, r, memory, floor).sum() for r in (first, last)]
@@ -57,7 +54,7 @@ def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> floa
 
 
 def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list[Floats]:
-    slower = tuple(replace(record, cutoff=SLOWER * record.cutoff) for record in records)
+    slower = tuple(record.slower(SLOWER) for record in records)
     return TorqueBalance(fit.balance.model, slower).residual(fit.values)
 
 
