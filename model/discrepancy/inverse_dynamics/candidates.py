@@ -158,9 +158,7 @@ def _stated_trial(model: Model, name: str, joints: tuple[int, ...], now: Balance
     own = tuple(p for p in mine if p.name in tolerances)
     if not own or not joints:
         return None
-    stated = tuple(
-        replace(p, value=tolerances[p.name].expected, deviation=tolerances[p.name].deviation) for p in own
-    )
+    stated = tuple(replace(p, value=tolerances[p.name].expected, deviation=tolerances[p.name].deviation) for p in own)
     origin = {p.name: now.values[p.name] for p in own}
     start = {n: v + tolerances[n].scale for n, v in origin.items()}
     return Trial(name, joints, model, own, tuple(origin), (start,), stated, origin)

@@ -356,7 +356,9 @@ class _Workflow:
 
     def _without(self, step: Step) -> Model:
         """The model without the effect of a step, but for joints of which the file states it."""
-        stated = {j for name in step.parameters if name in self.begin.by_name for j in self.begin.parameter(name).joints}
+        stated = {
+            j for name in step.parameters if name in self.begin.by_name for j in self.begin.parameter(name).joints
+        }
         joints = tuple(j for j in step.joints if j not in stated)
         if step.effect is None or (step.joints and not joints):
             return self.model
