@@ -78,8 +78,8 @@ class Prober:
     def _explained(
         self, columns: Floats, left: Floats, trial: Trial, start: Start, null: Start
     ) -> tuple[float, Floats]:
-        """Fall of the squares of what is left (N,), and the amplitudes (as shares of the start's) that cause it; none has
-        a wrong sign."""
+        """Fall of the squares of what is left (N,), and the amplitudes (as shares of the start's) that cause it, none
+        of a wrong sign."""
         kept = np.linalg.norm(columns, axis=0) > 1e-9
         shares = np.zeros(columns.shape[1])
         while kept.any():
