@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.arrays import Floats, Mask
+from model.arrays import Floats
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
+from model.inverse_dynamics.drive_timing import samples_late
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
@@ -62,8 +63,10 @@ class TorqueBalance:
 
         It is the drive that is predicted from the motion, and not the motion from the drive: an effect that makes the
         drive act less would otherwise make the residual smaller by itself.
+
+        values: of the model's parameters, and of `drive_timing.timing_unknowns`, by name.
         """
-        vector = self._vector(values)
+        vector, late = self._vector(values), samples_late(self.model, values)
         joints = _joints_of(vector, self.model)
         chain = chain_body(np.ascontiguousarray(vector[: at.SHARED]), joints, self.model.flags)
         bodies = vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
@@ -86,12 +89,12 @@ class TorqueBalance:
                 motion.speed,
                 motion.contact,
                 motion.speed,
-                self._volts(record, vector, joints),
+                self._volts(i, vector, joints, late),
                 levels[i],
                 gravity[i],
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
-            torque = _held_by_friction(torque, levels[i], motion.contact, record.turns)
+            torque = _held_by_friction(torque, levels[i], motion.contact, record)
             result.append(record.compared(torque))
         return result
 
@@ -120,7 +123,8 @@ class TorqueBalance:
         """The model's flat vector with other values of some parameters."""
         vector = self.model.vector.copy()
         for name, value in values.items():
-            vector[list(self.model.parameter(name).slots)] = value
+            if name in self.model.by_name:  # the others are of the records
+                vector[list(self.model.parameter(name).slots)] = value
         return vector
 
     def _cached(self, what: str, key: bytes, compute: Callable[[int], Any]) -> list[Any]:
@@ -131,15 +135,16 @@ class TorqueBalance:
             self._kept[what] = kept
         return kept[1]
 
-    def _volts(self, record: RecordedMotion, vector: Floats, joints: Floats) -> Floats:
-        """Volts at the motors at the grid's times, after delay and limit."""
-        late = vector[at.DELAY] + joints[:, at.EXTRA_DELAY]
+    def _volts(self, index: int, vector: Floats, joints: Floats, samples: Floats) -> Floats:
+        """Volts at the motors at the grid's times, after delay and limit. samples: (n,) that drives are late by."""
+        delays = vector[at.DELAY] + joints[:, at.EXTRA_DELAY]
         if holds_drive_between_samples(self.model.machine):
-            late = late + 0.5 * vector[at.PERIOD]
-        drive = record.drive
-        if late.any():
-            columns = [np.interp(record.time - late[j], record.time, drive[:, j]) for j in range(len(late))]
-            drive = np.stack(columns, axis=1)
+            delays = delays + 0.5 * vector[at.PERIOD]
+        drive = self._cached(
+            "drive",
+            delays.tobytes() + samples.tobytes(),
+            lambda i: self.records[i].driven(delays + samples * self.records[i].sampled),
+        )[index]
         out, without_zone = np.empty_like(drive), joints.copy()
         without_zone[:, at.DEAD_ZONE] = 0.0  # `_lost_in_dead_zone` has it
         kernel.amplify(np.ascontiguousarray(drive), without_zone, out)
@@ -220,11 +225,15 @@ def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:
     return out
 
 
-def _held_by_friction(left: Floats, level: Floats, contact: Floats, turns: Mask) -> Floats:
+def _held_by_friction(left: Floats, level: Floats, contact: Floats, record: RecordedMotion) -> Floats:
     """Residual torque (k, n) with Coulomb friction set-valued where a joint turns or stops for a moment: there it takes
-    any torque up to its level (k, n) that holds the joint, in place of a share that follows the speed."""
-    without = left - contact * level
-    return np.where(turns, without + np.clip(-without, -level, level), left)
+    any torque up to its level (k, n) that holds the joint, in place of a share that follows the speed.
+
+    What it has to hold is taken as a mean over the passage. Sample by sample, friction would take the noise that is
+    within its level and leave what is beyond: rectified noise, on the side to which the joint just turned.
+    """
+    without = record.mean_in_turn(left - contact * level)
+    return np.where(record.turns, without + np.clip(-without, -level, level), left)
 
 
 def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:

@@ -25,8 +25,8 @@ def _cutoff(v: Values) -> str:
 def _drive_timing(v: Values) -> str:
     times = ", ".join(f"{1e3 * t:.2g} ms" for t in v["delays"])
     return (
-        f"the drive acts {times} after its sample, less than the {1e3 * v['period']:.2g} ms between samples: this is "
-        "taken as the way in which the drive is held between samples, not as an effect"
+        f"the drive is taken to act {times} after its sample: up to {v['samples']:g} samples are how a drive is formed "
+        "and held, which no record tells, and are not named as a delay"
     )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
 from model.effects.library import library
+from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
@@ -55,6 +56,8 @@ class Trial:
     """An effect on joints, with its own parameters and the starting values from which it is tried.
 
     amplitudes: its parameters (full names) that measure its size; the others only shape it.
+    stated: those of its parameters that the file states, as it states them: the trial lifts their priors. Its starts
+        are then measured from where the tolerances' fit has them, `origin`, and not from nothing.
     """
 
     effect: str
@@ -63,6 +66,8 @@ class Trial:
     parameters: tuple[Parameter, ...]
     amplitudes: tuple[str, ...]
     starts: tuple[Start, ...]
+    stated: tuple[Parameter, ...] = ()
+    origin: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -112,7 +117,8 @@ class _Place:
 
 
 def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
-    """Every effect that the model lacks, joint by joint, and those of the whole machine once."""
+    """Every effect that the model lacks, joint by joint, and those of the whole machine once; of what the file states,
+    whether it is another size than stated."""
     names = case.options.effects
     for name, effect in library().items():
         if name in NOT_IN_TORQUES or (names is not None and name not in names):
@@ -121,7 +127,11 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
             [()] if effect.whole_machine else [(j,) for j in case.options.joints or model.machine.modelled_joints]
         )
         for joints in places:
-            if _present(model, name, joints) or not _possible(model, effect, joints):
+            if _present(model, name, joints):
+                if (again := _stated_trial(model, name, joints, now)) is not None:
+                    yield again
+                continue
+            if not _possible(model, effect, joints):
                 continue
             if name == "load_dependent_friction" and _constant_load(model, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
@@ -139,6 +149,19 @@ def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) ->
     own = tuple(_narrowed(p, place) for p in added)
     amplitudes = tuple(p.name for p in own if p.null is not None)
     return Trial(name, joints, wider, own, amplitudes, tuple(_starts(name, own, place)))
+
+
+def _stated_trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial | None:
+    """An effect that the file states for this joint: it may be larger or smaller than within its stated deviations."""
+    tolerances = {u.name: u for u in now.unknowns if u.deviation is not None and not u.nuisance}
+    mine = (p for p in model.parameters if p.effect == name and p.joints == joints and p.null is not None)
+    own = tuple(p for p in mine if p.name in tolerances)
+    if not own or not joints:
+        return None
+    stated = tuple(replace(p, value=tolerances[p.name].expected, deviation=tolerances[p.name].deviation) for p in own)
+    origin = {p.name: now.values[p.name] for p in own}
+    start = {n: v + tolerances[n].scale for n, v in origin.items()}
+    return Trial(name, joints, model, own, tuple(origin), (start,), stated, origin)
 
 
 def _constant_load(model: Model, column: int, records: Sequence[RecordedMotion]) -> bool:
@@ -227,9 +250,13 @@ def _limit(place: _Place) -> Iterator[Start]:
 
 def _delay(place: _Place) -> Iterator[Start]:
     controller = place.model.machine.controller
-    longest = np.inf if isinstance(controller, NoController) else 13 * controller.period.value
+    if isinstance(controller, NoController):
+        least = MOST * max(r.sampled for r in place.records)
+        for time in [t for t in DELAYS if t > least] or [1.5 * least]:
+            yield {"time": time}
+        return
     for time in DELAYS:
-        if time <= longest:
+        if time <= 13 * controller.period.value:
             yield {"time": time}
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,16 +23,19 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
+from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.verdict import verdict
+from model.inverse_dynamics.drive_timing import MOST, samples_late, timing_unknowns
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
-from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples, recorded_motions
+from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.repeats import repeated_noise
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
+from model.machine_model.parameter import Parameter
 
 CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
@@ -43,6 +46,8 @@ SUSPECTED = 10.0
 and still short of what naming it takes."""
 ROUNDED = 5.0
 """s to which the time that is still to be recorded is rounded up."""
+SLIGHTLY_LATE = 0.1
+"""Least lateness of a drive that is told, in samples."""
 ABOVE_NOISE = 1.2
 """Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
 removed."""
@@ -103,7 +108,7 @@ class _Workflow:
     case: TorqueCase
     progress: Progress
     cancel: Cancel
-    added: frozenset[str] = frozenset()
+    added: dict[str, Parameter] = field(default_factory=dict)
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
@@ -111,8 +116,8 @@ class _Workflow:
 
     def __post_init__(self) -> None:
         self.begin = self.model
-        self.now = self._fit(self.model)
-        self.first = self.now.values
+        self.now = self._fit(self.model, {}, self.added)
+        self.first = self.now
         source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE}
         self.notes.append(Note(kind="tolerance-source", values=source))
 
@@ -121,7 +126,7 @@ class _Workflow:
         while len([s for s in self.steps if s.adopted]) < self.case.options.most_steps:
             done = len(self.steps)
             self._report(0.1, "what is missing")
-            found = search(self.model, self.now, self.case, self._report, self.cancel)
+            found = self._search()
             if not self._adopt(found):
                 self.tried = self._candidates(found)
                 self.suspicion = self._suspect(found)
@@ -129,18 +134,25 @@ class _Workflow:
             self._report(0.9, "what is not needed any more")
             self._prune(done)
 
+    def _search(self) -> Findings:
+        """What a step found, without what the records do not resolve."""
+        found = search(self.model, self.now, self.case, self._report, self.cancel)
+        return replace(found, fitted=tuple(f for f in found.fitted if is_resolved(f, self.now, self.case)))
+
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
         whole = self.case.options.most_steps
         self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
 
-    def _fit(self, model: Model, begin: dict[str, float] | None = None) -> BalanceFit:
-        records = self.case.records
-        own, _ = tolerances(self.begin, sizes=recorded_sizes(self.begin, records))
+    def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
+        """The model fitted again, with the parameters that the diagnosis has `added` without priors."""
+        records, names = self.case.records, frozenset(added)
+        own = [u for u in tolerances(self.begin, sizes=recorded_sizes(self.begin, records))[0] if u.name not in names]
         known = {u.name for u in own}
-        sizes = recorded_sizes(model, records)
-        found = tuple(u for u in tolerances(model, self.added, sizes)[0] if u.name not in known)
-        return fit(TorqueBalance(model, self.case.records), (*own, *found), begin or {}, self.case.data)
+        sizes = {**recorded_sizes(model, records), **added}
+        found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
+        unknowns = (*own, *found, *timing_unknowns(model))
+        return fit(TorqueBalance(model, self.case.records), unknowns, begin, self.case.data)
 
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
@@ -150,34 +162,40 @@ class _Workflow:
             told = self._evidence_held_out(chosen)
             if chosen.evidence <= 0 or chosen.evidence + told < self._needed(chosen):
                 continue
-            if not self._is_beyond_noise(chosen):
+            reference = self._reference(chosen)
+            if not self._is_beyond_noise(reference, chosen):
                 continue
-            before, after = self._predicted(self.now, chosen.fit)
-            removed = self._removed(chosen, before, after)
+            before, after = self._predicted(reference, chosen.fit)
+            removed = self._removed(reference, chosen, before, after)
             holds = removed >= options.least_share
-            timing = self._timing(found, chosen) if holds else None
-            if timing is not None:
-                self._take(timing)
-                self.notes.append(_timing_note(timing, self.case.records))
-                return True
-            self.steps.append(self._step(found, chosen, (before, after), removed, told, refused))
+            self.steps.append(self._step(found, chosen, reference, (before, after), removed, told, refused))
             if holds:
                 self._take(chosen)
                 return True
             refused.append(chosen)
         return False
 
+    def _reference(self, chosen: Fitted) -> BalanceFit:
+        """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
+        its prior, a number far off may be fitted as well as without."""
+        if not chosen.stated:
+            return self.now
+        held = {p.name: p.value for p in chosen.stated}
+        unknowns = [u for u in self.now.unknowns if u.name not in held]
+        balance = TorqueBalance(self.model.with_values({**self.now.model_values, **held}), self.case.records)
+        return fit(balance, unknowns, self.now.values, self.case.data, self.now.noise.memory)
+
     def _needed(self, chosen: Fitted) -> float:
         """Evidence from which a candidate is named."""
         return self.case.options.least_evidence + self.case.options.echo * self._collected(chosen.joints)
 
-    def _is_beyond_noise(self, chosen: Fitted) -> bool:
-        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+    def _is_beyond_noise(self, reference: BalanceFit, chosen: Fitted) -> bool:
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))
         return holdout.is_beyond_noise(fell, left, self.case.noise)
 
-    def _removed(self, chosen: Fitted, before: Floats, after: Floats) -> float:
+    def _removed(self, reference: BalanceFit, chosen: Fitted, before: Floats, after: Floats) -> float:
         """Share of the mean square that is gone on records not fitted to, from mean squares (n,) there."""
-        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))
         return holdout.share_removed(fell, left, before, after)
 
     def _suspect(self, found: Findings) -> Suspicion | None:
@@ -187,9 +205,13 @@ class _Workflow:
         """
         for chosen in found.fitted[:CHANCES]:
             total, needed = chosen.evidence + self._evidence_held_out(chosen), self._needed(chosen)
-            if chosen.evidence <= 0 or not SUSPECTED <= total < needed or not self._is_beyond_noise(chosen):
+            if chosen.evidence <= 0 or not SUSPECTED <= total < needed:
                 continue
-            if self._removed(chosen, *self._predicted(self.now, chosen.fit)) < self.case.options.least_share:
+            reference = self._reference(chosen)
+            if not self._is_beyond_noise(reference, chosen):
+                continue
+            elsewhere = self._predicted(reference, chosen.fit)
+            if self._removed(reference, chosen, *elsewhere) < self.case.options.least_share:
                 continue
             recorded = sum(float(np.ptp(r.time)) for r in (*self.case.records, *self.case.held_out))
             seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)
@@ -214,24 +236,17 @@ class _Workflow:
         return holdout.evidence(self.now, chosen.fit, self.case.held_out)
 
     def _take(self, chosen: Fitted) -> None:
-        self.added |= {p.name for p in chosen.parameters}
-        self.model = chosen.model.with_values(chosen.fit.values)
-        self.now = self._fit(self.model, chosen.fit.values)
+        self.added |= {p.name: p for p in chosen.parameters}
+        self.model = chosen.model.with_values(chosen.fit.model_values)
+        self.now = self._fit(self.model, chosen.fit.values, self.added)
 
-    def _timing(self, found: Findings, chosen: Fitted) -> Fitted | None:
-        """A delay of less than a sample that explains as much as the chosen effect.
-
-        No record tells whether a recorded drive acted at its moment or until the next sample: such a delay is taken
-        into the model, and is no effect.
-        """
-        if holds_drive_between_samples(self.model.machine):
-            return None
-        least = min(record.sampled for record in self.case.records)
-        for other in found.fitted:
-            near = chosen.evidence - other.evidence < self.case.options.least_margin
-            if near and other.effect == "input_delay" and max(_delays(other)) < least:
-                return other
-        return None
+    def _timing(self) -> tuple[Note, ...]:
+        """How late the drives were found to act, which is taken for the way in which they are formed and held."""
+        late = samples_late(self.model, self.now.values)
+        if late.max() < SLIGHTLY_LATE:
+            return ()
+        period = min(record.sampled for record in self.case.records)
+        return (Note(kind="drive-timing", values={"delays": list(map(float, late * period)), "samples": MOST}),)
 
     def _predicted(self, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
@@ -246,6 +261,7 @@ class _Workflow:
         self,
         found: Findings,
         chosen: Fitted,
+        reference: BalanceFit,
         elsewhere: tuple[Floats, Floats],
         removed: float,
         told: float,
@@ -254,6 +270,7 @@ class _Workflow:
         """The step that the chosen effect is.
 
         Args:
+            reference: the fit that it is held against.
             elsewhere: mean squares (n,) on records not fitted to, before and after. told: evidence that held-out ones
                 give. refused: candidates of this step that did not hold there; they are no rivals.
         """
@@ -265,7 +282,7 @@ class _Workflow:
         near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
         values = found_values(chosen.fit, chosen.parameters)
-        squares = [holdout.mean_squares(case.stretches, f.residual) for f in (self.now, chosen.fit)]
+        squares = [holdout.mean_squares(case.stretches, f.residual) for f in (reference, chosen.fit)]
         return Step(
             effect=chosen.effect,
             joints=chosen.joints,
@@ -327,15 +344,25 @@ class _Workflow:
         for index, step in enumerate(self.steps[:latest]):
             if not step.adopted or step.effect is None:
                 continue
-            without = self.model.without_effect(step.effect, step.joints or None)
-            kept = {n: v for n, v in self.now.values.items() if n in without.by_name}
-            smaller = self._fit(without, kept)
+            kept = {name: p for name, p in self.added.items() if name not in step.parameters}
+            without = self._without(step)
+            smaller = self._fit(without, self.now.values, kept)
             if evidence(smaller, self.now, self.now.noise.memory, len(step.parameters), 1) < 0:
-                self.model, self.now = without.with_values(smaller.values), smaller
-                self.added -= set(step.parameters)
+                self.model, self.now = without.with_values(smaller.model_values), smaller
+                self.added = kept
                 gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
                 self.steps[index] = step.model_copy(update=gone)
                 self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
+
+    def _without(self, step: Step) -> Model:
+        """The model without the effect of a step, but for joints of which the file states it."""
+        stated = {
+            j for name in step.parameters if name in self.begin.by_name for j in self.begin.parameter(name).joints
+        }
+        joints = tuple(j for j in step.joints if j not in stated)
+        if step.effect is None or (step.joints and not joints):
+            return self.model
+        return self.model.without_effect(step.effect, joints or None)
 
     def _as_last_fitted(self) -> tuple[Step, ...]:
         """The steps with the parameters of the last fit: a step's own values are biased by effects that were found
@@ -355,8 +382,8 @@ class _Workflow:
         gives."""
         held = self.case.held_out
         records = held or self.case.records
-        before = holdout.relative_torque_error(self.begin.with_values(self.first), records)
-        after = holdout.relative_torque_error(self.model.with_values(self.now.values), records)
+        before = holdout.relative_torque_error(self.begin, self.first.values, records)
+        after = holdout.relative_torque_error(self.model, self.now.values, records)
         return Note(kind="torque-left", values={"held_out": bool(held), "before": before, "after": after})
 
     def _errors(self, records: tuple[RecordedMotion, ...]) -> tuple[SignalError, ...]:
@@ -372,11 +399,12 @@ class _Workflow:
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]
-        stated = on_stated_numbers((u for u in self.now.unknowns if u.name not in self.added), self.now.values)
+        own = [u for u in self.now.unknowns if not u.nuisance]
+        stated = on_stated_numbers((u for u in own if u.name not in self.added), self.now.values)
         lineage = Lineage(
             parent=self.begin.identity,
             traces=tuple(traces),
-            fit={"fitted": [u.name for u in self.now.unknowns]},
+            fit={"fitted": [u.name for u in own]},
             note="diagnosis",
         )
         fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
@@ -393,23 +421,14 @@ class _Workflow:
             candidates=self.tried,
             remaining=shapes,
             model_before=self.begin,
-            model_after=self.model.with_values(self.now.values).with_lineage(lineage),
+            model_after=self.model.with_values(self.now.model_values).with_lineage(lineage),
             traces=tuple(traces),
             holdout=tuple(held_out),
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
+            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
         )
-
-
-def _delays(found: Fitted) -> list[float]:
-    return [found.fit.values[p.name] for p in found.parameters]
-
-
-def _timing_note(found: Fitted, records: Sequence[RecordedMotion]) -> Note:
-    period = min(record.sampled for record in records)
-    return Note(kind="drive-timing", values={"delays": _delays(found), "period": period})
 
 
 def _assumptions(cutoff: float) -> tuple[Note, ...]:

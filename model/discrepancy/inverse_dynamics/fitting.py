@@ -58,6 +58,11 @@ class BalanceFit:
         """−2 log posterior up to a constant of the data."""
         return float(self.by_joint.sum()) + self.prior
 
+    @property
+    def model_values(self) -> dict[str, float]:
+        """The values of the model's parameters, without those of the records."""
+        return {name: value for name, value in self.values.items() if name in self.balance.model.by_name}
+
     def slope(self, unknown: Unknown) -> list[Floats]:
         """Derivative (m, n) of every record's residual by one unknown."""
         return self.balance.slope(self.values, self.residual, unknown)

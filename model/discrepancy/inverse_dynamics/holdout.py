@@ -79,9 +79,9 @@ def _fold(count: int, fold: int) -> NDArray[np.bool_]:
     return mask
 
 
-def relative_torque_error(model: Model, records: tuple[RecordedMotion, ...]) -> float:
-    """√(Σ residual² / Σ torque²) over all joints and compared samples, joints at rest included."""
-    left = sum(float((r**2).sum()) for r in _residuals(model, {}, records))
+def relative_torque_error(model: Model, values: Mapping[str, float], records: tuple[RecordedMotion, ...]) -> float:
+    """√(Σ residual² / Σ torque²) of a fitted model over all joints and compared samples, joints at rest included."""
+    left = sum(float((r**2).sum()) for r in _residuals(model, values, records))
     driven = TorqueBalance(model, records).supplied_by_drive()
     return float(np.sqrt(left / sum(float((r**2).sum()) for r in driven)))
 

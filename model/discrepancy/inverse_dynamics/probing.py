@@ -38,20 +38,26 @@ class Probe:
 
 @dataclass(frozen=True)
 class Prober:
-    """A fit, prepared for probing: `basis` (N, p) spans what its unknowns can explain."""
+    """A fit, prepared for probing: `basis` (N, p) spans what its unknowns can explain.
+
+    left: (N,) what they leave of the residual. pulled: (N,) the same with what the priors ask for, which a trial that
+    lifts a prior gains from.
+    """
 
     now: BalanceFit
     basis: Floats
     left: Floats
+    pulled: Floats
 
     def probe(self, trial: Trial) -> Probe:
         """The best of a trial's starts."""
         balance = TorqueBalance(trial.model, self.now.balance.records)
-        null = {p.name: float(p.null) for p in trial.parameters if p.null is not None}
+        null = {p.name: float(p.null) for p in trial.parameters if p.null is not None} | dict(trial.origin)
         best = Probe(trial, 0.0, trial.starts[0])
         for start in trial.starts:
             columns = [self._column(balance, {**start, **null, name: start[name]}) for name in trial.amplitudes]
-            gain, shares = self._explained(np.stack(columns, axis=1), trial, start, null)
+            left = self.pulled if trial.stated else self.left
+            gain, shares = self._explained(np.stack(columns, axis=1), left, trial, start, null)
             if gain > best.gain:
                 scaled = {
                     n: null[n] + float(a) * (start[n] - null[n]) for n, a in zip(trial.amplitudes, shares, strict=True)
@@ -69,12 +75,15 @@ class Prober:
         padded = np.concatenate([signal, np.zeros(self.basis.shape[0] - len(signal))])
         return padded - self.basis @ (self.basis.T @ padded)
 
-    def _explained(self, columns: Floats, trial: Trial, start: Start, null: Start) -> tuple[float, Floats]:
-        """Fall of the squares, and the amplitudes (as shares of the start's) that cause it; none has a wrong sign."""
+    def _explained(
+        self, columns: Floats, left: Floats, trial: Trial, start: Start, null: Start
+    ) -> tuple[float, Floats]:
+        """Fall of the squares of what is left (N,), and the amplitudes (as shares of the start's) that cause it, none
+        of a wrong sign."""
         kept = np.linalg.norm(columns, axis=0) > 1e-9
         shares = np.zeros(columns.shape[1])
         while kept.any():
-            found = np.linalg.lstsq(columns[:, kept], -self.left, rcond=1e-8)[0]
+            found = np.linalg.lstsq(columns[:, kept], -left, rcond=1e-8)[0]
             shares[:] = 0.0
             shares[kept] = np.clip(found, 0.0, NONLINEAR_LIMIT) if trial.effect in NONLINEAR else found
             wrong = kept & np.array(
@@ -85,7 +94,7 @@ class Prober:
             kept &= ~wrong
             shares[:] = 0.0
         change = columns @ shares
-        return float(-2 * change @ self.left - change @ change), shares
+        return float(-2 * change @ left - change @ change), shares
 
     def _outside(self, trial: Trial, name: str, share: float, start: Start, null: Start) -> bool:
         p = next(p for p in trial.parameters if p.name == name)
@@ -97,10 +106,11 @@ class Prober:
 def prepare_probes(now: BalanceFit, slopes: Slopes) -> Prober:
     """A prober around a fit whose derivatives are `slopes`."""
     A = np.concatenate(now.noise.weighted(now.data.stretches, stacked(slopes, now)))
-    rows, _ = prior_rows(now.unknowns, np.array([now.values[u.name] for u in now.unknowns]))
+    rows, aims = prior_rows(now.unknowns, np.array([now.values[u.name] for u in now.unknowns]))
     scale = np.array([u.scale for u in now.unknowns])
     whole = np.concatenate([A, rows]) * scale
     u, s, _ = np.linalg.svd(whole, full_matrices=False)
     basis = u[:, s > 1e-10 * s[0]] if s.size else np.zeros((whole.shape[0], 0))
-    left = np.concatenate([*now.noise.weighted(now.data.stretches, now.residual), np.zeros(len(rows))])
-    return Prober(now, basis, left - basis @ (basis.T @ left))
+    weighted = now.noise.weighted(now.data.stretches, now.residual)
+    left, pulled = (np.concatenate([*weighted, prior]) for prior in (np.zeros(len(rows)), -aims))
+    return Prober(now, basis, left - basis @ (basis.T @ left), pulled - basis @ (basis.T @ pulled))

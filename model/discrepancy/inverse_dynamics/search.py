@@ -16,6 +16,7 @@ from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.effects.library import effect as effect_of
+from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -42,6 +43,8 @@ class Fitted:
     evidence: float
     cost: float = 0.0
     """Cost of its parameters and of the places searched, which the evidence has paid."""
+    stated: tuple[Parameter, ...] = ()
+    """Those of its parameters that the file states, as it states them; their priors are lifted."""
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -73,13 +76,13 @@ class Findings:
 
 
 def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, cancel: Cancel) -> Findings:
-    """Try every effect that the model lacks against the residuals of a fit.
+    """Try every effect that the model lacks, or that the file states, against the residuals of a fit.
 
     Raises CancelledError when asked to end.
     """
     slopes = now.slopes()
     prober = prepare_probes(now, slopes)
-    fitted_model = model.with_values(now.values)
+    fitted_model = model.with_values(now.model_values)
     probes: list[Probe] = []
     for trial in list_trials(fitted_model, now, case):
         stop_if(cancel)
@@ -142,13 +145,17 @@ def _weighted_squares(now: BalanceFit) -> list[float]:
 def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe]) -> Fitted:
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet."""
     effect, joints = probes[0].trial.effect, _joints(probes)
-    wider = model.with_effect(effect, joints)
+    lacking = tuple(j for p in probes if not p.trial.stated for j in p.trial.joints)
+    wider = model if all(p.trial.stated for p in probes) else model.with_effect(effect, lacking)
     own = tuple(p for probe in probes for p in probe.trial.parameters)
+    free, stated = {p.name for p in own}, tuple(p for probe in probes for p in probe.trial.stated)
     start: Start = {name: value for p in probes for name, value in p.start.items()}
-    unknowns = (*now.unknowns, *(free_unknown(p) for p in own))
+    timing = {u.name for u in timing_unknowns(wider)}
+    kept = (u for u in now.unknowns if u.name not in free and (not u.nuisance or u.name in timing))
+    unknowns = (*kept, *(free_unknown(p) for p in own))
     balance = TorqueBalance(wider, now.balance.records)
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
-    return Fitted(effect, joints, wider, own, fitted, 0.0)
+    return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
 
 
 def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted]:
@@ -163,7 +170,7 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
         replace(
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
-            cost=_cost(now, memory, len(f.parameters), places),
+            cost=cost_of(now, memory, len(f.parameters), places),
         )
         for f in found
     ]
@@ -173,10 +180,10 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
     fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    return fell + before.prior - after.prior - _cost(before, memory, parameters, places)
+    return fell + before.prior - after.prior - cost_of(before, memory, parameters, places)
 
 
-def _cost(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
+def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """k ln n for k parameters and n independent samples, and twice the logarithm of the places searched."""
     counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
     independent = max(float((counts / memory).sum()), 2.0)

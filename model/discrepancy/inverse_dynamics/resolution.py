@@ -1,0 +1,87 @@
+"""Whether a record resolves what a fitted effect claims: four things that a sound rig imitates (decision 0053)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from model.arrays import Floats
+from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.estimates import found_values
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.inverse_dynamics.likelihood import minus_twice_log_likelihood, noise_model
+from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
+from model.inverse_dynamics.drive_timing import DELAY, MOST
+from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
+from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.parameter import Parameter
+
+OF_CHANGES = frozenset({"joint_compliance", "backlash"})
+"""Effects whose torque follows how a torque changes in time: they cut short what is fast, and noise of accelerations is
+fast."""
+SLOWER = 0.5
+"""Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
+the fifth power of the cutoff, so 3 % of it is left there."""
+AT_BOUND = 1.01
+"""Ratio to its lower bound below which a speed is the bound's."""
+FAR = 4.0
+"""Distance from what the file states, in stated deviations, beyond which a number is not a tolerance any more."""
+
+
+def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
+    """Whether the records can tell this effect from a sound rig.
+
+    Args:
+        before: the fit without the effect.
+    """
+    if found.effect == DELAY and _may_be_timing(found):
+        return False
+    if any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
+        return False
+    if found.stated and not any(_is_far(p, found.fit.values[p.name]) for p in found.stated):
+        return False
+    return found.effect not in OF_CHANGES or slower_evidence(found, before, case) >= case.options.least_evidence
+
+
+def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> float:
+    """Evidence of an effect, as it was fitted, in torques low-passed at a share `SLOWER` of the cutoff."""
+    data = found.fit.data
+    floor = data.floor * SLOWER**2.5
+    first, last = (_slower_residual(fit, case.records) for fit in (before, found.fit))
+    memory = noise_model(data.stretches, last, floor).memory
+    fell = [minus_twice_log_likelihood(data.stretches, r, memory, floor).sum() for r in (first, last)]
+    return float(fell[0] - fell[1]) - cost_of(before, memory, len(found.parameters), 1)
+
+
+def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list[Floats]:
+    slower = tuple(record.slower(SLOWER) for record in records)
+    return TorqueBalance(fit.balance.model, slower).residual(fit.values)
+
+
+def _may_be_timing(found: Fitted) -> bool:
+    """Whether this delay may be how the drive is formed and held: on some joint the lower end of its interval is not
+    beyond what such a drive may be late by."""
+    if holds_drive_between_samples(found.model.machine):
+        return False
+    most = MOST * max(record.sampled for record in found.fit.balance.records)
+    estimates = found_values(found.fit, found.parameters).values()
+    return any(e.low is None or e.low <= most for e in estimates)
+
+
+def _fades_unresolved(p: Parameter, value: float) -> bool:
+    """Whether friction fades at the lowest speed that is looked at: then it fades below, where a smoothed speed does
+    not tell whether the joint stands."""
+    return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
+
+
+def _is_far(p: Parameter, value: float) -> bool:
+    """Whether a number is far from what the file states.
+
+    A number that cannot be negative is stated to a share of itself: twice and half as much are then equally far.
+    """
+    deviation = p.deviation or 0.0
+    if abs(value - p.value) <= FAR * deviation:
+        return False
+    if p.low < 0.0 or p.value <= 0.0:
+        return True
+    return value <= 0.0 or abs(math.log(value / p.value)) > FAR * deviation / p.value

@@ -1,0 +1,108 @@
+"""What a sound rig imitates is not named: a drive that is held, noise of readings, friction near a reversal, numbers
+within what their file states."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq.contracts.machine import Machine, load_machine
+from daq.contracts.trace import Trace
+from daq.traces.csv_table import import_csv
+from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.machine_model.model import base_model
+from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.worlds.folder import write_world
+
+SAMPLE = 0.002
+"""s between the samples of `slide_trace`."""
+
+
+def acting_late(trace: Trace, samples: float) -> Trace:
+    """The trace of a rig whose drive acts so many samples after it was recorded."""
+    assert trace.drive is not None
+    recorded = np.interp(trace.time + samples * SAMPLE, trace.time, trace.drive[:, 0])
+    return replace(trace, drive=recorded[:, None])
+
+
+def slide(hidden: dict[str, float], late: float = 0.0, machine: Machine | None = None) -> Diagnosis:
+    training, held_out = (acting_late(rigs.slide_trace(seed, hidden), late) for seed in (1, 2))
+    return diagnose_torques(base_model(machine or rigs.slide_machine()), [training], [held_out])
+
+
+def stating_friction(**friction: dict[str, Any]) -> Machine:
+    """The slide, with a file that states its friction."""
+    written = rigs.slide_machine().model_dump(mode="json", exclude_none=True)
+    written["joints"][0]["friction"] = friction
+    return Machine.model_validate(written)
+
+
+def named(found: Diagnosis) -> list[str | None]:
+    return [step.effect for step in found.steps if step.adopted]
+
+
+def test_how_a_drive_is_held_is_no_effect() -> None:
+    """1.6 samples: half a sample by being held, the rest by the loop that forms it."""
+    found = slide({}, late=1.6)
+    assert found.verdict == "nothing-significant", found.summary
+    assert found.model_after.effects == found.model_before.effects
+    told = next(note for note in found.notes_data if note.kind == "drive-timing")
+    assert told.values["delays"][0] == pytest.approx(1.6 * SAMPLE, rel=0.1)
+
+
+def test_a_delay_beyond_two_samples_is_named_whole() -> None:
+    found = slide({}, late=5.0)
+    assert named(found) == ["input_delay"], found.summary
+    assert found.steps[0].parameters["joint1.input_delay.time"].value == pytest.approx(5 * SAMPLE, rel=0.05)
+
+
+def test_friction_far_beyond_what_the_file_states_is_named() -> None:
+    """It was fitted within its prior alone, and its remainder looked like something else."""
+    machine = stating_friction(viscous=rigs.quantity(6.0, "N·s/m", low=0.0, deviation=1.8))
+    found = slide({"viscous": 60.0}, machine=machine)
+    assert named(found) == ["viscous_friction"], found.summary
+    assert found.steps[0].parameters["joint1.viscous_friction.coefficient"].value == pytest.approx(60.0, rel=0.02)
+    assert found.model_after.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(60.0, rel=0.02)
+
+
+@pytest.mark.parametrize("true", [8.0, 15.0])
+def test_friction_within_what_the_file_states_is_no_effect(true: float) -> None:
+    """15 is 5 of the stated deviations above 6, and 2.5 times as much: with 30 % stated, 3 deviations of a ratio."""
+    machine = stating_friction(viscous=rigs.quantity(6.0, "N·s/m", low=0.0, deviation=1.8))
+    found = slide({"viscous": true}, machine=machine)
+    assert found.verdict == "nothing-significant", found.summary
+    assert found.model_after.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(true, rel=0.1)
+
+
+def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> None:
+    """White noise of the recorded force, which no file states and no reading shows."""
+    draw = np.random.default_rng(5)
+
+    def noisy(seed: int) -> Trace:
+        trace = rigs.slide_trace(seed, {})
+        assert trace.drive is not None
+        return replace(trace, drive=trace.drive + 4.0 * draw.standard_normal(trace.drive.shape))
+
+    found = diagnose_torques(base_model(rigs.slide_machine()), [noisy(1)], [noisy(2)])
+    assert found.rmse_fit[0].after > 1.5 * found.rmse_fit[0].floor
+    assert found.remaining == ()
+    assert found.verdict == "nothing-significant", found.summary
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("axis-current", 500), pytest.param("arm-current", 507, marks=pytest.mark.slow)]
+)
+@pytest.mark.timeout(300)
+def test_a_sound_rig_of_another_world_is_sound(kind: str, seed: int, tmp_path: Path) -> None:
+    """Bristles in its friction, a current loop behind its drive, positions alone: noise of accelerations was called a
+    compliance, and friction near reversals Stribeck friction."""
+    write_world(tmp_path, kind, seed, "sound")
+    lab = tmp_path / "lab"
+    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
+    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    assert found.verdict == "nothing-significant", found.summary
