@@ -19,7 +19,7 @@ from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
-from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.notes import on_noise, on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
@@ -90,8 +90,8 @@ def diagnose_by_simulation(
         excluded = tuple(effect.value for effect in ControllerEffect)
     fitted = _weighed_with_shown_noise(_fit_tolerances(given))
     case = build_case(model, given, fitted, traces, hold_out(known, holdout), options, excluded)
-    begun = judge(fitted)
-    case, search = _add_effects(case, _Search(first=begun, current=begun), progress, cancel)
+    first = judge(fitted)
+    case, search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
     answer = _answer(case, search, proved, chooser, cancel)
@@ -186,7 +186,8 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
     """The point fitted with the noise that its record shows, where that is more than it was fitted with, and noise.
 
     Twice, since a fit with too little noise has followed some of it. Where tolerances stay far from what they are
-    expected to be, the fit is begun from there as well.
+    expected to be, the fit is begun from there as well: with too little noise it may have gone along a valley in which
+    records tell little, and a search does not find the way back.
     """
     if weighs_rightly(fitted):
         return fitted
@@ -198,8 +199,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
         try:
             fitted = converge(fitted.on(observation), LAST_STEPS)
             if strain(fitted) >= STRAINED:
-                begun = fitted.at_expected()
-                again = converge(begun, LAST_STEPS) if begun.is_finite else fitted
+                again = _fit_tolerances(fitted.at_expected())
                 fitted = again if again.cost < fitted.cost else fitted
         except SpecError:
             break
@@ -258,7 +258,7 @@ def _answer(
 ) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
-    joints = _unexplained_joints(case, found, looked)
+    joints, noisy = _joints_left(case, found, looked)
     answered = verdict((*proved, *found.steps), unexplained=bool(joints))
     if answered == "unknown-effect":
         found = _withdraw(found, joints)
@@ -272,6 +272,7 @@ def _answer(
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
+        *on_noise(end.observation, case.scoring.rms(case.scoring.residuals(end)), noisy),
         *on_unfinished((*case.traces, *case.held_traces)),
         *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *asked.notes,
@@ -305,9 +306,9 @@ def _answer(
     return with_sentences(answer)
 
 
-def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tuple[int, ...]:
-    """Joints with an unexplained error on fitted or held-out traces. where: the map of the current point, while no
-    effect has been added."""
+def _joints_left(case: Case, found: _Search, where: Where | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Joints on which fitted or held-out traces leave more than noise: those where that has a shape, an unexplained
+    error, and those where it has none. where: the map of the current point, while no effect has been added."""
     before, after, effect_added = found.first.point, found.current.point, where is None
     if effect_added:
         case = case.with_floors_of(after)
@@ -319,20 +320,20 @@ def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tupl
         case.fitted_errors(before, after), held_errors, case.thresholds, named=effect_added, samples=counts
     )
     if where is None:
-        return _with_structure(case, after, left)
+        return _by_structure(case, after, left)
     closer = unexplained(errors_of_fit(after), (), case.thresholds, named=False, samples=counts)
     line = chance_significance(len(where.cells), case.thresholds.place)
     places = [c.joint for c in where.cells if c.significance >= line]
-    return _with_structure(case, after, tuple(sorted({*left, *closer, *places})))
+    return _by_structure(case, after, tuple(sorted({*left, *closer, *places})))
 
 
-def _with_structure(case: Case, point: Point, joints: tuple[int, ...]) -> tuple[int, ...]:
-    """Of these joints, those on which what is left has a shape, on the fitted traces or on held-out ones. Of the others
-    it is noise, larger than the file states."""
+def _by_structure(case: Case, point: Point, joints: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """These joints: those on which what is left has a shape, on the fitted traces or on held-out ones, and those on
+    which it is noise, larger than the file states."""
     if not joints:
-        return joints
+        return (), ()
     found = {*joints_with_structure(case.residuals_of(point)), *joints_with_structure(case.held_residuals_of(point))}
-    return tuple(joint for joint in joints if joint in found)
+    return tuple(j for j in joints if j in found), tuple(j for j in joints if j not in found)
 
 
 def _withdraw(found: _Search, unexplained_joints: Sequence[int]) -> _Search:
