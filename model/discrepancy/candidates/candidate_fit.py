@@ -119,6 +119,15 @@ def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit 
     return None if best is None or best.cost > lost else with_evidence(before, probe, best)
 
 
+def refit_from_expected(before: Fit, probe: Probe) -> CandidateFit | None:
+    """The candidate, fitted from the expected numbers alone; None if that does not better the baseline."""
+    try:
+        point = _from_expected(before.point, probe, before.point.cost)
+    except SpecError:
+        return None
+    return None if point is None or point.cost > before.point.cost else with_evidence(before, probe, point)
+
+
 def nearest(before: Point, begun: Sequence[Probe]) -> Probe:
     """The start with the lowest cost, of several for a fit of the same effect. Raises SpecError."""
 
