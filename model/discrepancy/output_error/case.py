@@ -65,13 +65,6 @@ class Case:
         held = self.floor_held if self.held is None else np.maximum(self.floor_held, self.held.floor(point))
         return replace(self, floor=floor, floor_held=held)
 
-    def with_noise_of(self, point: Point) -> Case:
-        """The same, its errors and floors with the noise that a point is weighed with."""
-        scoring = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
-        held = _held_with_noise(self.held, point)
-        held_floor = self.floor_held if held is None else held.floor(point)
-        return replace(self, scoring=scoring, floor=noise_floor(scoring, point), held=held, floor_held=held_floor)
-
     def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
         """Errors of every joint on the fitted traces."""
         old, new = (self.scoring.residuals(p) for p in (before, after))

@@ -54,11 +54,6 @@ def shown_noise(point: Point) -> ShownNoise | None:
     return ShownNoise(tuple(whiteners), np.array(sizes))
 
 
-def weighs_rightly(point: Point) -> bool:
-    """Whether a point leaves what it was weighed with."""
-    return 1.0 / LARGER < point.misfit < LARGER
-
-
 def residuals_of(model: Model, observation: Observation, signals: Sequence[Floats]) -> Residuals:
     """Residuals of an observation as their shape is looked for."""
     return Residuals(

@@ -39,7 +39,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
-from model.discrepancy.output_error.shown_noise import shown_noise, weighs_rightly, with_noise
+from model.discrepancy.output_error.shown_noise import shown_noise, with_noise
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
@@ -91,7 +91,7 @@ def diagnose_by_simulation(
     fitted = _weighed_with_shown_noise(_fit_tolerances(given))
     case = build_case(model, given, fitted, traces, hold_out(known, holdout), options, excluded)
     first = judge(fitted)
-    case, search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
+    search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
     answer = _answer(case, search, proved, chooser, cancel)
@@ -189,8 +189,6 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
     expected to be, the fit is begun from there as well: with too little noise it may have gone along a valley in which
     records tell little, and a search does not find the way back.
     """
-    if weighs_rightly(fitted):
-        return fitted
     for _ in range(NOISE_ROUNDS):
         noise = shown_noise(fitted)
         if noise is None:
@@ -206,9 +204,9 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
     return fitted
 
 
-def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tuple[Case, _Search]:
+def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
     """Adds effects until nothing significant is left, until what is left cannot be named, or until the limit of
-    steps. The case changes where what an effect leaves shows another noise."""
+    steps."""
     width = 0.8 / case.options.most_steps
     for number in range(case.options.most_steps):
 
@@ -218,10 +216,7 @@ def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel
         search = _add_effect(case, search, tell, cancel)
         if search.ended:
             break
-        point = _weighed_with_shown_noise(search.current.point)
-        if point is not search.current.point:
-            case, search = case.with_noise_of(point), replace(search, current=judge(point))
-    return case, search
+    return search
 
 
 def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
@@ -307,8 +302,12 @@ def _answer(
 
 
 def _joints_left(case: Case, found: _Search, where: Where | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Joints on which fitted or held-out traces leave more than noise: those where that has a shape, an unexplained
-    error, and those where it has none. where: the map of the current point, while no effect has been added."""
+    """Joints on which fitted or held-out traces leave more than noise: those with an unexplained error, and those on
+    which it is noise. where: the map of the current point, while no effect has been added.
+
+    What a nearly right law of an effect leaves may be without any shape: with an effect, more than noise is an
+    unexplained error.
+    """
     before, after, effect_added = found.first.point, found.current.point, where is None
     if effect_added:
         case = case.with_floors_of(after)
@@ -320,7 +319,7 @@ def _joints_left(case: Case, found: _Search, where: Where | None) -> tuple[tuple
         case.fitted_errors(before, after), held_errors, case.thresholds, named=effect_added, samples=counts
     )
     if where is None:
-        return _by_structure(case, after, left)
+        return left, ()
     closer = unexplained(errors_of_fit(after), (), case.thresholds, named=False, samples=counts)
     line = chance_significance(len(where.cells), case.thresholds.place)
     places = [c.joint for c in where.cells if c.significance >= line]
