@@ -16,7 +16,7 @@ from model.discrepancy.output_error.shown_noise import readings_apart, shown_noi
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy import outside_arm
 
-FAR_OFF = (300, 801, 1200)
+FAR_OFF = (200, 501, 800)
 """Samples of joint 2 that are far off."""
 COLOURED = 2.0
 """rms in counts of noise below 3 Hz."""
