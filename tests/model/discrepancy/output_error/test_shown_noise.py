@@ -8,87 +8,106 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from daq.contracts.trace import Trace
-from model.discrepancy.output_error.noise_floor import noise_floor
-from model.discrepancy.output_error.observation import Observation, observe
-from model.discrepancy.output_error.search import Point, converge, point_at
+from model.arrays import Floats
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import Point, point_at
 from model.discrepancy.output_error.shown_noise import readings_apart, shown_noise, with_noise
-from model.machine_model.model import Model, base_model
-from tests.model.discrepancy import outside_arm
+from tests.model.fitting import imagined
 
-FAR_OFF = (200, 501, 800)
+FAR_OFF = (200, 301, 450)
 """Samples of joint 2 that are far off."""
-COLOURED = 2.0
-"""rms in counts of noise below 3 Hz."""
-MODEL = base_model(outside_arm.machine())
-
-
-def noisy(trace: Trace) -> Trace:
-    """The record with more noise than its file states: slow, and now and then far off. The controller has not seen
-    it."""
-    pole = np.exp(-2 * np.pi * 3.0 * outside_arm.PERIOD)
-    draw = np.random.default_rng(4).standard_normal(trace.position.shape)
-    slow = COLOURED * lfilter([np.sqrt(1 - pole**2)], [1.0, -pole], draw, axis=0)
-    slow[list(FAR_OFF), 1] += 15.0
-    return replace(trace, position=trace.position + outside_arm.COUNT * np.round(slow))
-
-
-def with_sudden_friction(given: Point) -> Point:
-    """That of the arm, whose other numbers are those of its file."""
-    pairs = zip(given.unknowns, given.values, strict=True)
-    return given.moved_to(np.array([u.low if u.name.startswith("presliding.") else v for u, v in pairs]))
+DISTANCE = 30.0
+"""By how many deviations."""
 
 
 @pytest.fixture(scope="module")
-def fitted() -> Point:
-    """Fitted from the arm's own numbers, which are those of the file, to keep the test short."""
-    given = point_at(*observe(MODEL, [noisy(outside_arm.record(outside_arm.OutsideArm(), 7, 9.0))]))
-    sudden = [
-        u.low if u.name.startswith("presliding.") else v for u, v in zip(given.unknowns, given.values, strict=True)
-    ]
-    return converge(given.moved_to(np.array(sudden)), 3, most=1)
+def given() -> Point:
+    arm = imagined.arm()
+    observation, calibration = observe(arm, [imagined.trace(arm, seconds=12.0)])
+    return point_at(observation, calibration, np.zeros((len(calibration.unknowns), observation.samples)))
 
 
-def test_noise_that_is_not_stated_is_reckoned_with(fitted: Point) -> None:
-    noise = shown_noise(fitted)
+def slow(given: Point, seed: int = 4) -> Floats:
+    """White noise as stated, and two deviations of noise whose neighbours are alike to seven tenths."""
+    draw, shape = np.random.default_rng(seed), given.residuals[0].shape
+    coloured = lfilter([np.sqrt(1 - 0.7**2)], [1.0, -0.7], draw.standard_normal(shape), axis=0)
+    return np.asarray(draw.standard_normal(shape) + 2.0 * coloured)
+
+
+def leaving(given: Point, left: Floats) -> Point:
+    """A fit that leaves so much, in deviations of a reading."""
+    residuals = (left * given.observation.deviations,)
+    return replace(given, residuals=residuals, weighted=given.observation.weighted(residuals))
+
+
+def with_far_readings(given: Point) -> Point:
+    left = slow(given)
+    left[list(FAR_OFF), 1] += DISTANCE
+    record = given.observation.records[0]
+    measured = record.measured.copy()
+    measured[list(FAR_OFF), 1] += DISTANCE * given.observation.deviations[1]
+    (prepared,) = given.observation.prepared
+    there = replace(
+        given.observation,
+        records=(replace(record, measured=measured),),
+        prepared=(replace(prepared, readings=measured.copy()),),
+    )
+    return leaving(replace(given, observation=there), left)
+
+
+def test_noise_that_is_not_stated_is_reckoned_with_in_size_and_colour(given: Point) -> None:
+    point = leaving(given, slow(given))
+    noise = shown_noise(point)
     assert noise is not None
-    counts = fitted.observation.deviations * noise.sizes / fitted.observation.unit
-    np.testing.assert_allclose(counts, np.hypot(COLOURED, 0.5), rtol=0.35)
-    weighed = fitted.on(with_noise(fitted.observation, noise, fitted.residuals), fitted.tangents)
-    assert fitted.misfit > 5.0
-    assert weighed.misfit == pytest.approx(1.0, abs=0.15)
+    np.testing.assert_allclose(noise.sizes, np.sqrt(5.0), rtol=0.2)
+    assert all(w.order > 0 for w in noise.whiteners)
+    observation = with_noise(point.observation, noise, point.residuals)
+    assert point.misfit == pytest.approx(5.0, rel=0.3)
+    assert np.mean(observation.weighted(point.residuals) ** 2) == pytest.approx(1.0, abs=0.05)
+    np.testing.assert_allclose(observation.sizes, noise.sizes * observation.deviations)
 
 
-def test_readings_that_are_far_off_are_left_out_and_no_others(fitted: Point) -> None:
-    (apart,) = readings_apart(fitted.observation, fitted.residuals)
+def test_one_joint_is_weighed_as_all_of_them_are(given: Point) -> None:
+    point = leaving(given, slow(given))
+    noise = shown_noise(point)
+    assert noise is not None
+    observation = with_noise(point.observation, noise, point.residuals)
+    n = len(observation.deviations)
+    alone = observation.whitened(1, observation.in_deviations(point.residuals)[1::n])
+    np.testing.assert_allclose(alone, observation.weighted(point.residuals)[1::n])
+
+
+def test_noise_as_stated_and_what_has_a_shape_change_nothing(given: Point) -> None:
+    white = np.random.default_rng(1).standard_normal(given.residuals[0].shape)
+    assert shown_noise(leaving(given, white)) is None
+    drift = np.cumsum(np.random.default_rng(2).standard_normal(given.residuals[0].shape), axis=0)
+    assert shown_noise(leaving(given, white + drift)) is None
+
+
+def test_readings_that_are_far_off_are_left_out_and_no_others(given: Point) -> None:
+    point = with_far_readings(given)
+    (apart,) = readings_apart(point.observation, point.residuals)
     rows, columns = np.nonzero(apart)
     assert rows.tolist() == list(FAR_OFF)
     assert set(columns.tolist()) == {1}
-    noise = shown_noise(fitted)
+    noise = shown_noise(point)
     assert noise is not None
-    observation = with_noise(fitted.observation, noise, fitted.residuals)
-    weighed = observation.in_deviations(fitted.residuals)
-    assert weighed.size == fitted.weighted.size
-    assert np.abs(weighed).max() < 0.7 * np.abs(fitted.observation.in_deviations(fitted.residuals)).max()
-    before, after = (o.prepared[0].readings[list(FAR_OFF), 1] for o in (fitted.observation, observation))
-    at_far = after - before
-    np.testing.assert_allclose(at_far / outside_arm.COUNT, -15.0, atol=8.0)
+    np.testing.assert_allclose(noise.sizes, np.sqrt(5.0), rtol=0.2)
+    observation = with_noise(point.observation, noise, point.residuals)
+    assert np.abs(observation.in_deviations(point.residuals)).max() < 0.5 * DISTANCE
+    assert observation.rms(point.residuals)[1] < point.observation.rms(point.residuals)[1]
 
 
-def test_the_floor_is_that_of_the_noise_that_is_reckoned_with(fitted: Point) -> None:
-    noise = shown_noise(fitted)
+def test_a_simulation_that_gets_the_recorded_drive_is_not_given_far_readings(given: Point) -> None:
+    """One that forms its drive gets them, since the real controller had them."""
+    point = with_far_readings(given)
+    noise = shown_noise(point)
     assert noise is not None
-    observation: Observation = with_noise(fitted.observation, noise, fitted.residuals)
-    ratio = np.array(observation.rms(fitted.residuals)) / noise_floor(observation, fitted)
-    np.testing.assert_allclose(ratio, 1.0, atol=0.25)
-
-
-def test_noise_as_stated_changes_nothing() -> None:
-    model: Model = MODEL
-    given = point_at(*observe(model, [outside_arm.record(outside_arm.OutsideArm(), 7, 9.0)]))
-    sudden = [
-        u.low if u.name.startswith("presliding.") else v for u, v in zip(given.unknowns, given.values, strict=True)
-    ]
-    fine = given.moved_to(np.array(sudden))
-    assert fine.misfit < 1.15
-    assert shown_noise(fine) is None
+    closed = with_noise(point.observation, noise, point.residuals)
+    assert closed.prepared == point.observation.prepared
+    driven = with_noise(point.observation.with_drive_as_input(True), noise, point.residuals)
+    (before,), (after,) = point.observation.prepared, driven.prepared
+    changed = np.nonzero(before.readings != after.readings)
+    assert changed[0].tolist() == list(FAR_OFF)
+    taken = (before.readings - after.readings)[changed] / point.observation.deviations[1]
+    np.testing.assert_allclose(taken, DISTANCE, rtol=0.5)
