@@ -56,7 +56,7 @@ class Readings:
     closed: dict[str, Signals]
     machine: Machine = field(default_factory=imagined.machine)
     units: tuple[str, ...] = ("rad",) * 3
-    deviations: Floats = field(default_factory=lambda: np.array([0.1, 0.2, 0.3]))
+    sizes: Floats = field(default_factory=lambda: np.array([0.1, 0.2, 0.3]))
     drive: bool = True
     share: float = 0.9
 
