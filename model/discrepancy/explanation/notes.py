@@ -7,13 +7,9 @@ from typing import Any, Protocol
 
 from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Note
-from model.discrepancy.output_error.observation import Observation
 
 FAR = 4.0
 """Distance of an estimate from the stated value, in stated deviations, beyond which there is a warning."""
-
-NOISIER = 1.15
-"""Variance of readings, relative to the stated one, from which there is a note."""
 
 
 class _Expected(Protocol):
@@ -41,33 +37,6 @@ def on_unfinished(traces: Sequence[Trace]) -> tuple[Note, ...]:
         for t in traces
         if t.record.outcome not in (None, "complete")
     )
-
-
-def on_noise(observation: Observation, rms: Sequence[float], joints: Sequence[int]) -> tuple[Note, ...]:
-    """A note on joints whose readings are noisier than the machine file states; none where there are none.
-
-    Args:
-        observation: with the noise that it is weighed with, where that is not the stated one. rms: of each joint's
-            residual, rad. joints: those on which more is left than noise, without any shape.
-    """
-    found = []
-    for column, joint in enumerate(observation.machine.modelled_joints):
-        stated = float(observation.deviations[column])
-        size = max(float(observation.sizes[column]), float(rms[column]) if joint in joints else 0.0)
-        if size**2 < NOISIER * stated**2:
-            continue
-        counts = observation.machine.joint(joint).sensor is not None
-        unit = float(observation.unit[column]) if counts else 1.0
-        found.append(
-            {
-                "joint": joint,
-                "size": size / unit,
-                "stated": stated / unit,
-                "unit": "count" if counts else observation.units[column],
-                "apart": sum(int(apart[:, column].sum()) for apart in observation.apart),
-            }
-        )
-    return (Note(kind="larger-noise", values={"joints": found}),) if found else ()
 
 
 def on_stated_numbers(numbers: Iterable[_Expected], values: Mapping[str, float]) -> tuple[Note, ...]:

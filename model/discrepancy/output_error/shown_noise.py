@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.arrays import Floats
+from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.structure import GAUSSIAN, joints_with_structure
 from model.discrepancy.output_error.observation import Observation, ShownNoise, Signals
@@ -85,6 +86,33 @@ def with_noise(observation: Observation, noise: ShownNoise, signals: Signals) ->
             readings[gone, column] = np.interp(gone, kept, readings[kept, column])
         prepared.append(replace(given, readings=readings))
     return replace(weighed, prepared=tuple(prepared))
+
+
+def note_on_noise(observation: Observation, rms: Sequence[float], joints: Sequence[int]) -> tuple[Note, ...]:
+    """A note on joints whose readings are noisier than the machine file states; none where there are none.
+
+    Args:
+        observation: with the noise that it is weighed with, where that is not the stated one. rms: of each joint's
+            residual, rad. joints: those on which more is left than noise, without any shape.
+    """
+    found = []
+    for column, joint in enumerate(observation.machine.modelled_joints):
+        stated = float(observation.deviations[column])
+        size = max(float(observation.sizes[column]), float(rms[column]) if joint in joints else 0.0)
+        if size**2 < LARGER * stated**2:
+            continue
+        counts = observation.machine.joint(joint).sensor is not None
+        unit = float(observation.unit[column]) if counts else 1.0
+        found.append(
+            {
+                "joint": joint,
+                "size": size / unit,
+                "stated": stated / unit,
+                "unit": "count" if counts else observation.units[column],
+                "apart": sum(int(apart[:, column].sum()) for apart in observation.apart),
+            }
+        )
+    return (Note(kind="larger-noise", values={"joints": found}),) if found else ()
 
 
 def readings_apart(observation: Observation, signals: Signals) -> tuple[NDArray[np.bool_], ...]:

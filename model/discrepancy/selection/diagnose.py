@@ -19,7 +19,7 @@ from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
-from model.discrepancy.explanation.notes import on_noise, on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
@@ -39,7 +39,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
-from model.discrepancy.output_error.shown_noise import shown_noise, with_noise
+from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
@@ -267,7 +267,7 @@ def _answer(
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
-        *on_noise(end.observation, case.scoring.rms(case.scoring.residuals(end)), noisy),
+        *note_on_noise(end.observation, case.scoring.rms(case.scoring.residuals(end)), noisy),
         *on_unfinished((*case.traces, *case.held_traces)),
         *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *asked.notes,

@@ -9,10 +9,11 @@ import pytest
 
 from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
 from model.discrepancy.explanation.note_words import note_words
-from model.discrepancy.explanation.notes import on_noise, on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
 from model.discrepancy.grounds import Note, NoteKind, PatternKind
 from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.shown_noise import note_on_noise
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
 
@@ -69,8 +70,8 @@ def test_noise_that_the_file_does_not_state_is_told_in_counts() -> None:
     arm = imagined.arm()
     observation, _ = observe(arm, [imagined.trace(arm, seconds=3.0)])
     rms = [3.0 * float(d) for d in observation.deviations]
-    assert on_noise(observation, rms, ()) == ()
-    (note,) = on_noise(observation, rms, (2,))
+    assert note_on_noise(observation, rms, ()) == ()
+    (note,) = note_on_noise(observation, rms, (2,))
     (joint,) = note.values["joints"]
     assert joint["joint"] == 2
     assert joint["size"] == pytest.approx(3.0 * joint["stated"])

@@ -100,7 +100,7 @@ def case_of(held: Held | None) -> Case:
         given=cast(Point, "given"),
         traces=(),
         scoring=plain,
-        floor=plain.deviations,
+        floor=plain.sizes,
         held=cast(Any, held),
         floor_held=np.zeros(0),
         options=DiagnosisOptions(),
