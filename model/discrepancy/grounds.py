@@ -39,6 +39,7 @@ NoteKind = Literal[
     "cutoff",
     "drive-timing",
     "errors-follow-record",
+    "larger-noise",
     "no-experiment-left",
     "not-looked-for",
     "not-separable",

@@ -66,7 +66,7 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
         error = wanted - read
         if k == 0:
             memory[j, LAST_ERROR] = error
-        power = board_pid(error, record.gains[j], joint, quantise, memory[j])
+        power = board_pid(error, record.gains[j], joint, rounds, memory[j])
         drive = power * joint[at.VOLTS_PER_COUNT]
         error = error * unit
     else:

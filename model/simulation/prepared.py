@@ -18,6 +18,10 @@ from model.simulation.inputs import RunInputs
 
 POSTURE_UNITS = 1000
 """Number of posture units over the range of a sensor, as the board counts them."""
+NEARLY_WHOLE = 1e-3
+"""Distance of a set point from a whole count, in counts, that a record's digits explain."""
+NO_ACCIDENT = 20
+"""Number of different set points of one joint that are not all whole counts by accident."""
 LONGEST_STEP = 1e-3
 """Longest step of integration, s: readings are right to some 0.005 counts, contacts apart (docs/modelling.md has each
 effect)."""
@@ -131,8 +135,28 @@ def _rounded(controller: SampledPid, joints: tuple[int, ...], set_points: Floats
     return found
 
 
+def _whole_counts(model: Model, set_points: Floats) -> Floats | None:
+    """Set points in ADC counts, if all of them are whole ones and a joint has so many that it is no accident."""
+    counts = np.empty_like(set_points)
+    for k, joint in enumerate(model.machine.modelled_joints):
+        if model.machine.joint(joint).sensor is None:
+            return None
+        own = model.machine.calibration(joint)
+        counts[:, k] = (set_points[:, k] - own.angle_at_zero_rad) / own.rad_per_count
+    whole = np.round(counts)
+    if np.abs(counts - whole).max() > NEARLY_WHOLE:
+        return None
+    return whole if max(len(np.unique(column)) for column in whole.T) >= NO_ACCIDENT else None
+
+
 def _counts(model: Model, set_points: Floats) -> Floats:
-    """Set points in ADC counts as the board takes them: rounded to posture units, then to counts (half up)."""
+    """Set points in ADC counts as the board takes them: rounded to posture units, then to counts (half up).
+
+    Those of a record that are whole counts already are what the board has worked with: it takes no posture units then.
+    """
+    own_counts = _whole_counts(model, set_points)
+    if own_counts is not None:
+        return own_counts
     counts = np.empty_like(set_points)
     for k, joint in enumerate(model.machine.modelled_joints):
         own = model.machine.calibration(joint)

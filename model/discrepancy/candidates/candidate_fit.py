@@ -89,8 +89,10 @@ def says_no_more(
 
 
 def judge(point: Point) -> Fit:
-    """The point with the noise model of its own residual."""
-    return Fit(point, fit_noise_model(point.observation.by_joint(point.weighted)))
+    """The point with the noise model of its own residual, in stated deviations: the noise that its fit was weighed
+    with is that of another model's residual."""
+    observation = point.observation
+    return Fit(point, fit_noise_model(observation.by_joint(observation.in_deviations(point.residuals))))
 
 
 def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit | None:
@@ -115,6 +117,15 @@ def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit 
                 break
     best = min(found, key=lambda p: p.cost, default=None)
     return None if best is None or best.cost > lost else with_evidence(before, probe, best)
+
+
+def refit_from_expected(before: Fit, probe: Probe) -> CandidateFit | None:
+    """The candidate, fitted from the expected numbers alone; None if that does not better the baseline."""
+    try:
+        point = _from_expected(before.point, probe, before.point.cost)
+    except SpecError:
+        return None
+    return None if point is None or point.cost > before.point.cost else with_evidence(before, probe, point)
 
 
 def nearest(before: Point, begun: Sequence[Probe]) -> Probe:
@@ -176,7 +187,7 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
     The new fit is given up once a cost of `goal` is out of reach.
     """
-    if found.misfit < STRANGE and _strain(found.fit.point) < STRAINED:
+    if found.misfit < STRANGE and strain(found.fit.point) < STRAINED:
         return found
     try:
         point = _from_expected(before.point, found.probe, min(goal, found.fit.point.cost))
@@ -189,10 +200,10 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
 def diverged_from_prior(point: Point) -> bool:
     """Whether the tolerance parameters have unlikely values, and the record is unexplained all the same."""
-    return point.misfit >= STRANGE and _strain(point) >= STRAINED
+    return point.misfit >= STRANGE and strain(point) >= STRAINED
 
 
-def _strain(point: Point) -> float:
+def strain(point: Point) -> float:
     """The largest deviation from a prior's mean, in its standard deviations."""
     return float(np.max(np.abs(point.values - point.expected) * np.sqrt(point.precision), initial=0.0))
 

@@ -11,6 +11,7 @@ from model.arrays import Floats
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, price_of, says_no_more
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import Candidate, FoundValue
+from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, descend
 from model.fitting.fit import INTERVAL
@@ -31,7 +32,10 @@ def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | fl
     """
     point = found.point
     tangents = point.observation.by_joint(point.tangents)
-    statistical = standard_deviations(point.precision, found.noise.whiteners, tangents)
+    weighed = found.noise
+    if point.observation.noise is not None:
+        weighed = fit_noise_model(point.observation.by_joint(point.weighted))
+    statistical = standard_deviations(point.precision, weighed.whiteners, tangents)
     deviations = np.hypot(statistical, shift)
     values = {}
     for p in parameters:

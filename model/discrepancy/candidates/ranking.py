@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates.candidate_fit import (
     STRANGE,
@@ -17,6 +18,7 @@ from model.discrepancy.candidates.candidate_fit import (
     polish,
     price_of,
     refit,
+    refit_from_expected,
     restart,
     same_answer,
 )
@@ -61,6 +63,8 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     probes = _probe_all(case, current, cancel, earlier)
     chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
     fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
+    if diverged_from_prior(current.point):
+        fits += _fits_from_expected(current, probes, case.options.polished)
     progress(0.9, "fitting effects of several joints")
     fits += fit_several_joints(current, fits, probes, case.thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
@@ -134,6 +138,31 @@ def _fit_all(
 
         fits += [f for f in side_by_side(fit, now) if f is not None]
     return fits
+
+
+def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> list[CandidateFit]:
+    """Fits, from the expected numbers, of the candidates that promise most there. Where tolerances have diverged to
+    imitate an effect, its probe promises nothing from where they are.
+
+    The closed loop is probed, which stays near the record whatever is missing.
+    """
+    tried = [p.hypothesis for p in probes if p.hypothesis.tone is None and not effect(p.hypothesis.name).is_flexible]
+    try:
+        begun = current.point.at_expected().on(current.point.observation.with_feedback_share(0.0))
+    except SpecError:
+        return []
+    if not begun.is_finite:
+        return []
+    found: list[Probe] = []
+    for one in probe(begun, tried):
+        if len(found) < most and not any(_same_place(one, other) for other in found):
+            found.append(one)
+    fits = side_by_side(partial(refit_from_expected, current), found)
+    return [fit for fit in fits if fit is not None]
+
+
+def _same_place(one: Probe, other: Probe) -> bool:
+    return (one.hypothesis.name, one.hypothesis.joints) == (other.hypothesis.name, other.hypothesis.joints)
 
 
 def _different(fits: Sequence[CandidateFit]) -> list[CandidateFit]:

@@ -259,6 +259,7 @@ def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: in
     for own in np.array_split(rates, math.ceil(len(rates) * len(columns) / BLOCK)) if len(rates) else ():
         waves = [_passed(point, over, column, own, response, t) for t in range(len(observation.records))]
         both = np.concatenate(waves, axis=1) / (observation.deviations[column] / math.sqrt(every))
+        both = observation.whitened(column, both.real) + 1j * observation.whitened(column, both.imag)
         sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
         gains, first, second = _explained(few, sine, cosine, columns)
         k = int(np.argmax(gains))

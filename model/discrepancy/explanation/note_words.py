@@ -38,6 +38,19 @@ def _errors_follow_record(v: Values) -> str:
     )
 
 
+def _larger_noise(v: Values) -> str:
+    def of(joint: Values) -> str:
+        apart = joint["apart"]
+        left_out = "" if not apart else f" beside {apart} reading{'' if apart == 1 else 's'} far off, left out"
+        unit = " counts" if joint["unit"] == "count" else f" {joint['unit']}"
+        return f"joint {joint['joint']} {joint['size']:.2g}{unit} for {joint['stated']:.2g}{left_out}"
+
+    return (
+        "the noise of readings is larger than what the machine file states of noise and rounding: "
+        f"{'; '.join(map(of, v['joints']))}; it goes with nothing that the arm does, so it is no effect"
+    )
+
+
 def _no_experiment_left(v: Values) -> str:
     return (
         f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
@@ -126,6 +139,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
+    "larger-noise": _larger_noise,
     "no-experiment-left": _no_experiment_left,
     "not-looked-for": _not_looked_for,
     "not-separable": _not_separable,

@@ -19,6 +19,7 @@ from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import Point
+from model.discrepancy.output_error.shown_noise import residuals_of, with_noise
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
 from model.machine_model.model import Model
@@ -105,21 +106,21 @@ class Case:
         """Where the point disagrees with the fitted traces. moving: also find which parameters would have to vary with
         time, which takes longest."""
         driven = tuple(t for t in self.traces if moving and t.drive is not None)
-        return locate(self._residuals(point), driven)
+        return locate(self.residuals_of(point), driven)
 
     def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
         """What the point leaves of the fitted traces, as torques."""
-        return remaining_shapes(self._residuals(point))
+        return remaining_shapes(self.residuals_of(point))
 
-    def _residuals(self, point: Point) -> Residuals:
-        left = self.scoring.residuals(point)
-        return Residuals(
-            model=point.fitted_model,
-            records=self.scoring.records,
-            signals=left,
-            deviations=self.scoring.deviations,
-            feedback_share=FEEDBACK_SHARE_FOR_ERRORS,
-        )
+    def residuals_of(self, point: Point) -> Residuals:
+        """Residuals of the fitted traces as errors are reported."""
+        return residuals_of(point.fitted_model, self.scoring, self.scoring.residuals(point))
+
+    def held_residuals_of(self, point: Point) -> Residuals | None:
+        """The same of the held-out traces; None where there are none."""
+        if self.held is None:
+            return None
+        return residuals_of(point.fitted_model, self.held.observation, self.held.residuals(point))
 
     def _square(self, point: Point) -> float:
         """Weighted sum of squares of a point, on the fitted traces as errors are reported."""
@@ -138,6 +139,7 @@ def build_case(
 ) -> Case:
     """The case of traces that a point was fitted to, with the floors that this point gives them."""
     scoring = fitted.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
+    held = _held_with_noise(held, fitted)
     return Case(
         model=model,
         given=given,
@@ -149,6 +151,14 @@ def build_case(
         options=options or DiagnosisOptions(),
         excluded=excluded,
     )
+
+
+def _held_with_noise(held: HeldOut | None, point: Point) -> HeldOut | None:
+    """Held-out traces with the noise that a point is weighed with, without readings of theirs that lie apart."""
+    noise = point.observation.noise
+    if held is None or noise is None:
+        return held
+    return replace(held, observation=with_noise(held.observation, noise, held.residuals(point)))
 
 
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:

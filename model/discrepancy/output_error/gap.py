@@ -36,7 +36,7 @@ def closed_loop_gap(case: Case, first: Point, taken: Sequence[tuple[Step, Point]
         measure="closed-loop",
         joints=joints,
         units=tuple(case.scoring.units),
-        noise=tuple(float(d) for d in case.scoring.deviations),
+        noise=tuple(float(d) for d in case.scoring.sizes),
         stages=(
             stage(GapStage(kind="given", fitted=()), case.given),
             stage(GapStage(kind="fitted", fitted=()), first),

@@ -83,7 +83,12 @@ def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
 def _record(observation: Observation, number: int) -> Observation:
     """One record of several."""
     own = slice(number, number + 1)
-    return replace(observation, records=observation.records[own], prepared=observation.prepared[own])
+    return replace(
+        observation,
+        records=observation.records[own],
+        prepared=observation.prepared[own],
+        apart=observation.apart[own],
+    )
 
 
 def _residuals(observation: Observation, point: Calibration, starts: tuple[Unknown, ...]) -> Floats:

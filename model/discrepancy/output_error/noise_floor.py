@@ -32,14 +32,21 @@ def noise_floor(
     replicas = [_replica(observation, truth, rng) for _ in range(REPLICAS)]
     if not all(np.isfinite(r.measured).all() for replica in replicas for r in replica.records):
         return observation.deviations.copy()
-    squares = []
-    for replica, residuals in zip(replicas, side_by_side(left, replicas), strict=True):
-        squares.append([np.mean(np.concatenate(runs) ** 2) for runs in replica.by_joint(replica.weighted(residuals))])
-    return np.asarray(observation.deviations * np.sqrt(np.mean(squares, axis=0)))
+    squares = [
+        np.square(replica.rms(residuals))
+        for replica, residuals in zip(replicas, side_by_side(left, replicas), strict=True)
+    ]
+    return np.asarray(np.sqrt(np.mean(squares, axis=0)))
 
 
 def _replica(observation: Observation, truth: Calibration, rng: np.random.Generator) -> Observation:
-    """The same experiments on an arm that is this model, with random noise of the stated size."""
+    """The same experiments on an arm that is this model, with random noise of the stated size, or as the records show
+    it."""
     scale = observation.deviations / observation.unit
-    noise = [scale * rng.normal(size=p.noise.shape) for p in observation.prepared]
-    return observation.imagined(truth, noise)
+    noise = [rng.normal(size=p.noise.shape) for p in observation.prepared]
+    if observation.noise is not None:
+        whiteners = observation.noise.whiteners
+        noise = [
+            np.stack([w.coloured(own) for w, own in zip(whiteners, each.T, strict=True)], axis=1) for each in noise
+        ]
+    return observation.imagined(truth, [scale * each for each in noise])

@@ -17,21 +17,24 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import Machine, PlainGain, SampledPid
+from daq.contracts.machine import BoardPid, Machine, PlainGain, SampledPid
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
+from model.drives import controller as pid
 from model.effects.effect import JointScale, Tone
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
+from model.fitting.whitening import Whitener
 from model.inverse_dynamics.recorded_sizes import as_driven
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
@@ -76,6 +79,9 @@ other simulations. Longer steps make such joints creep, and derivatives of that 
 LOOSE_START = 8.0
 """Prior width of the initial posture, in sensor tolerances. Wide, because the sensor itself may have the missing
 effect."""
+WHOLE = 1e-3
+"""Distance of a board's gain, in counts of drive per count of error, from a whole number that rounds nothing: counts
+of error are never more than some hundreds."""
 BATCH = 64
 """Simulations per call of the engine. It bounds the memory: 64 runs of 55 s take 26 MB."""
 AT_ONCE = 2
@@ -86,13 +92,26 @@ FAST = 0.99
 
 
 @dataclass(frozen=True)
+class ShownNoise:
+    """Noise of the readings as records show it, in stated standard deviations of a reading.
+
+    whiteners: one filter per joint. sizes: (n,) standard deviations.
+    """
+
+    whiteners: tuple[Whitener, ...]
+    sizes: Floats
+
+
+@dataclass(frozen=True)
 class Observation:
     """Records of one machine, and how well a reading can be known.
 
     records: inputs of the simulations and what was measured. deviations: (n,) rad, noise and rounding of one reading.
     unit: (n,) rad per count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
     with the share of the recorded readings that the simulated controller is given. scales: natural sizes, from the
-    records, of joints (from 1) whose file does not say how far they are driven.
+    records, of joints (from 1) whose file does not say how far they are driven. noise: of the readings as the records
+    show it, where it is not what the file states. apart: (m, n) per record, readings that are left out; none where
+    empty.
     """
 
     machine: Machine
@@ -101,11 +120,18 @@ class Observation:
     unit: Floats
     prepared: tuple[Prepared, ...]
     scales: Mapping[int, JointScale] = field(default_factory=dict)
+    noise: ShownNoise | None = None
+    apart: tuple[NDArray[np.bool_], ...] = ()
 
     @property
     def samples(self) -> int:
         """Readings that are compared, all joints together."""
         return sum(r.samples for r in self.records) * len(self.deviations)
+
+    @property
+    def sizes(self) -> Floats:
+        """(n,) rad, standard deviation of the noise of a reading: as the records show it, or as the file states it."""
+        return self.deviations if self.noise is None else self.deviations * self.noise.sizes
 
     def with_feedback_share(self, share: float) -> Observation:
         """The same with another share of the recorded readings that the simulated controller is given."""
@@ -129,7 +155,7 @@ class Observation:
         alone = tuple(
             replace(p, following=0.0, noise=own)
             .with_setting(at.DRIVE_RECORDED, 0)
-            .with_setting(at.QUANTISE, at.DRIVE_ROUNDED)
+            .with_setting(at.QUANTISE, at.DRIVE_ROUNDED if forms_rounded_drive(self.machine, p.gains) else 0)
             for p, own in zip(self.prepared, noise, strict=True)
         )
         outputs = replace(self, prepared=alone).outputs(truth.model, [self.state(truth)])
@@ -143,7 +169,7 @@ class Observation:
             )
             for p, r, out in zip(self.prepared, records, outputs, strict=True)
         )
-        return replace(self, records=records, prepared=prepared)
+        return replace(self, records=records, prepared=prepared, apart=())
 
     def readings(self, model: Model, states: Sequence[State], longest_step: float = STEP) -> list[Floats]:
         """Simulated readings of p states of a model, per record (p, m, n) rad, with noise where the simulation has
@@ -252,8 +278,15 @@ class Observation:
             for column in range(len(self.deviations))
         ]
 
+    def without_apart(self, signals: Sequence[Floats]) -> Signals:
+        """Signals (…, m, n), zero where a reading is left out."""
+        if not self.apart:
+            return tuple(signals)
+        return tuple(np.where(apart, 0.0, signal) for signal, apart in zip(signals, self.apart, strict=True))
+
     def _runs(self, signals: Signals) -> list[tuple[Floats, slice]]:
-        return [(s, run) for s, r in zip(signals, self.records, strict=True) for run in r.runs]
+        kept = self.without_apart(signals)
+        return [(s, run) for s, r in zip(kept, self.records, strict=True) for run in r.runs]
 
     def errors(self, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
         """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
@@ -263,13 +296,37 @@ class Observation:
             for joint, unit, old, new, least in rows
         )
 
-    def weighted(self, signals: Sequence[Floats]) -> Floats:
-        """Signals (…, m, n) in standard deviations of a reading, all compared samples in one row: (…, N)."""
+    def in_deviations(self, signals: Sequence[Floats]) -> Floats:
+        """Signals (…, m, n) in stated standard deviations of a reading, all compared samples in one row: (…, N)."""
         parts = []
-        for record, signal in zip(self.records, signals, strict=True):
+        for record, signal in zip(self.records, self.without_apart(signals), strict=True):
             chosen = np.concatenate([signal[..., run, :] for run in record.runs], axis=-2) / self.deviations
             parts.append(chosen.reshape(*chosen.shape[:-2], -1))
         return np.concatenate(parts, axis=-1)
+
+    def weighted(self, signals: Sequence[Floats]) -> Floats:
+        """The same in standard deviations of the noise that is reckoned with: where it is coloured, of what a sample
+        tells beyond those before it."""
+        found = self.in_deviations(signals)
+        if self.noise is not None:
+            n = len(self.deviations)
+            for column in range(n):
+                found[..., column::n] = self.whitened(column, found[..., column::n])
+        return found
+
+    def whitened(self, column: int, rows: Floats) -> Floats:
+        """Signals (…, N / n) of one joint's column, in stated deviations, as `weighted` weighs them."""
+        if self.noise is None:
+            return rows
+        whitener, found, done = self.noise.whiteners[column], np.empty_like(rows), 0
+        if whitener.order == 0:
+            return np.asarray(rows / whitener.deviations[-1])
+        for record in self.records:
+            for run in record.runs:
+                part = slice(done, done + run.stop - run.start)
+                found[..., part] = np.moveaxis(whitener.whitened(np.moveaxis(rows[..., part], -1, 0)), 0, -1)
+                done = part.stop
+        return found
 
     def by_joint(self, weighted: Floats) -> list[list[Floats]]:
         """A weighted row (…, N) split up: for every joint its uninterrupted runs (…, m)."""
@@ -338,9 +395,21 @@ def _recorded_scales(model: Model, records: Sequence[Record]) -> dict[int, Joint
 def _drive_is_input(machine: Machine, record: Record) -> bool:
     """Whether the record says what moved the arm in every period: its drive, however the controller came to it.
 
-    The board's own arithmetic is simulated as it is: that its drive is recorded brings nothing (docs/decisions/0033).
+    The drive of a board that rounds nothing is simulated as it is: that it is recorded brings nothing then
+    (docs/decisions/0033).
     """
-    return isinstance(machine.controller, SampledPid) and record.inputs.drive_of_every_period
+    return forms_rounded_drive(machine, record.inputs.gains) and record.inputs.drive_of_every_period
+
+
+def forms_rounded_drive(machine: Machine, gains: Floats) -> bool:
+    """Whether a controller with these gains (n, GAINS) may round its drive, so that a simulation without rounding has
+    another. A board's power for whole counts of error is whole as long as its gains are, and it sums up no errors."""
+    if isinstance(machine.controller, SampledPid):
+        return True
+    if not isinstance(machine.controller, BoardPid):
+        return False
+    of_counts = gains[:, [pid.P, pid.D]] * gains[:, [pid.SCALE]]
+    return bool(np.any(gains[:, pid.I]) or np.any(np.abs(of_counts - np.round(of_counts)) > WHOLE))
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:

@@ -74,6 +74,10 @@ class Point(Calibration):
         """The point at other values, with this one's derivatives."""
         return point_at(self.observation, self.at(values), self.tangents)
 
+    def at_expected(self) -> Point:
+        """The point at which all that has a prior is at its mean."""
+        return self.moved_to(np.where(self.precision > 0.0, self.expected, self.values))
+
     def with_new_tangents(self, which: Sequence[int] | None = None) -> Point:
         """The point with derivatives computed at it, by the unknowns of these indices or by all.
 

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import SampledPid
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
-from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
+from model.discrepancy.candidates.candidate_fit import STRAINED, CandidateFit, Fit, improved_baseline, judge, strain
 from model.discrepancy.candidates.decision import Added, decide
 from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
@@ -23,6 +23,7 @@ from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
+from model.discrepancy.localisation.structure import joints_with_structure
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.case import Case, build_case, errors_of_fit
@@ -38,6 +39,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
+from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
@@ -48,6 +50,8 @@ from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Kind
 
+NOISE_ROUNDS = 2
+"""Fits with the noise that the one before has left."""
 MOST_REFUSALS = 3
 """Candidates of one ranking that held-out traces may refuse before the search ends."""
 FIRST_FEEDBACK_SHARES = (0.0, 0.5)
@@ -84,9 +88,10 @@ def diagnose_by_simulation(
     if given.observation.drive_is_input:
         # The plant gets the drive that was recorded, whatever the controller has done.
         excluded = tuple(effect.value for effect in ControllerEffect)
-    fitted = judge(_fit_tolerances(given))
-    case = build_case(model, given, fitted.point, traces, hold_out(known, holdout), options, excluded)
-    search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
+    fitted = _weighed_with_shown_noise(_fit_tolerances(given))
+    case = build_case(model, given, fitted, traces, hold_out(known, holdout), options, excluded)
+    first = judge(fitted)
+    search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
     answer = _answer(case, search, proved, chooser, cancel)
@@ -177,6 +182,28 @@ def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
         return None
 
 
+def _weighed_with_shown_noise(fitted: Point) -> Point:
+    """The point fitted with the noise that its record shows, where that is more than it was fitted with, and noise.
+
+    Twice, since a fit with too little noise has followed some of it. Where tolerances stay far from what they are
+    expected to be, the fit is begun from there as well: with too little noise it may have gone along a valley in which
+    records tell little, and a search does not find the way back.
+    """
+    for _ in range(NOISE_ROUNDS):
+        noise = shown_noise(fitted)
+        if noise is None:
+            break
+        observation = with_noise(fitted.observation, noise, fitted.residuals)
+        try:
+            fitted = converge(fitted.on(observation), LAST_STEPS)
+            if strain(fitted) >= STRAINED:
+                again = _fit_tolerances(fitted.at_expected())
+                fitted = again if again.cost < fitted.cost else fitted
+        except SpecError:
+            break
+    return fitted
+
+
 def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
     """Adds effects until nothing significant is left, until what is left cannot be named, or until the limit of
     steps."""
@@ -226,7 +253,7 @@ def _answer(
 ) -> Diagnosis:
     """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
-    joints = _unexplained_joints(case, found, looked)
+    joints, noisy = _joints_left(case, found, looked)
     answered = verdict((*proved, *found.steps), unexplained=bool(joints))
     if answered == "unknown-effect":
         found = _withdraw(found, joints)
@@ -240,6 +267,7 @@ def _answer(
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
+        *note_on_noise(end.observation, case.scoring.rms(case.scoring.residuals(end)), noisy),
         *on_unfinished((*case.traces, *case.held_traces)),
         *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *asked.notes,
@@ -273,9 +301,13 @@ def _answer(
     return with_sentences(answer)
 
 
-def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tuple[int, ...]:
-    """Joints with an unexplained error on fitted or held-out traces. where: the map of the current point, while no
-    effect has been added."""
+def _joints_left(case: Case, found: _Search, where: Where | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Joints on which fitted or held-out traces leave more than noise: those with an unexplained error, and those on
+    which it is noise. where: the map of the current point, while no effect has been added.
+
+    What a nearly right law of an effect leaves may be without any shape: with an effect, more than noise is an
+    unexplained error.
+    """
     before, after, effect_added = found.first.point, found.current.point, where is None
     if effect_added:
         case = case.with_floors_of(after)
@@ -287,11 +319,20 @@ def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tupl
         case.fitted_errors(before, after), held_errors, case.thresholds, named=effect_added, samples=counts
     )
     if where is None:
-        return left
+        return left, ()
     closer = unexplained(errors_of_fit(after), (), case.thresholds, named=False, samples=counts)
     line = chance_significance(len(where.cells), case.thresholds.place)
     places = [c.joint for c in where.cells if c.significance >= line]
-    return tuple(sorted({*left, *closer, *places}))
+    return _by_structure(case, after, tuple(sorted({*left, *closer, *places})))
+
+
+def _by_structure(case: Case, point: Point, joints: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """These joints: those on which what is left has a shape, on the fitted traces or on held-out ones, and those on
+    which it is noise, larger than the file states."""
+    if not joints:
+        return (), ()
+    found = {*joints_with_structure(case.residuals_of(point)), *joints_with_structure(case.held_residuals_of(point))}
+    return tuple(j for j in joints if j in found), tuple(j for j in joints if j not in found)
 
 
 def _withdraw(found: _Search, unexplained_joints: Sequence[int]) -> _Search:

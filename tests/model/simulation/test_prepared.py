@@ -63,6 +63,20 @@ def test_a_board_with_a_finer_sensor_counts_in_its_own_counts() -> None:
     assert found.set_points[0, 0] == round(501 * 2**14 / 1000)
 
 
+def test_set_points_that_are_whole_counts_are_what_a_board_has_worked_with() -> None:
+    own = MA2000.calibration(1)
+    wanted = np.tile(START, (40, 1))
+    for k, joint in enumerate(MA2000.modelled_joints):
+        calibration = MA2000.calibration(joint)
+        wanted[:, k] = calibration.counts_to_rad(round(calibration.rad_to_counts(wanted[0, k])))
+    counts = 2048.0 + np.arange(40.0)
+    wanted[:, 0] = [own.counts_to_rad(c) for c in counts]
+    assert prepared(MA2000, trace_of(wanted)).set_points[:, 0].tolist() == counts.tolist()
+    between = wanted.copy()
+    between[7, 0] += 0.3 * own.rad_per_count
+    assert prepared(MA2000, trace_of(between)).set_points[:, 0].tolist() != counts.tolist(), "as planned, not as taken"
+
+
 def test_a_sampled_controller_rounds_set_points_to_its_own_step_half_up() -> None:
     text = SLIDE.replace(
         "gains = [[4.0", 'set_point_resolution = { value = 0.01, unit = "m", source = "t" }\ngains = [[4.0'

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import get_args
 
+import pytest
+
 from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
 from model.discrepancy.grounds import Note, NoteKind, PatternKind
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.shown_noise import note_on_noise
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
 
@@ -60,3 +64,20 @@ def test_a_note_reads_the_same_after_json() -> None:
     assert note_words(again) == (
         "no experiment within the limits and 60 s separates these by 3 standard deviations: a and b (1.2 at most)"
     )
+
+
+def test_noise_that_the_file_does_not_state_is_told_in_counts() -> None:
+    arm = imagined.arm()
+    observation, _ = observe(arm, [imagined.trace(arm, seconds=3.0)])
+    rms = [3.0 * float(d) for d in observation.deviations]
+    assert note_on_noise(observation, rms, ()) == ()
+    (note,) = note_on_noise(observation, rms, (2,))
+    (joint,) = note.values["joints"]
+    assert joint["joint"] == 2
+    assert joint["size"] == pytest.approx(3.0 * joint["stated"])
+    assert joint["stated"] == pytest.approx(observation.deviations[1] / observation.unit[1])
+    assert note_words(note).startswith(
+        "the noise of readings is larger than what the machine file states of noise and rounding: joint 2 "
+    )
+    apart = Note(kind="larger-noise", values={"joints": [{**joint, "size": 1.0, "stated": 0.3, "apart": 1}]})
+    assert "joint 2 1 counts for 0.3 beside 1 reading far off, left out;" in note_words(apart)

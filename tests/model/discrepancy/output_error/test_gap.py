@@ -56,7 +56,7 @@ class Readings:
     closed: dict[str, Signals]
     machine: Machine = field(default_factory=imagined.machine)
     units: tuple[str, ...] = ("rad",) * 3
-    deviations: Floats = field(default_factory=lambda: np.array([0.1, 0.2, 0.3]))
+    sizes: Floats = field(default_factory=lambda: np.array([0.1, 0.2, 0.3]))
     drive: bool = True
     share: float = 0.9
 
@@ -100,7 +100,7 @@ def case_of(held: Held | None) -> Case:
         given=cast(Point, "given"),
         traces=(),
         scoring=plain,
-        floor=plain.deviations,
+        floor=plain.sizes,
         held=cast(Any, held),
         floor_held=np.zeros(0),
         options=DiagnosisOptions(),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from model.discrepancy.output_error.observation import observe
+from daq.contracts.machine import load_machine
+from model.discrepancy.output_error.observation import forms_rounded_drive, observe
+from model.simulation.inputs import gains_of
 from tests.model.fitting import imagined
 
 
@@ -23,3 +26,22 @@ def test_numbers_of_the_machine_are_expected_to_be_what_its_file_states() -> Non
     load = next(u for u in given.unknowns if u.name == "load.mass")
     assert load.expected == pytest.approx(imagined.arm().parameter("load.mass").value)
     assert load.start == pytest.approx(1.4)
+
+
+def test_a_board_rounds_its_drive_unless_whole_errors_make_whole_counts_of_power() -> None:
+    machine = load_machine("ma2000")
+    assert not forms_rounded_drive(machine, gains_of(machine, None))
+    coarse = machine.model_copy(
+        update={
+            "controller": machine.controller.model_copy(
+                update={
+                    "dac_counts_per_adc_count": machine.controller.dac_counts_per_adc_count.model_copy(
+                        update={"value": 0.27}
+                    )
+                }
+            )
+        }
+    )
+    assert forms_rounded_drive(coarse, gains_of(coarse, None))
+    integrates = gains_of(machine, None) + np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert forms_rounded_drive(machine, integrates)
