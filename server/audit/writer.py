@@ -178,8 +178,7 @@ class AuditWriter:
         self.waiting = len(self._notes)
 
     def _forget_kept(self) -> None:
-        """Removes the file, since what it had has rows now. If that fails, they have rows twice after the next
-        start."""
+        """Removes the file, since what it had has rows now. If that fails, the next start writes them again."""
         self._taken_in = False
         with suppress(OSError):
             self._kept.unlink(missing_ok=True)

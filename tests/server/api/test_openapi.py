@@ -53,6 +53,8 @@ def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
     of_no_robot = {
         "/api/v1/robots",
         "/api/v1/tickets",
+        "/api/v1/audit",
+        "/api/v1/notifications",
         "/api/v1/me",
         "/api/v1/system",
         "/healthz",
