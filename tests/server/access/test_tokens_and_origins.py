@@ -363,7 +363,8 @@ def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path, daq: Comman
             assert nobody.post("/robots/ma2000/stop").status_code == 401
             assert nobody.get("/robots", headers={"Authorization": "Bearer daq_wrong"}).status_code == 401
             anna = {"Authorization": f"Bearer {viewer}"}
-            assert nobody.get("/me", headers=anna).json() == {"name": "anna", "role": "viewer"}
+            me = nobody.get("/me", headers=anna).json()
+            assert (me["name"], me["role"], me["owner_of"]) == ("anna", "viewer", [])
             refused = nobody.post("/robots/ma2000/experiments", json={}, headers=anna)
             assert (refused.status_code, refused.json()["type"]) == (403, "docs/service.md#operator-needed")
             bert = {"Authorization": f"Bearer {operator}"}
