@@ -41,7 +41,7 @@ def _fits(page: Page, name: str) -> None:
         if folder := os.environ.get("DAQ_PICTURES"):
             for scheme in ("light", "dark"):
                 page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-                page.screenshot(path=f"{folder}/{name}-{size['width']}-{scheme}.png")
+                Path(folder, f"{name}-{size['width']}-{scheme}.png").write_bytes(page.screenshot())
             page.emulate_media(color_scheme="light")
     page.set_viewport_size(WIDE)
 
