@@ -54,6 +54,8 @@ def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
         "/api/v1/robots",
         "/api/v1/tickets",
         "/api/v1/me",
+        "/api/v1/login",
+        "/api/v1/logout",
         "/api/v1/system",
         "/healthz",
         "/readyz",
