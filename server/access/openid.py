@@ -136,7 +136,7 @@ class Provider:
             claims.validate(leeway=LEEWAY)
         except (JoseError, ValueError, KeyError, TypeError) as error:
             raise _not_proven(f"the ID token is not valid: {error}") from error
-        return claims
+        return dict(claims)
 
     async def _key_set(self, now: float, *, anew: bool = False) -> KeySet:
         if self._keys is None or anew:

@@ -33,7 +33,7 @@ async def get_login_ways(services: ServicesDep) -> LoginWays:
     return LoginWays(openid=OpenIdWay(label=services.settings.server.oidc.label, start=START))
 
 
-@router.get("/login/start", status_code=303, response_class=RedirectResponse)
+@router.get("/login/start", include_in_schema=False)
 async def start_login(
     services: ServicesDep,
     robot: Annotated[str, Query(pattern=r"^([a-z0-9][a-z0-9_-]{0,31})?$", description="What to show afterwards.")] = "",
@@ -52,7 +52,7 @@ async def start_login(
     return answer
 
 
-@router.get("/login/callback", status_code=303, response_class=RedirectResponse)
+@router.get("/login/callback", include_in_schema=False)
 async def finish_login(services: ServicesDep, request: Request) -> Response:
     """Takes the provider's answer, begins a session, and sends the browser to the page.
 

@@ -87,6 +87,9 @@ def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], se
     for operation, part, content in _bodies(described):
         for name, example in content["examples"].items() if part == "request" else ():
             answer = _sent(service, operation, example["value"])
+            if operation.endswith("/approval") and answer.status_code == 409:
+                assert answer.json()["type"].endswith("#no-review"), answer.text  # this robot's need none
+                continue
             assert answer.status_code in (200, 201, 202, 404), (operation, name, answer.text)
             if answer.status_code == 404:
                 assert "there is no " in answer.json()["detail"], (operation, name)

@@ -56,6 +56,8 @@ def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
         "/api/v1/audit",
         "/api/v1/notifications",
         "/api/v1/me",
+        "/api/v1/login",
+        "/api/v1/logout",
         "/api/v1/system",
         "/healthz",
         "/readyz",

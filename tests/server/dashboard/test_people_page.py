@@ -41,7 +41,7 @@ def _fits(page: Page, name: str) -> None:
         if folder := os.environ.get("DAQ_PICTURES"):
             for scheme in ("light", "dark"):
                 page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-                page.screenshot(path=f"{folder}/{name}-{size['width']}-{scheme}.png")
+                Path(folder, f"{name}-{size['width']}-{scheme}.png").write_bytes(page.screenshot())
             page.emulate_media(color_scheme="light")
     page.set_viewport_size(WIDE)
 
@@ -56,7 +56,8 @@ def provider() -> Iterator[Provider]:
 
 
 def test_somebody_signs_in_and_out_on_the_page(browser: Browser, provider: Provider, tmp_path: Path) -> None:
-    with service_of_people(tmp_path, provider.url) as service, _tab(browser) as page:
+    elsewhere = provider.url.replace("127.0.0.1", "localhost")  # another site, as a browser sees it
+    with service_of_people(tmp_path, elsewhere) as service, _tab(browser) as page:
         page.goto(service.url)
         link = page.get_by_role("link", name="Sign in with the laboratory")
         expect(link).to_be_visible()
@@ -101,10 +102,10 @@ def test_somebody_else_s_experiment_is_looked_at_and_approved(
         robot.post("/queue/pause")
         anna = people_at(robot, tmp_path, {"anna": "operator"})["anna"]
         identity = anna.submit()
-        own = robot.post("/experiments", json={"spec": SPEC | {"name": "my own"}, "at": LATER}).json()["id"]
+        own = robot.post("/experiments", json={"spec": SPEC | {"name": "mine"}, "at": LATER}).json()["id"]
         page.goto(f"http://127.0.0.1:{robot.base_url.port}/#/experiments")
         page.get_by_role("button", name="Look at warm-up").click()
-        expect(page.get_by_role("button", name="Look at my own")).to_have_count(0)
+        expect(page.get_by_role("button", name="Look at mine")).to_have_count(0)
         expect(page.get_by_text("not approved: another operator must look at it")).to_have_count(2)
         _fits(page, "review")
         page.get_by_role("button", name="Approve warm-up").click()

@@ -1499,48 +1499,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/login/start": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Start Login
-         * @description Sends the browser to the provider of OpenID Connect.
-         */
-        get: operations["start_login"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/login/callback": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Finish Login
-         * @description Takes the provider's answer, begins a session, and sends the browser to the page.
-         *
-         *     A refused answer leads to the page's sign-in, with the problem's kind in the address.
-         */
-        get: operations["finish_login"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/logout": {
         parameters: {
             query?: never;
@@ -9046,29 +9004,6 @@ export interface operations {
                 };
             };
         };
-    };
-    start_login: {
-        parameters: {
-            query?: {
-                /** @description What to show afterwards. */
-                robot?: string;
-            };
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: never;
-    };
-    finish_login: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: never;
     };
     log_out: {
         parameters: {
