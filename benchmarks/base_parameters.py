@@ -107,7 +107,9 @@ def _of_figaroh(python: str, arm: PublishedArm, motion: Motion) -> tuple[int, Fl
             speed=motion.speed,
             acceleration=motion.acceleration,
         )
-        done = subprocess.run([python, str(PEER), str(task), str(answer)], check=True, stdout=subprocess.PIPE, text=True)
+        done = subprocess.run(
+            [python, str(PEER), str(task), str(answer)], check=True, stdout=subprocess.PIPE, text=True
+        )
         return int(json.loads(done.stdout.splitlines()[-1])["rank"]), np.load(answer)["base"]
 
 

@@ -34,7 +34,9 @@ def main(task_file: str, answer_file: str) -> None:
     robot = SimpleNamespace(model=model, data=model.createData())
     start = pinocchio.neutral(model)
     positions = np.array([pinocchio.integrate(model, start, q) for q in task["position"]])
-    regressor = build_regressor_basic(robot, positions, task["speed"], task["acceleration"], {"act_idxv": range(model.nv)})
+    regressor = build_regressor_basic(
+        robot, positions, task["speed"], task["acceleration"], {"act_idxv": range(model.nv)}
+    )
     names = [f"{kind}{joint}" for joint in range(len(joints)) for kind in range(regressor.shape[1] // len(joints))]
     dropped, kept = get_index_eliminate(regressor, dict.fromkeys(names, 0.0), tol_e=LEAST_COLUMN)
     reduced = build_regressor_reduced(regressor, dropped)

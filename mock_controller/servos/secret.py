@@ -39,7 +39,9 @@ class Secret:
         """What `reveal` tells."""
         return {
             "seed": seed,
-            "effects": [{"effect": self.effect, "joint": self.joint, "size": self.size, "unit": _RANGES[self.effect][3]}],
+            "effects": [
+                {"effect": self.effect, "joint": self.joint, "size": self.size, "unit": _RANGES[self.effect][3]}
+            ],
         }
 
     def lost(self, joint: int, volts: float) -> float:

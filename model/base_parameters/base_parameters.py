@@ -1,4 +1,4 @@
-"""The base parameters of a machine, by QR of a regressor at random admissible postures, and what records tell of them."""
+"""The base parameters of a machine, by QR of a regressor at random admissible postures; what records tell of them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,15 @@ HIGHEST_SPEED = 3.0
 """Largest speed drawn, rad/s (m/s), unless the joint's own limit is lower."""
 REVERSAL = 0.2
 """Time (s) in which a drawn acceleration changes the speed by the largest speed."""
-LINEAR = ("viscous_friction", "coulomb_friction", "weakened_magnet", "payload", "link_mass", "centre_of_mass", "base_tilt")
+LINEAR = (
+    "viscous_friction",
+    "coulomb_friction",
+    "weakened_magnet",
+    "payload",
+    "link_mass",
+    "centre_of_mass",
+    "base_tilt",
+)
 """Effects that the standard parameters, or gravity's direction, have in them."""
 
 

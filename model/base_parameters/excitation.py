@@ -22,12 +22,10 @@ from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
 
 TOLD = 0.1
-"""Largest relative deviation with which a base parameter counts as told: a value beyond it is within about a fifth of
-its own size only in name. Ten per cent is also the customary bound for robots (Gautier and Khalil 1991)."""
+"""Largest deviation with which a base parameter counts as told, as a share of its size. The size is the largest value
+of its unit at its joint, so that a moment that is zero can be told to be zero."""
 LEAST_LEFT = 1e-6
 """Least residual torque that weighs a record, as a share of its torque: a record without noise leaves next to none."""
-HARDLY = 1e6
-"""Condition number of the columns from which a record does not excite all base parameters."""
 
 
 def excitation_of(
@@ -58,20 +56,28 @@ def excitation_of(
         condition=float(singular[0] / singular[-1]) if rank == len(sizes) else None,
         residual=tuple(float(one) for one in np.sqrt((left**2).mean(axis=0))),
         parameters=tuple(
-            _recorded(deviation, value, excited=bool(size > 0.0))
-            for deviation, value, size in zip(deviations, values, sizes, strict=True)
+            _recorded(deviation, value, natural, excited=bool(size > 0.0))
+            for deviation, value, natural, size in zip(
+                deviations, values, _natural(standards, grouping, values), sizes, strict=True
+            )
         ),
     )
 
 
-def _recorded(deviation: float, value: float, *, excited: bool) -> RecordedBaseParameter:
+def _natural(standards: Sequence[Standard], grouping: Grouping, values: Floats) -> Floats:
+    """Sizes (r,) of base parameters: the largest value of the same unit at the same joint."""
+    kinds = [(standards[index].joint, standards[index].unit) for index in grouping.base]
+    return np.array([max(abs(v) for v, other in zip(values, kinds, strict=True) if other == own) for own in kinds])
+
+
+def _recorded(deviation: float, value: float, natural: float, *, excited: bool) -> RecordedBaseParameter:
     if not excited or not np.isfinite(deviation):
         return RecordedBaseParameter(deviation=None, relative=None, told=False)
     relative = None if value == 0.0 else deviation / abs(value)
     return RecordedBaseParameter(
         deviation=float(deviation),
         relative=None if relative is None else float(relative),
-        told=relative is not None and relative <= TOLD,
+        told=bool(deviation <= TOLD * natural),
     )
 
 
@@ -94,9 +100,7 @@ def _deviations(residuals: Sequence[Floats], torques: Sequence[Floats], columns:
         for joint, least in enumerate(floor)
     ]
     white = [whitened_residual(one, whiteners) for one in residuals]
-    jacobians = [
-        np.stack([w.whitened(one[:, joint]) for joint, w in enumerate(whiteners)], axis=1) for one in columns
-    ]
+    jacobians = [np.stack([w.whitened(one[:, joint]) for joint, w in enumerate(whiteners)], axis=1) for one in columns]
     starts = (0, *np.cumsum([len(one) for one in white]).tolist())
     flat = np.concatenate(jacobians)
     sizes = np.maximum(np.sqrt((flat**2).sum(axis=(0, 1))), np.finfo(float).tiny)

@@ -32,7 +32,7 @@ class Grouping:
     Args:
         base: indices of the r independent columns. regrouped: those of the columns that depend on them.
         without_effect: indices of columns that are zero.
-        shares: (r, len(regrouped)): column j is the base columns times shares[:, j], so that base parameter i is its own
+        shares: (r, len(regrouped)): column j is the base columns times shares[:, j]. So base parameter i is its own
             standard parameter plus shares[i, j] times each regrouped one.
         gap: smallest pivot that counts, and largest that does not, as shares of the first.
     """

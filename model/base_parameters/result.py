@@ -33,8 +33,8 @@ class RecordedBaseParameter(FrozenRecord):
     """What records tell of one base parameter.
 
     `deviation` is what they leave of it, every other base parameter being free, in its unit; `relative` is its share of
-    the value, None where the value is 0. Both are None where the records do not excite it. `told`: `relative` is at
-    most `TOLD`.
+    the value, None where the value is 0. Both are None where the records do not excite it. `told`: the deviation is at
+    most a tenth of the largest value of this unit at the joint, so that a moment that is zero can be told as well.
     """
 
     deviation: float | None
@@ -100,7 +100,8 @@ class BaseParameters(FrozenRecord):
 
 def headline(found: BaseParameters) -> str:
     """One line for people: how many base parameters there are, and how many the records tell."""
-    text = f"base parameters: {len(found.parameters)} of {found.standard} ({found.inertial} inertial, {found.friction} friction)"
+    text = f"base parameters: {len(found.parameters)} of {found.standard}"
+    text += f" ({found.inertial} inertial, {found.friction} friction)"
     if (records := found.excitation) is not None:
         condition = "" if records.condition is None else f", condition number {records.condition:.3g}"
         text += f"; told by these traces: {records.told}{condition}"

@@ -27,7 +27,7 @@ OF_JOINT = ("Ia", "Fv", "Ke", "Fc")
 """Rotor's inertia, viscous friction, damping by back-EMF and Coulomb friction, all as seen at the joint."""
 WORDS = {
     "m": "mass of a link",
-    "MX": "mass times x of its centre (MY, MZ alike), about the foot of the common normal on the link's own joint axis; "
+    "MX": "mass times x of its centre (MY, MZ alike), from the foot of the common normal on the link's own joint axis; "
     "z along that axis, x along the common normal",
     "XX": "moment of inertia about x at the same point (XY, XZ, YY, YZ, ZZ alike)",
     "Ia": "inertia of the joint's rotor, times the gear ratio squared",

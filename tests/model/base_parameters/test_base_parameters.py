@@ -9,25 +9,34 @@ import pytest
 
 from benchmarks.base_parameters import angle, pinocchio_regressor, rank_of, space
 from daq.contracts.machine import load_machine
+from mock_controller.servos.bench import Options
+from model.arrays import Floats
 from model.base_parameters.base_parameters import base_parameters, random_motion, regressor
 from model.base_parameters.grouping import grouped, preferred_order
 from model.base_parameters.result import headline
 from model.base_parameters.standard import (
     Motion,
+    about_own_axis,
     inertial_regressor,
     joint_parameters,
     link_parameters,
     standard_values,
 )
 from model.dynamics import recursive
-from model.kinematics.chain import Chain, Joint, Link
+from model.fitting.options import FitOptions
+from model.inverse_dynamics.fit import fit_torques
+from model.kinematics.chain import Chain, Joint
 from model.machine_model.model import base_model
 from model.robot_files.machine_of_arm import machine_from_urdf
 from model.simulation.chain_of_model import chain_of
+from tests.daq.runner.test_servo_models import motion
+from tests.daq.servo_bench import recorded as recorded_on_bench
 from tests.model.dynamics.chains import random_chain, random_link
+from tests.model.inverse_dynamics.test_fit_torques import COULOMB, LENGTH, MASS, ROTOR, VISCOUS, rod, swinging
 from tests.model.robot_files.arms import ARMS
 
 AGREEMENT = 1e-9
+EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
 def some_motion(joints: int, count: int, seed: int = 5) -> Motion:
@@ -41,14 +50,12 @@ def test_the_regressor_times_the_standard_parameters_is_the_torque(kinds: str) -
     chain = random_chain(4, 4, kinds).arrays()
     chain = chain._replace(rotor_inertia=np.zeros(4))
     motion = some_motion(4, 20)
-    from model.base_parameters.standard import about_own_axis
-
     parameters = np.concatenate([about_own_axis(chain, link) for link in range(4)])
     torque = np.array([recursive.inverse_dynamics(chain, *row) for row in zip(*motion_rows(motion), strict=True)])
     np.testing.assert_allclose(inertial_regressor(chain, motion) @ parameters, torque, rtol=0, atol=1e-10)
 
 
-def motion_rows(motion: Motion) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+def motion_rows(motion: Motion) -> tuple[list[Floats], list[Floats], list[Floats]]:
     return list(motion.position), list(motion.speed), list(motion.acceleration)
 
 
@@ -129,3 +136,43 @@ def test_a_seed_gives_the_same_answer_and_another_the_same_groups() -> None:
     one = base_parameters(model, seed=1)
     assert one == base_parameters(model, seed=1)
     assert [p.text for p in one.parameters] == [p.text for p in base_parameters(model, seed=2).parameters]
+
+
+def test_a_record_that_excites_all_tells_all_and_the_fitted_model_has_their_values() -> None:
+    """The hand-written swing of the fits of torques: its numbers are known."""
+    options = FitOptions(parameters=("link1.mass", "*friction*", "joint1.drive.inertia"), use_priors=False)
+    fitted = fit_torques(rod(), [swinging(1)], [], options).model
+    found = base_parameters(fitted, [swinging(1)])
+    told = found.excitation
+    assert told is not None
+    assert (told.rank, told.told) == (5, 5)
+    assert told.condition == pytest.approx(3.48, abs=0.02)
+    truth = {
+        "MX_1": MASS * LENGTH / 2,
+        "ZZ_1": MASS * LENGTH**2 / 3 + ROTOR,
+        "MY_1": 0.0,
+        "Fv_1": VISCOUS,
+        "Fc_1": COULOMB,
+    }
+    for parameter, recorded in zip(found.parameters, told.parameters, strict=True):
+        assert recorded.deviation is not None
+        own = truth[parameter.members[0].symbol]
+        assert abs(parameter.value - own) < max(4 * recorded.deviation, 0.1 * own)
+
+
+def test_a_record_of_one_joint_does_not_tell_the_others(tmp_path: Path) -> None:
+    machine = load_machine(str(EXAMPLES / "pan_tilt.toml"))
+    one = recorded_on_bench(Options(torque=True), motion(1, 3.0).model_copy(update={"joints": (2,)}), tmp_path)
+    told = base_parameters(base_model(machine), [one])
+    assert told.excitation is not None
+    verdicts = dict(zip((p.text for p in told.parameters), told.excitation.parameters, strict=True))
+    assert not verdicts["Fc_1"].told
+    assert told.excitation.told < len(told.parameters)
+
+
+def test_a_trace_without_a_drive_leaves_the_machines_part_and_says_why() -> None:
+    found = base_parameters(rod(), [swinging(1, torque=False)])
+    assert found.excitation is None
+    assert found.no_excitation is not None
+    assert "drive" in found.no_excitation
+    assert len(found.parameters) == 5
