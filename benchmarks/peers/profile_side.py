@@ -1,8 +1,8 @@
 """The side of pyPESTO and of `mujoco.sysid` in `benchmarks/profile_likelihoods.py`: one hanging rod, one record.
 
-python profile_side.py TASK.json, in an environment with `pypesto` and `mujoco[sysid]`. Both use MuJoCo's simulation of a
-rod that is described here anew; pyPESTO is given its residuals, `mujoco.sysid` its own. Prints JSON: estimates with 95 %
-intervals, pyPESTO's from profile likelihoods, those of `mujoco.sysid` from the Jacobian at the optimum.
+python profile_side.py TASK.json, in an environment with `pypesto` and `mujoco[sysid]`. Both are given the residuals of
+MuJoCo's simulation of a rod that is described here anew. Prints JSON: estimates with 95 % intervals, pyPESTO's from
+profile likelihoods, those of `mujoco.sysid` from the Jacobian at the optimum.
 """
 
 from __future__ import annotations
@@ -77,37 +77,37 @@ class Rod:
 
 
 def by_pypesto(rod: Rod, task: dict[str, Any]) -> dict[str, Any]:
-    """Fits and profiles with pyPESTO: its optimizer, its starts and its profiler."""
+    """Fits and profiles with pyPESTO: its optimizer, its starts and its profiler. Its parameters are shares of the
+    starting values, for its searches take all of them to be of one size."""
+    sizes = np.array(task["start"])
 
-    def cost(values: Any) -> float:
-        return 0.5 * float(np.sum(rod.residual(values) ** 2))
+    def residual(shares: Any) -> Any:
+        return rod.residual(np.asarray(shares) * sizes)
 
-    def slopes(values: Any) -> Any:
-        steps = 1e-5 * np.array(task["start"])
-        columns = [
-            (rod.residual(values + step) - rod.residual(values - step)) / (2 * step[k])
-            for k, step in enumerate(np.diag(steps))
-        ]
+    def slopes(shares: Any) -> Any:
+        columns = [(residual(shares + step) - residual(shares - step)) / 2e-5 for step in 1e-5 * np.eye(len(sizes))]
         return np.stack(columns, axis=1)
 
     objective = pypesto.Objective(
-        fun=cost,
-        grad=lambda values: slopes(values).T @ rod.residual(values),
-        hess=lambda values: slopes(values).T @ slopes(values),
+        fun=lambda shares: 0.5 * float(np.sum(residual(shares) ** 2)),
+        grad=lambda shares: slopes(shares).T @ residual(shares),
+        res=residual,
+        sres=slopes,
     )
-    problem = pypesto.Problem(objective, task["low"], task["high"], x_guesses=[task["start"]], x_names=task["names"])
-    optimizer = pypesto.optimize.ScipyOptimizer(method="L-BFGS-B", options={"ftol": 1e-13, "gtol": 1e-7})
+    low, high = np.array(task["low"]) / sizes, np.array(task["high"]) / sizes
+    problem = pypesto.Problem(objective, low, high, x_guesses=[np.ones(len(sizes))], x_names=task["names"])
+    optimizer = pypesto.optimize.ScipyOptimizer(method="ls_trf", tol=1e-11)
     found = pypesto.optimize.minimize(problem, optimizer, n_starts=task["starts"], progress_bar=False)
-    steps = np.array(task["steps"])
+    steps = np.array(task["steps"]) / sizes
     answer = {}
     for index, name in enumerate(task["names"]):
         size = float(steps[index])
         options = pypesto.profile.ProfileOptions(
-            default_step_size_absolute=0.2 * size,
+            default_step_size_absolute=size,
             default_step_size_relative=0.0,
-            min_step_size_absolute=0.02 * size,
+            min_step_size_absolute=0.2 * size,
             min_step_size_relative=0.0,
-            max_step_size_absolute=size,
+            max_step_size_absolute=2 * size,
             max_step_size_relative=0.0,
         )
         profiled = pypesto.profile.parameter_profile(
@@ -116,9 +116,12 @@ def by_pypesto(rod: Rod, task: dict[str, Any]) -> dict[str, Any]:
         one = profiled.profile_result.list[-1][index]
         threshold = pypesto.profile.chi2_quantile_to_ratio(CONFIDENCE)
         low, high = pypesto.profile.calculate_approximate_ci(one.x_path[index], one.ratio_path, threshold)
-        best = float(found.optimize_result.x[0][index])
+        best = float(found.optimize_result.x[0][index] * sizes[index])
         bounded = [one.ratio_path[0] < threshold, one.ratio_path[-1] < threshold]
-        answer[name] = [best, *(float(v) if is_end else None for v, is_end in zip((low, high), bounded, strict=True))]
+        answer[name] = [
+            best,
+            *(float(v * sizes[index]) if is_end else None for v, is_end in zip((low, high), bounded, strict=True)),
+        ]
     return answer
 
 
@@ -134,7 +137,7 @@ def by_sysid(rod: Rod, task: dict[str, Any]) -> dict[str, Any]:
         found = np.stack([rod.residual(column) for column in columns], axis=1)
         return [found if np.ndim(values) > 1 else found[:, 0]], None, None
 
-    _, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False)
+    _, result = sysid.optimize(parameters, residual, optimizer="scipy", verbose=False)
     left = rod.residual(result.x)
     _, halves = sysid.calculate_intervals([left], np.asarray(result.jac))
     return {

@@ -44,26 +44,25 @@ def named_shares(
 
     A share that is no polynomial of the lengths stays a number.
     """
-    found = {
-        (row, column): (Term(float(grouping.shares[row, column]), ()),)
+    found: dict[tuple[int, int], tuple[Term, ...]] = {
+        (int(row), int(column)): (Term(float(grouping.shares[row, column]), ()),)
         for row, column in np.argwhere(grouping.shares != 0.0)
     }
     lengths = _lengths(chain)
-    powers = {place: _power(standards, grouping, place) for place in found}
-    wanted = [place for place, power in powers.items() if power in (1, 2)]
-    if not wanted or not lengths:
+    powers = {place: power for place in found if (power := _power(standards, grouping, place)) in (1, 2)}
+    if not powers or not lengths:
         return found
     names = [_name(place) for place in lengths]
     products = {
-        power: list(combinations_with_replacement(range(len(lengths)), power)) for power in {powers[p] for p in wanted}
+        power: list(combinations_with_replacement(range(len(lengths)), power)) for power in set(powers.values())
     }
     rng = np.random.default_rng(seed)
     stretches = rng.uniform(*_STRETCH, (max(map(len, products.values())) + 4, len(lengths)))
     values = np.array([[chain.geometry[place] for place in lengths]]) * stretches
     few = _first_postures(motion, ENOUGH * len(standards) // len(chain.geometry))
     shares = [_shares(chain, few, grouping, lengths, row) for row in values]
-    for place in wanted:
-        monomials = products[powers[place]]
+    for place, own_power in powers.items():
+        monomials = products[own_power]
         table = np.array([[np.prod([row[k] for k in product]) for product in monomials] for row in values])
         seen = np.array([one[place] for one in shares])
         factors = np.linalg.lstsq(table, seen, rcond=None)[0]
@@ -98,10 +97,10 @@ def _name(place: tuple[int, int]) -> str:
     return f"{'d' if place[1] == 1 else 'a'}_{place[0] + 1}"
 
 
-def _power(standards: Sequence[Standard], grouping: Grouping, place: tuple[int, int]) -> int | None:
-    """Power of length of a share, by the units; None for friction."""
+def _power(standards: Sequence[Standard], grouping: Grouping, place: tuple[int, int]) -> int:
+    """Power of length of a share, by the units; 0 for friction."""
     base, other = standards[grouping.base[place[0]]], standards[grouping.regrouped[place[1]]]
-    return None if base.degree is None or other.degree is None else base.degree - other.degree
+    return 0 if base.degree is None or other.degree is None else base.degree - other.degree
 
 
 def _shares(

@@ -24,8 +24,8 @@ def profile_report(fitted: FitResult, profiles: Sequence[Profile]) -> Report:
     """The page of some parameters' profiles about a fit."""
     picture = Picture(
         drawn(lambda figure: _draw(figure, fitted, profiles), PANEL_HEIGHT * len(profiles)),
-        "Rise of −2 ln L when the parameter is moved and all others are fitted again. The line is the rise at which the "
-        "95 % interval ends; the band is the interval. Dashed: the parabola that the fit's covariance stands for.",
+        "Rise of −2 ln L when the parameter is moved and all others are fitted again. The line is the rise at which "
+        "the 95 % interval ends; the band is the interval. Dashed: the parabola that the fit's covariance stands for.",
     )
     blocks: list[Table | Text] = [_table(profiles)]
     if better := [one.name for one in profiles if one.better]:
