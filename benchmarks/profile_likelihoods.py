@@ -3,7 +3,7 @@
 python -m benchmarks profile_likelihoods [--peers PYTHON] [--slow]
 
 PYTHON is that of an environment made by `python -m venv peers; peers/bin/pip install pypesto 'mujoco[sysid]'`. The
-record is of none of them: a hanging rod is driven by a torque, its equation is integrated by SciPy (DOP853, 1e-10), and white
+record is of none of them: a hanging rod is driven by a torque, SciPy integrates its equation (DOP853, 1e-10), and white
 noise of known size is added. With `--slow` the torque changes so slowly that the rotor's inertia hardly shows.
 """
 
@@ -83,9 +83,9 @@ def main(arguments: list[str]) -> int:
 
 def rod_record(*, slow: bool = False) -> Trace:
     """Six seconds of the rod: torque held for each sample, angle with white noise but for the first reading."""
-    time = PERIOD * np.arange(SAMPLES)
+    time = np.asarray(PERIOD * np.arange(SAMPLES), dtype=np.float64)
     rates = (0.15, 0.25, 0.4) if slow else (2.1, 4.3, 11.0)
-    torque = sum(0.3 * np.sin(rate * time + phase) for phase, rate in enumerate(rates))
+    torque = np.sum([0.3 * np.sin(rate * time + phase) for phase, rate in enumerate(rates)], axis=0)
     if slow:  # begun and ended gently, so that the rod never swings by itself
         torque = torque * np.sin(np.pi * time / time[-1]) ** 2
     mass, viscous, rotor = TRUTH.values()
@@ -108,8 +108,8 @@ def rod_record(*, slow: bool = False) -> Trace:
         period=PERIOD,
         drive_unit="V",
     )
-    position = (np.array(angles) + noise)[:, None]
-    return Trace(record, (1,), time, position, drive=torque[:, None])
+    position = np.asarray(np.array(angles) + noise, dtype=np.float64)[:, None]
+    return Trace(record, (1,), time, position, drive=np.asarray(torque, dtype=np.float64)[:, None])
 
 
 OPTIONS = FitOptions(
