@@ -150,7 +150,6 @@ no compiler."""
 _ON_A_ROBOT = {"Arm", "Run", "RunError", "connect", "machine_from_urdf", "plot", "run"}
 _ON_A_SERVICE = {"LocalService"}
 _WITH_MODELS = {
-    "BaseParameters",
     "DesignOptions",
     "DesignedExperiments",
     "Profile",
