@@ -8,7 +8,7 @@ import numpy as np
 
 from daq.contracts.trace import Trace
 from model import layout as at
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.base_parameters.grouping import DEPENDENT, Grouping
 from model.base_parameters.result import Excitation, RecordedBaseParameter
 from model.base_parameters.standard import Motion, Standard, inertial_regressor, joint_regressor
@@ -19,11 +19,14 @@ from model.inverse_dynamics.fit import CUTOFF, LONGEST_MEMORY
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.inverse_dynamics.torque_balance import TorqueBalance, link_motion
 from model.machine_model.model import Model
+from model.machine_model.nominal import joint_scale
 from model.simulation.chain_of_model import chain_of
 
 TOLD = 0.1
 """Largest deviation with which a base parameter counts as told, as a share of its size. The size is the largest value
 of its unit at its joint, so that a moment that is zero can be told to be zero."""
+STANDS = 10.0
+"""Counts of its sensor that a joint must go in a record for its torques to say anything of its friction."""
 LEAST_LEFT = 1e-6
 """Least residual torque that weighs a record, as a share of its torque: a record without noise leaves next to none."""
 
@@ -41,7 +44,8 @@ def excitation_of(
     """
     motions = recorded_motions(traces, model.machine, CUTOFF)
     balance = TorqueBalance(model, motions)
-    residuals, torques = balance.residual({}), balance.supplied_by_drive()
+    torques = balance.supplied_by_drive()
+    residuals = [left * _moving(model, record) for left, record in zip(balance.residual({}), motions, strict=True)]
     columns = [_columns(model, one, standards, grouping) for one in motions]
     whole = np.concatenate([one.reshape(-1, one.shape[-1]) for one in columns])
     sizes = np.linalg.norm(whole, axis=0)
@@ -89,7 +93,15 @@ def _columns(model: Model, record: RecordedMotion, standards: Sequence[Standard]
     inertial = inertial_regressor(chain_of(model), motion)
     of_joints = joint_regressor(standards[inertial.shape[2] :], motion)
     whole = np.concatenate((inertial, of_joints), axis=2)[:, :, list(grouping.base)]
-    return record.compared(whole)
+    # of a joint at rest, friction takes whatever torque holds it: such samples say nothing
+    return record.compared(whole) * _moving(model, record)[:, :, None]
+
+
+def _moving(model: Model, record: RecordedMotion) -> Mask:
+    """(m, n) where a joint moves; a joint that goes less than `STANDS` counts in all does not."""
+    far = np.ptp(record.position, axis=0)
+    counts = [joint_scale(model.machine, joint).resolution for joint in model.machine.modelled_joints]
+    return np.asarray(record.moving & (far > STANDS * np.array(counts)))
 
 
 def _deviations(residuals: Sequence[Floats], torques: Sequence[Floats], columns: Sequence[Floats]) -> Floats:

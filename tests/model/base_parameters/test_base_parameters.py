@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.base_parameters import angle, pinocchio_regressor, rank_of, space
+from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.machine import load_machine
 from mock_controller.servos.bench import Options
 from model.arrays import Floats
@@ -29,7 +30,6 @@ from model.kinematics.chain import Chain, Joint
 from model.machine_model.model import base_model
 from model.robot_files.machine_of_arm import machine_from_urdf
 from model.simulation.chain_of_model import chain_of
-from tests.daq.runner.test_servo_models import motion
 from tests.daq.servo_bench import recorded as recorded_on_bench
 from tests.model.dynamics.chains import random_chain, random_link
 from tests.model.inverse_dynamics.test_fit_torques import COULOMB, LENGTH, MASS, ROTOR, VISCOUS, rod, swinging
@@ -162,7 +162,9 @@ def test_a_record_that_excites_all_tells_all_and_the_fitted_model_has_their_valu
 
 def test_a_record_of_one_joint_does_not_tell_the_others(tmp_path: Path) -> None:
     machine = load_machine(str(EXAMPLES / "pan_tilt.toml"))
-    one = recorded_on_bench(Options(torque=True), motion(1, 3.0).model_copy(update={"joints": (2,)}), tmp_path)
+    tones = Multisine(amplitude={2: 0.2}, duration=4.0, lowest=0.2, highest=1.5, tones=8, seed=1)
+    spec = ExperimentSpec(trajectory=tones, joints=(2,), settle=0.3, hold=0.3)
+    one = recorded_on_bench(Options(torque=True), spec, tmp_path)
     told = base_parameters(base_model(machine), [one])
     assert told.excitation is not None
     verdicts = dict(zip((p.text for p in told.parameters), told.excitation.parameters, strict=True))
