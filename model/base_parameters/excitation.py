@@ -115,9 +115,12 @@ def _deviations(residuals: Sequence[Floats], torques: Sequence[Floats], columns:
     jacobians = [np.stack([w.whitened(one[:, joint]) for joint, w in enumerate(whiteners)], axis=1) for one in columns]
     starts = (0, *np.cumsum([len(one) for one in white]).tolist())
     flat = np.concatenate(jacobians)
-    sizes = np.maximum(np.sqrt((flat**2).sum(axis=(0, 1))), np.finfo(float).tiny)
-    data = Whitened(np.concatenate(white), flat / sizes, starts)
-    least = np.full(len(sizes), np.finfo(float).eps)
+    sizes = np.sqrt((flat**2).sum(axis=(0, 1)))
+    shown = sizes > 0.0
+    data = Whitened(np.concatenate(white), flat[:, :, shown] / sizes[shown], starts)
+    least = np.full(int(shown.sum()), np.finfo(float).eps)
     robust = np.sqrt(np.diag(sandwich(data.information, data.scores(), least)))
     plain = np.sqrt(np.diag(inverse(data.information)))
-    return np.asarray(np.maximum(robust, plain) / sizes)
+    found = np.full(len(sizes), np.inf)
+    found[shown] = np.maximum(robust, plain) / sizes[shown]
+    return found
