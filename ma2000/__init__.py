@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from ma2000.files import read_traces as read_traces
     from ma2000.files import write_table as write_table
     from ma2000.files import write_trace as write_trace
+    from ma2000.fitting import base_parameters as base_parameters
     from ma2000.fitting import fit as fit
     from ma2000.fitting import fit_torques as fit_torques
     from ma2000.fitting import profile as profile
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from ma2000.studies import learn as learn
     from ma2000.studies import validate as validate
     from ma2000.thesis import reproduce_thesis as reproduce_thesis
+    from model.base_parameters.result import BaseParameters as BaseParameters
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
@@ -82,6 +84,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Arm": "ma2000.arm",
+    "BaseParameters": "model.base_parameters.result",
     "Batch": "ma2000.batches",
     "BatchRequest": "daq.contracts.service.jobs",
     "Client": "daq.client",
@@ -112,6 +115,7 @@ _HOME = {
     "TraceSummary": "daq.traces.catalogue",
     "ValidateRequest": "daq.contracts.service.jobs",
     "base_model": "model.machine_model.model",
+    "base_parameters": "ma2000.fitting",
     "batch": "ma2000.batches",
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
@@ -152,6 +156,7 @@ _WITH_MODELS = {
     "Reproduction",
     "Simulation",
     "TorqueFit",
+    "base_parameters",
     "batch",
     "design",
     "diagnose",

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from daq.contracts.progress import Cancel
 from daq.contracts.trace import Trace
 from ma2000.progress import Shown, told
+from model.base_parameters import base_parameters as base
+from model.base_parameters.result import BaseParameters
 from model.fitting import fit as motion
 from model.fitting import profile as profiles
 from model.fitting.options import FitOptions
@@ -50,6 +52,19 @@ def fit_torques(
     """
     with told(progress, "fitting torques") as tell:
         return torques.fit_torques(model, traces, holdout, options, progress=tell, cancel=cancel)
+
+
+def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0) -> BaseParameters:
+    """The base parameters of a model's machine: the fewest combinations of inertial and friction parameters that its
+    joint torques depend on, by QR with column pivoting of the regressor at random admissible postures (Gautier 1991).
+
+    With traces that have a recorded drive, `excitation` says which of them these tell: condition number of the columns,
+    and each one's deviation. Traces that cannot be judged are no error: `no_excitation` says why.
+
+    Args:
+        seed: of the drawn postures.
+    """
+    return base.base_parameters(model, traces, seed=seed)
 
 
 def profile(

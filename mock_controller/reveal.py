@@ -1,6 +1,6 @@
 """`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each; with
 `--memory-map`, what the memories of `--secret-map SEED` hide, with `--sensors`, the potentiometers of
-`--secret-sensors SEED`.
+`--secret-sensors SEED`, and with `--servos`, what the bench of `daq mock dynamixel --secret SEED` hides.
 
 For scoring answers after they have been given. Exit code 2 for seeds without a meaning.
 """
@@ -16,6 +16,7 @@ from mock_controller.board.parameters import default_board
 from mock_controller.hidden.arm import draw_arm
 from mock_controller.hidden.memory import draw_memory
 from mock_controller.hidden.sensors import draw_sensors, truth_of
+from mock_controller.servos.secret import draw_secret
 
 
 def main(arguments: list[str]) -> int:
@@ -25,6 +26,7 @@ def main(arguments: list[str]) -> int:
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument("--memory-map", action="store_true", help="the seeds are those of --secret-map")
     kind.add_argument("--sensors", action="store_true", help="the seeds are those of --secret-sensors")
+    kind.add_argument("--servos", action="store_true", help="the seeds are those of a bench of servos")
     parser.add_argument("--documented", choices=("kept", "moved"), default="kept", help="as given to the mock")
     given = parser.parse_args(arguments)
     truths: list[Any]
@@ -34,6 +36,8 @@ def main(arguments: list[str]) -> int:
         elif given.sensors:
             stated = default_board().calibrations
             truths = [{"seed": seed, "sensors": truth_of(draw_sensors(seed, stated))} for seed in given.seeds]
+        elif given.servos:
+            truths = [draw_secret(seed).truth(seed) for seed in given.seeds]
         else:
             truths = [draw_arm(seed).truth() for seed in given.seeds]
     except ValueError as error:

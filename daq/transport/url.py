@@ -108,7 +108,7 @@ MOCK_VALUES = (
 )
 """Options of mock:// that are handed to the mock with their value."""
 REPEATABLE = ("modify", "fault")
-SERVO_VALUES = ("ids", "supply", "load", "coulomb")
+SERVO_VALUES = ("ids", "supply", "load", "coulomb", "secret")
 """Options of mock://?dialect=dynamixel that are handed to the mock of servos with their value."""
 
 

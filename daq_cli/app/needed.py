@@ -7,7 +7,19 @@ from collections.abc import Sequence
 from daq.contracts.extras import Extra
 
 MODEL = frozenset(
-    ["batch", "blind", "compare", "design", "diagnose", "fit", "sensitivity", "simulate", "thesis", "validate"]
+    [
+        "batch",
+        "blind",
+        "compare",
+        "design",
+        "diagnose",
+        "fit",
+        "profile",
+        "sensitivity",
+        "simulate",
+        "thesis",
+        "validate",
+    ]
 )
 SERVER = frozenset(["audit", "backup", "notify", "restore", "serve", "token"])
 WITH_A_VALUE = frozenset(["--config", "--port", "--robot", "--server"])

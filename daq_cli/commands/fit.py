@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from daq.contracts.trace import Trace
+    from model.base_parameters.result import BaseParameters
     from model.comparison.agreement import ModelAgreement
     from model.fitting.options import FitOptions
     from model.fitting.result import FitResult
@@ -151,6 +152,7 @@ def _fit_motion(
 ) -> None:
     """Fits motion on this computer, writes the model, and prints the result."""
     from daq_cli.app.progress import shown_progress
+    from model.base_parameters.base_parameters import base_parameters
     from model.comparison.compare import compare
     from model.fitting.fit import fit as run_fit
     from model.simulation.prepared import Options
@@ -165,12 +167,13 @@ def _fit_motion(
             options=Options(loop=options.loop or "closed"),
             progress=lambda f, text: progress(0.9 + 0.1 * f, text),
         )
-    _print_result(found, comparison.models, out, as_json=as_json)
+    base = base_parameters(found.model, traces)
+    _print_result(found, comparison.models, out, base, as_json=as_json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
 
-        console().print(f"report: {write_report(fit_report(found, comparison), report)}")
+        console().print(f"report: {write_report(fit_report(found, comparison, base), report)}")
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
@@ -198,14 +201,21 @@ def _beginning(
     return with_effects(base_model(chosen, friction=False), effects)
 
 
-def _print_result(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, as_json: bool) -> None:
+def _print_result(
+    found: FitResult,
+    agreement: Sequence[ModelAgreement],
+    out: Path,
+    base: BaseParameters | None = None,
+    *,
+    as_json: bool,
+) -> None:
     if as_json:
-        _print_json(found, agreement, out)
+        _print_json(found, agreement, out, base)
     else:
-        _print(found, agreement)
+        _print(found, agreement, base)
 
 
-def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path) -> None:
+def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, base: BaseParameters | None) -> None:
     from daq_cli.models.agreement_table import agreement_data
 
     print_json(
@@ -214,6 +224,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "file": out,
             "parameters": [p.model_dump(mode="json") for p in found.parameters],
             "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
+            "base_parameters": None if base is None else base.model_dump(mode="json"),
             "agreement": agreement_data(agreement),
             "whitened_mean_square": found.whitened_mean_square,
             "converged": found.converged,
@@ -223,7 +234,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
     )
 
 
-def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:
+def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BaseParameters | None) -> None:
     from daq_cli.models.agreement_table import print_agreement
 
     print_parameters(found.parameters)
@@ -232,6 +243,10 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:
     print("; no number is given for the others" if known < len(found.parameters) else "")
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")
+    if base is not None:
+        from model.base_parameters.result import headline
+
+        print(headline(base))
     print()
     print_agreement(agreement)
     if not found.converged:

@@ -21,6 +21,7 @@ from firmware_protocol.dynamixel.control_table import HardwareError
 from firmware_protocol.dynamixel.packets import LARGEST_ID
 from mock_controller.ports import Port, PortError, PtyPort, TcpPort, host_and_port
 from mock_controller.servos.bench import Bench, Options
+from mock_controller.servos.secret import NONE, draw_secret
 
 _STDIN = 0
 _WAKE_S = 0.02
@@ -32,7 +33,8 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, _interrupt)
     given = _parser().parse_args(arguments)
     try:
-        bench = Bench(Options(_ids(given.ids), given.supply, given.load, given.coulomb, given.torque))
+        secret = NONE if given.secret is None else draw_secret(given.secret)
+        bench = Bench(Options(_ids(given.ids), given.supply, given.load, given.coulomb, given.torque, secret))
         _serve(bench, PtyPort(given.link) if given.pty else TcpPort(*host_and_port(given.tcp, "tcp")), given.owned)
     except KeyboardInterrupt:
         return 0
@@ -52,6 +54,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--supply", type=float, default=12.0, help="supply voltage in V")
     parser.add_argument("--load", type=float, default=0.0, help="mass at the end of the bar in kg")
     parser.add_argument("--coulomb", type=float, default=0.10, help="Coulomb friction of each joint in N·m")
+    parser.add_argument(
+        "--secret",
+        type=int,
+        metavar="SEED",
+        help="a bench with a secret effect; python -m mock_controller.reveal --servos SEED tells it",
+    )
     parser.add_argument("--torque", action="store_true", help="start with the torque on (default: off, as at power-up)")
     parser.add_argument("--owned", action="store_true", help="end when standard input ends")
     return parser

@@ -17,6 +17,7 @@ from firmware_protocol.dynamixel.instructions import (
 from firmware_protocol.dynamixel.packets import BROADCAST, STATUS, Packet, PacketDecoder, encode
 from firmware_protocol.errors import ProtocolError
 from mock_controller.servos.plant import STEP_US, Head, Motor, PanTilt
+from mock_controller.servos.secret import NONE, Secret
 from mock_controller.servos.servo import Servo
 
 PERIOD_US = 1000
@@ -35,6 +36,7 @@ class Options:
     load: float = 0.0
     coulomb: float = 0.10
     torque: bool = False
+    secret: Secret = NONE
 
 
 class Bench:
@@ -46,7 +48,7 @@ class Bench:
         self.gone: set[int] = set()
         """IDs of servos that are off the bus."""
         self._motor = Motor(coulomb=options.coulomb)
-        self._plant = PanTilt(Head(load=options.load), self._motor, (_START[0], _START[1] - LEVEL))
+        self._plant = PanTilt(Head(load=options.load), self._motor, (_START[0], _START[1] - LEVEL), options.secret)
         self._decoder = PacketDecoder()
         self._waiting: dict[int, Packet] = {}
         for servo, angle in zip(self.servos, _START, strict=True):

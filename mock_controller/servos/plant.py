@@ -15,6 +15,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from mock_controller.servos.secret import NONE, Secret
+
 GRAVITY = 9.81
 STEP_US = 250
 """Step of integration, µs: with a time constant of the motors of some 10 ms its error is far below a count."""
@@ -55,17 +57,21 @@ class Motor:
 class PanTilt:
     """Positions (rad) and speeds (rad/s) of both joints, advanced in steps."""
 
-    def __init__(self, head: Head, motor: Motor, positions: tuple[float, float] = (0.0, 0.0)) -> None:
-        self.position = list(positions)
+    def __init__(
+        self, head: Head, motor: Motor, positions: tuple[float, float] = (0.0, 0.0), secret: Secret = NONE
+    ) -> None:
+        self.position, self._first = list(positions), positions
+        self._secret = secret
         self.speed = [0.0, 0.0]
         self.volts: list[float | None] = [None, None]
         """At each motor; None: the bridge is open, and no current flows."""
         self._motor = motor
         rotor = motor.gear**2 * motor.rotor
         self._pan = 0.5 * head.turntable * head.radius**2 + rotor
-        self._bar = (head.bar / 3.0 + head.load) * head.length**2
+        load = head.load + secret.load
+        self._bar = (head.bar / 3.0 + load) * head.length**2
         self._rotor = rotor
-        self._weight = GRAVITY * head.length * (head.bar / 2.0 + head.load)
+        self._weight = GRAVITY * head.length * (head.bar / 2.0 + load)
 
     def step(self) -> None:
         """One step: the speed first, then the position with the new speed."""
@@ -77,15 +83,16 @@ class PanTilt:
         self._accelerate(1, torques[1] - coupling * pan**2 - self._weight * cosine, self._rotor + self._bar)
 
     def _driven(self, joint: int) -> float:
-        volts = self.volts[joint]
-        return (
-            -self._motor.viscous * self.speed[joint] if volts is None else self._motor.torque(volts, self.speed[joint])
-        )
+        volts, speed = self.volts[joint], self.speed[joint]
+        hidden = self._secret.torque(joint, self.position[joint] - self._first[joint], speed)
+        if volts is None:
+            return hidden - self._motor.viscous * speed
+        return hidden + self._motor.torque(self._secret.lost(joint, volts), speed)
 
     def _accelerate(self, joint: int, torque: float, inertia: float) -> None:
         """Coulomb friction takes from the speed what it can within the step, but never turns it round."""
         seconds = STEP_US * 1e-6
         free = self.speed[joint] + seconds * torque / inertia
-        lost = seconds * self._motor.coulomb / inertia
+        lost = seconds * (self._motor.coulomb + self._secret.friction(joint, free)) / inertia
         self.speed[joint] = math.copysign(max(0.0, abs(free) - lost), free)
         self.position[joint] += seconds * self.speed[joint]

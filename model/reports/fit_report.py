@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from model.base_parameters.result import BaseParameters
 from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
+from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
 from model.reports.page import Cell, Report, Section, Table, Text, effect_list, listed
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 
-def fit_report(found: FitResult, comparison: Comparison) -> Report:
-    """The page of a fit; `comparison` is of the model before and after, on the traces fitted to and held out."""
+def fit_report(found: FitResult, comparison: Comparison, base: BaseParameters | None = None) -> Report:
+    """The page of a fit.
+
+    `comparison` is of the model before and after, on the traces fitted to and held out; `base`, the base parameters of
+    the fitted model on the traces fitted to.
+    """
     sections = [
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
+        *(() if base is None else (base_parameter_section(base),)),
         Section("How large the error is", (agreement_table(comparison.models), *_floor_remark(comparison))),
         motion_section(comparison.signals, [m.label for m in comparison.models]),
         Section("How it was done", (_how(found),)),

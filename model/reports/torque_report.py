@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from model.base_parameters.result import BaseParameters
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
+from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Report, Section, Table, cells, effect_list, listed
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
@@ -14,12 +16,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves]) -> Report:
-    """The page; `curves` are those of the fitted model on the traces to draw."""
+def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves], base: BaseParameters | None = None) -> Report:
+    """The page; `curves` are those of the fitted model on the traces to draw, `base` its base parameters on those that
+    were fitted to."""
     machine = found.model.machine
     sections = (
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
+        *(() if base is None else (base_parameter_section(base),)),
         Section("What is left of the torque", (_error_table(found), *(_picture(c, found) for c in curves))),
         Section("How it was done", (_how(found),)),
     )

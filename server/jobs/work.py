@@ -107,6 +107,7 @@ class _Worker:
 
     def fit(self, request: FitRequest) -> Ended:
         """Does the same as `daq fit`."""
+        from model.base_parameters.base_parameters import base_parameters
         from model.fitting.fit import fit
         from model.fitting.identifiability import undetermined_in_words
         from model.machine_model.parameter_words import words_by_name
@@ -130,7 +131,8 @@ class _Worker:
             undetermined=undetermined_in_words(found.identifiability, words_by_name(found.model.parameters)),
         )
         result = FitJobResult(id=self._job, data=data)
-        return self._done(result, fit_report(found, comparison), of_fit(found, comparison), found.model)
+        report = fit_report(found, comparison, base_parameters(found.model, traces))
+        return self._done(result, report, of_fit(found, comparison), found.model)
 
     def validate(self, request: ValidateRequest) -> Ended:
         """Does the same as `daq validate`."""

@@ -27,6 +27,7 @@ WORDS = {
     "design": "ma2000",
     "diagnose": "{trace}",
     "fit": "{trace} --out fitted.json",
+    "profile": "ma2000 {trace} --parameter load.mass",
     "sensitivity": "ma2000 {trace}",
     "simulate": "ma2000 {trace}",
     "thesis": "",

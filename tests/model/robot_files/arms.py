@@ -105,14 +105,14 @@ class InPinocchio:
 
     def inertia(self, q: Floats) -> Floats:
         """D(q)."""
-        upper = np.triu(np.array(pinocchio.crba(self.model, self.data, self._posture(q))))
+        upper = np.triu(np.array(pinocchio.crba(self.model, self.data, self.posture(q))))
         return upper + np.triu(upper, 1).T
 
     def bias(self, q: Floats, velocity: Floats) -> Floats:
         """H(q, q̇) + G(q)."""
-        return np.array(pinocchio.nonLinearEffects(self.model, self.data, self._posture(q), velocity))
+        return np.array(pinocchio.nonLinearEffects(self.model, self.data, self.posture(q), velocity))
 
-    def _posture(self, q: Floats) -> Floats:
+    def posture(self, q: Floats) -> Floats:
         """Positions as Pinocchio has them: of a continuous joint, cosine and sine."""
         return np.array(pinocchio.integrate(self.model, pinocchio.neutral(self.model), q))
 

@@ -1,0 +1,117 @@
+"""Base parameters of a machine, and what records tell about them: data first, words last."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from daq.contracts.frozen import FrozenRecord
+
+
+class BaseMember(FrozenRecord):
+    """A standard parameter's part in a base parameter: its `factor`, and the same written with the arm's lengths."""
+
+    symbol: str
+    factor: float
+    written: str
+
+
+class BaseParameter(FrozenRecord):
+    """A combination of standard parameters that torques depend on, the first of which represents it.
+
+    `value` is that of the model, in `unit`.
+    """
+
+    text: str
+    unit: str
+    joint: int
+    inertial: bool
+    members: tuple[BaseMember, ...]
+    value: float
+
+
+class RecordedBaseParameter(FrozenRecord):
+    """What records tell of one base parameter.
+
+    `deviation` is what they leave of it, every other base parameter being free, in its unit; `relative` is its share of
+    the value, None where the value is 0. Both are None where the records do not excite it. `told`: the deviation is at
+    most a tenth of the largest value of this unit at the joint, so that a moment that is zero can be told as well.
+    """
+
+    deviation: float | None
+    relative: float | None
+    told: bool
+
+
+class Excitation(FrozenRecord):
+    """What records tell of base parameters, in their order.
+
+    `condition` is the condition number of the base parameters' columns along the records, each column brought to unit
+    size, and `rank` the number of base parameters that they excite at all: numerically, whatever the noise. `residual`
+    is the root mean square of the torque that the model leaves, N·m (N), by joint: it stands for the noise.
+    """
+
+    traces: tuple[str, ...]
+    samples: int
+    rank: int
+    condition: float | None
+    residual: tuple[float, ...]
+    parameters: tuple[RecordedBaseParameter, ...]
+
+    @property
+    def told(self) -> int:
+        """How many base parameters the records tell."""
+        return sum(one.told for one in self.parameters)
+
+
+class BaseParameters(FrozenRecord):
+    """The base parameters of a machine: independent of any record, and, with records, what these tell of them.
+
+    `standard` counts the standard parameters, `without_effect` names those that no motion shows. `smallest_kept` and
+    `largest_dropped` are pivots of the factorisation, as shares of the first: far apart, the rank is certain.
+    """
+
+    machine: str
+    model: str
+    standard: int
+    parameters: tuple[BaseParameter, ...]
+    without_effect: tuple[str, ...]
+    postures: int
+    seed: int
+    smallest_kept: float
+    largest_dropped: float
+    left_out: tuple[str, ...] = ()
+    """Effects of the model on which torques do not depend linearly: they keep their values."""
+    excitation: Excitation | None = None
+    no_excitation: str | None = None
+    """Why records could not be judged; one line."""
+
+    shown = ("machine", "standard", "inertial", "friction")
+
+    @property
+    def inertial(self) -> int:
+        """Number of inertial base parameters, rotors included."""
+        return sum(one.inertial for one in self.parameters)
+
+    @property
+    def friction(self) -> int:
+        """Number of base parameters of friction."""
+        return len(self.parameters) - self.inertial
+
+
+def headline(found: BaseParameters) -> str:
+    """One line for people: how many base parameters there are, and how many the records tell."""
+    text = f"base parameters: {len(found.parameters)} of {found.standard}"
+    text += f" ({found.inertial} inertial, {found.friction} friction)"
+    if (records := found.excitation) is not None:
+        condition = "" if records.condition is None else f", condition number {records.condition:.3g}"
+        text += f"; told by these traces: {records.told}{condition}"
+    return text
+
+
+def written(first: str, members: Sequence[BaseMember]) -> str:
+    """A combination as a sum, after its first member: `ZZ_1 + Ia_1 + a_2² m_3`."""
+    text = first
+    for one in members:
+        sign, size = ("−", one.written[1:]) if one.written.startswith("−") else ("+", one.written)
+        text += f" {sign} {one.symbol if size == '1' else f'{size} {one.symbol}'}"
+    return text
