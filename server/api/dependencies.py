@@ -80,7 +80,7 @@ Arrived = Annotated[float, Depends(_arrived)]
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 Auditor = Operator
-"""Who may read the audit log, which names people and their computers: the highest role."""
+"""Who may read the audit log, which names people and their computers: whoever may change something."""
 
 
 def _require_cursor(cursor: str | None) -> str | None:
