@@ -24,6 +24,11 @@ Addresses = Annotated[tuple[Address, ...], Field(strict=False)]
 
 PER_JOINT_REGISTERS = ("set_point", "position", "error", "power", "gain_p", "gain_i", "gain_d")
 SINGLE_REGISTERS = ("process_inputs", "process_outputs", "gripper")
+GAIN_REGISTERS = ("gain_p", "gain_i", "gain_d")
+"""A map has all of them or none. Without them the bridge refuses to read and to write gains."""
+MAY_BE_ABSENT = (*GAIN_REGISTERS, *SINGLE_REGISTERS)
+"""Registers that a map may leave out, because nobody knows where they are. What is left out is neither read nor written:
+without one of `SINGLE_REGISTERS` the bridge refuses all process requests."""
 
 
 class Kind(NamedTuple):
@@ -119,8 +124,11 @@ class MemoryMap(BaseModel):
 
     def _check_names(self) -> None:
         for name in (*PER_JOINT_REGISTERS, *SINGLE_REGISTERS):
-            if name not in self.registers:
+            if name not in self.registers and name not in MAY_BE_ABSENT:
                 raise ValueError(f"register {name} is missing")
+        gains = [name for name in GAIN_REGISTERS if name in self.registers]
+        if gains and len(gains) < len(GAIN_REGISTERS):
+            raise ValueError(f"registers {', '.join(gains)}: give all of {', '.join(GAIN_REGISTERS)}, or none")
         unknown = self.registers.keys() - KINDS.keys()
         if unknown:
             raise ValueError(f"register {min(unknown)} is not one that the protocol knows: {', '.join(KINDS)}")
@@ -153,6 +161,21 @@ class MemoryMap(BaseModel):
 
     def __getitem__(self, name: str) -> Register:
         return self.registers[name]
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Names of the registers that this map leaves out."""
+        return tuple(name for name in MAY_BE_ABSENT if name not in self.registers)
+
+    @property
+    def has_gains(self) -> bool:
+        """Whether gains can be read and written."""
+        return GAIN_REGISTERS[0] in self.registers
+
+    @property
+    def has_process(self) -> bool:
+        """Whether process signals and gripper can be read and written."""
+        return all(name in self.registers for name in SINGLE_REGISTERS)
 
     @property
     def assumed(self) -> tuple[str, ...]:

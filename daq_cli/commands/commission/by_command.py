@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import SpecError
+from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
 from daq_cli.commands.commission.arm import note_period
 from daq_cli.commands.commission.bench import Bench, NotCommissionedError, connected
 from daq_cli.commands.commission.periods import followed_periods
@@ -120,7 +121,16 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
     robot = robot_access(bench.configured)
     spec = ExperimentSpec(name="commission-ramp", joints=joints)
     done = acquire_complete(robot, spec, robot.machine, robot.call.trace_folder, bench.consent)
-    return {"trace": str(done.trace), "samples": done.samples, "missing": done.missing, "outcome": done.outcome}
+    late = round(done.counters.get(LATE_SET_POINTS, 0.0))
+    if late:
+        bench.operator.show(late_set_points_line(late))
+    return {
+        "trace": str(done.trace),
+        "samples": done.samples,
+        "missing": done.missing,
+        "set_points_taken_late": late,
+        "outcome": done.outcome,
+    }
 
 
 def model(bench: Bench) -> dict[str, Any]:
