@@ -226,7 +226,8 @@ def figures(scores: list[Score]) -> list[Figure]:
         Figure("set points proved by command", f"{sum(score.proofs for score in scores) / total:.3f} of all"),
         Figure("complete: every register has a place", f"{sum(score.complete for score in scores)} maps"),
         Figure(
-            "complete, and everything assumed is right", f"{sum(score.complete and score.right for score in scores)} maps"
+            "complete, and everything assumed is right",
+            f"{sum(score.complete and score.right for score in scores)} maps",
         ),
         Figure("a register assumed where something else lies", f"{sum(not score.right for score in scores)} maps"),
         Figure(

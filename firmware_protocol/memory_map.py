@@ -27,8 +27,8 @@ SINGLE_REGISTERS = ("process_inputs", "process_outputs", "gripper")
 GAIN_REGISTERS = ("gain_p", "gain_i", "gain_d")
 """A map has all of them or none. Without them the bridge refuses to read and to write gains."""
 MAY_BE_ABSENT = (*GAIN_REGISTERS, *SINGLE_REGISTERS)
-"""Registers that a map may leave out, because nobody knows where they are. What is left out is neither read nor written:
-without one of `SINGLE_REGISTERS` the bridge refuses all process requests."""
+"""Registers that a map may leave out, because nobody knows where they are. What is left out is neither read nor
+written: without one of `SINGLE_REGISTERS` the bridge refuses all process requests."""
 
 
 class Kind(NamedTuple):
@@ -202,6 +202,11 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
         found = f" (found {first.value!r:.60})" if isinstance(first.value, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {first.where('registers')}: {first.message}{found}") from error
     except ValueError as error:  # malformed TOML, or an integer with thousands of digits
+        if marked := [number for number, line in enumerate(text.splitlines(), 1) if "?" in line.partition("#")[0]]:
+            lines = ", ".join(map(str, marked))
+            raise MemoryMapError(
+                f"{origin}: line {lines}: put an address, as 0xFC40, in place of each question mark"
+            ) from error
         raise MemoryMapError(f"{origin}: not TOML: {error}") from error
 
 

@@ -90,8 +90,8 @@ def _board(
     if options.secret_map is None:
         if told.absent:
             raise MemoryMapError(
-                f"memory map {told.name!r}: without {', '.join(told.absent)} it is one for --secret-map; the mock's own "
-                "controller needs every register"
+                f"memory map {told.name!r}: without {', '.join(told.absent)} it is one for --secret-map; the mock's "
+                "own controller needs every register"
             )
         return Board(parameters, told, plant, options.seed, modifications, arm_seed)
     from mock_controller.hidden.memory import draw_memory

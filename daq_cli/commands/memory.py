@@ -255,9 +255,9 @@ def what_is_absent(found: Findings, path: Path) -> str:
     if any(not name.startswith("gain") for name in absent):
         lost.append("process signals and the gripper are not offered")
     return (
-        f"{path.name} leaves out {', '.join(absent)}, which have no place, so {'; '.join(lost)}. Nothing reads or writes "
-        f"them. With a manual: put the addresses in place of the question marks of {begun_map(path).name}, and save it as "
-        f"{path.name}"
+        f"{path.name} leaves out {', '.join(absent)}, which have no place, so {'; '.join(lost)}. Nothing reads or "
+        f"writes them. With a manual: put the addresses in place of the question marks of {begun_map(path).name}, and "
+        f"save it as {path.name}"
     )
 
 

@@ -84,6 +84,32 @@ def test_the_bridge_the_stop_and_the_timing_of_an_arm_with_a_known_map(daq: Comm
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
+def test_an_arm_whose_gains_and_gripper_nobody_knows_is_commissioned_without_them(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    moved = "secret_map=4&documented=moved"
+    with mock(moved) as arm:
+        said = commission(daq, arm, tmp_path)
+        said.complains(3, "make firmware MAP=")
+    absent = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]["memory"]["absent"]
+    assert absent == ["gain_p", "gain_i", "gain_d", "process_outputs", "gripper"]
+    skipped = [word for name in ("potentiometers", "end_stops", "emergency_stop") for word in ("--skip", name)]
+    with mock(f"{moved}&memory_map={tmp_path / 'memory_map.toml'}") as arm:
+        said = commission(daq, arm, tmp_path, *skipped, "--skip", "delay", "--skip", "gain", "--skip", "model")
+        written = told_by(str(arm.control), "written")["written"]
+    assert said.code == 0, said.err
+    steps = json.loads(said.out)["steps"]
+    assert steps["ramp"]["outcome"] == "complete"
+    assert steps["ramp"]["set_points_taken_late"] == 0
+    truth = draw_memory(4, "moved").map["set_point"]
+    assert {int(address, 16) for address in written} <= set(truth.addresses), "what has no place is never written"
+    page = (tmp_path / "acceptance.html").read_text("utf-8")
+    assert "left out: no place is known" in page
+    assert "sensors of joints 1, 2, 3, 4, 5, 6" in page
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_with_a_secret_memory_map_and_secret_sensors_every_step_is_done_in_the_end(
     daq: CommandLine, tmp_path: Path
 ) -> None:

@@ -138,8 +138,7 @@ def bridge(bench: Bench) -> dict[str, Any]:
         far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
     if far:
         raise NotCommissionedError(
-            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
-            f"{give_it}"
+            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. {give_it}"
         )
     return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
 
