@@ -45,7 +45,7 @@ class Clumsy:
 
     def read_angle(
         self, joint: int, number: int, wait: Callable[[float], None]
-    ) -> float | None | Literal["taken back"]:
+    ) -> float | Literal["taken back"] | None:
         assert not (self.folder / "machine.toml").exists(), "written only when all is measured"
         self.asked.append(number)
         if number > 1 and self.slips:
