@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import cache
 from importlib import resources
@@ -188,6 +189,13 @@ class MemoryMap(BaseModel):
         )
 
 
+def open_places(text: str) -> str:
+    """What is to be done with a text of a map that still has question marks in place of addresses; empty where it has
+    none. Such a text is no TOML."""
+    marked = [str(number) for number, line in enumerate(text.splitlines(), 1) if re.search(r"[\[,]\s*\?", line)]
+    return f"line {', '.join(marked)}: put an address, as 0xFC40, in place of each question mark" if marked else ""
+
+
 def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
     """A memory map from TOML text; `origin` names the file in errors.
 
@@ -202,12 +210,7 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
         found = f" (found {first.value!r:.60})" if isinstance(first.value, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {first.where('registers')}: {first.message}{found}") from error
     except ValueError as error:  # malformed TOML, or an integer with thousands of digits
-        if marked := [number for number, line in enumerate(text.splitlines(), 1) if "?" in line.partition("#")[0]]:
-            lines = ", ".join(map(str, marked))
-            raise MemoryMapError(
-                f"{origin}: line {lines}: put an address, as 0xFC40, in place of each question mark"
-            ) from error
-        raise MemoryMapError(f"{origin}: not TOML: {error}") from error
+        raise MemoryMapError(f"{origin}: {open_places(text) or f'not TOML: {error}'}") from error
 
 
 @cache

@@ -270,7 +270,7 @@ def test_a_result_of_another_memory_map_is_done_again(daq: CommandLine, tmp_path
     record = Record.of(tmp_path)
     record.keep("bridge", {"basis": {"port": MOCK, "memory_map": "of another one"}})
     record.keep("period", {})
-    (tmp_path / "memory_map.toml").write_text("another", "utf-8")
+    daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
     options = [word for step in STEPS for word in ("--skip", step.name)]
     assert "To be done again" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
     assert Record.of(tmp_path).steps["bridge"]["skipped"]

@@ -63,7 +63,7 @@ def test_without_gains_and_gripper_the_bridge_refuses_them_and_writes_nothing(br
 
 def test_an_arm_without_gains_runs_and_its_record_has_none(tmp_path: Path) -> None:
     path = without(tmp_path, *GAIN_REGISTERS)
-    with rig(tmp_path, f"seed=1&secret_map={SEED}&memory_map={path}&gains=3/0/0") as arm:
+    with rig(tmp_path, f"seed=1&secret_map={SEED}&memory_map={path}") as arm:
         result = arm.run()
         assert result.outcome == "complete"
         assert arm.trace(result).record.gains is None
