@@ -16,6 +16,8 @@ from daq_cli.robot.safe_release import typical
 if TYPE_CHECKING:
     from daq.commissioning.memory.commands import CommandProof
     from daq.commissioning.memory.findings import Findings
+    from daq.driver import Controller
+    from firmware_protocol.commands import Process
 
 ROUND_TRIPS = 200
 """Number of single bytes read to judge the line."""
@@ -118,9 +120,13 @@ def bridge(bench: Bench) -> dict[str, Any]:
     with connected(bench) as controller:
         told = controller.errors_positions_powers()
         gains = controller.gains()
-        process = controller.process() if memory_map.has_process else None
-    if memory_map.has_gains != bool(gains):
-        raise NotCommissionedError(f"the bridge {'has' if gains else 'lacks'} gains, unlike {MAP}. {give_it}")
+        process = _process(controller)
+    for what, there, wanted in (
+        ("gains", bool(gains), memory_map.has_gains),
+        ("process signals", process is not None, memory_map.has_process),
+    ):
+        if there != wanted:  # a place that the arm's map leaves out must not be written by the bridge either
+            raise NotCommissionedError(f"the bridge {'has' if there else 'lacks'} {what}, unlike {MAP}. {give_it}")
     far = [
         f"{name.replace('_', ' ')} {joint}"
         for name, values in own.items()
@@ -141,6 +147,19 @@ def bridge(bench: Bench) -> dict[str, Any]:
             f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. {give_it}"
         )
     return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
+
+
+def _process(controller: Controller) -> Process | None:
+    """The process signals; None where the bridge's memory map leaves out their registers."""
+    from daq.link import RequestRefusedError
+    from firmware_protocol.codes import Refusal
+
+    try:
+        return controller.process()
+    except RequestRefusedError as error:
+        if error.reason != Refusal.NOT_CAPABLE:
+            raise
+        return None
 
 
 def _page(bench: Bench) -> Any:
