@@ -132,6 +132,12 @@ class Score:
     contradiction_told: bool
     seconds: float
     open: tuple[str, ...]
+    complete: bool
+    """Whether every register has a place, be it found or assumed."""
+    right: bool
+    """Whether every place of the memory map, those that are assumed too, is the true one."""
+    usable: bool
+    """Whether a memory map could be written, perhaps without gains, process signals or gripper."""
 
 
 def search(seed: int, documented: Documented, *, commands: bool = True) -> Score:
@@ -185,6 +191,17 @@ def _score(
         all(told) if documented == "moved" else not any(told),
         time.process_time() - begun,
         tuple(still_open),
+        not findings.missing(),
+        _is_right(findings, truth),
+        findings.memory_map("") is not None,
+    )
+
+
+def _is_right(findings: Findings, truth: MemoryMap) -> bool:
+    """Whether a memory map was found, and has each of its registers where it is."""
+    found = findings.memory_map("")
+    return found is not None and all(
+        (one.low, one.high) == (truth[name].low, truth[name].high) for name, one in found.registers.items()
     )
 
 
@@ -207,6 +224,16 @@ def figures(scores: list[Score]) -> list[Figure]:
         ),
         Figure("set points found", f"{found['set_point'] / total:.3f} of all"),
         Figure("set points proved by command", f"{sum(score.proofs for score in scores) / total:.3f} of all"),
+        Figure("complete: every register has a place", f"{sum(score.complete for score in scores)} maps"),
+        Figure(
+            "complete, and everything assumed is right",
+            f"{sum(score.complete and score.right for score in scores)} maps",
+        ),
+        Figure("a register assumed where something else lies", f"{sum(not score.right for score in scores)} maps"),
+        Figure(
+            "usable: complete, or without gains, process signals or gripper",
+            f"{sum(score.usable for score in scores)} maps",
+        ),
         Figure("process inputs found", f"{found['process_inputs'] / len(scores):.3f} of maps"),
         Figure("writes", f"{sum(score.writes for score in scores)}"),
         Figure("processor time a map", f"{sum(score.seconds for score in scores) / len(scores):.2f} s"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import cache
 from importlib import resources
@@ -24,6 +25,11 @@ Addresses = Annotated[tuple[Address, ...], Field(strict=False)]
 
 PER_JOINT_REGISTERS = ("set_point", "position", "error", "power", "gain_p", "gain_i", "gain_d")
 SINGLE_REGISTERS = ("process_inputs", "process_outputs", "gripper")
+GAIN_REGISTERS = ("gain_p", "gain_i", "gain_d")
+"""A map has all of them or none. Without them the bridge refuses to read and to write gains."""
+MAY_BE_ABSENT = (*GAIN_REGISTERS, *SINGLE_REGISTERS)
+"""Registers that a map may leave out, because nobody knows where they are. What is left out is neither read nor
+written: without one of `SINGLE_REGISTERS` the bridge refuses all process requests."""
 
 
 class Kind(NamedTuple):
@@ -119,8 +125,11 @@ class MemoryMap(BaseModel):
 
     def _check_names(self) -> None:
         for name in (*PER_JOINT_REGISTERS, *SINGLE_REGISTERS):
-            if name not in self.registers:
+            if name not in self.registers and name not in MAY_BE_ABSENT:
                 raise ValueError(f"register {name} is missing")
+        gains = [name for name in GAIN_REGISTERS if name in self.registers]
+        if gains and len(gains) < len(GAIN_REGISTERS):
+            raise ValueError(f"registers {', '.join(gains)}: give all of {', '.join(GAIN_REGISTERS)}, or none")
         unknown = self.registers.keys() - KINDS.keys()
         if unknown:
             raise ValueError(f"register {min(unknown)} is not one that the protocol knows: {', '.join(KINDS)}")
@@ -155,6 +164,21 @@ class MemoryMap(BaseModel):
         return self.registers[name]
 
     @property
+    def absent(self) -> tuple[str, ...]:
+        """Names of the registers that this map leaves out."""
+        return tuple(name for name in MAY_BE_ABSENT if name not in self.registers)
+
+    @property
+    def has_gains(self) -> bool:
+        """Whether gains can be read and written."""
+        return GAIN_REGISTERS[0] in self.registers
+
+    @property
+    def has_process(self) -> bool:
+        """Whether process signals and gripper can be read and written."""
+        return all(name in self.registers for name in SINGLE_REGISTERS)
+
+    @property
     def assumed(self) -> tuple[str, ...]:
         """Names like `error 2` of every register whose address is an assumption."""
         return tuple(
@@ -163,6 +187,13 @@ class MemoryMap(BaseModel):
             for i, provenance in enumerate(register.provenance)
             if provenance == "assumed"
         )
+
+
+def open_places(text: str) -> str:
+    """What is to be done with a text of a map that still has question marks in place of addresses; empty where it has
+    none. Such a text is no TOML."""
+    marked = [str(number) for number, line in enumerate(text.splitlines(), 1) if re.search(r"[\[,]\s*\?", line)]
+    return f"line {', '.join(marked)}: put an address, as 0xFC40, in place of each question mark" if marked else ""
 
 
 def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
@@ -179,7 +210,7 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
         found = f" (found {first.value!r:.60})" if isinstance(first.value, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {first.where('registers')}: {first.message}{found}") from error
     except ValueError as error:  # malformed TOML, or an integer with thousands of digits
-        raise MemoryMapError(f"{origin}: not TOML: {error}") from error
+        raise MemoryMapError(f"{origin}: {open_places(text) or f'not TOML: {error}'}") from error
 
 
 @cache

@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random, SystemRandom
 from typing import Any
 
+from firmware_protocol.errors import MemoryMapError
 from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
 from mock_controller.board.board import Board
 from mock_controller.board.parameters import BoardParameters, default_board, parse_board
@@ -87,6 +88,11 @@ def _board(
     """The board; with a secret memory, `memory_map` is only what the bridge has been told."""
     told = _memory_map(options)
     if options.secret_map is None:
+        if told.absent:
+            raise MemoryMapError(
+                f"memory map {told.name!r}: without {', '.join(told.absent)} it is one for --secret-map; the mock's "
+                "own controller needs every register"
+            )
         return Board(parameters, told, plant, options.seed, modifications, arm_seed)
     from mock_controller.hidden.memory import draw_memory
     from mock_controller.hidden.secret_board import SecretBoard

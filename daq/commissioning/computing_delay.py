@@ -70,7 +70,8 @@ def computing_delay(effects: Sequence[Effect], period: float) -> ComputingDelay:
         )
     if high - low > WIDEST_S:
         raise SpecError(
-            f"computing delay: between {1e3 * low:.2f} and {1e3 * high:.2f} ms: the line is too slow to say more"
+            f"computing delay: between {1e3 * low:.2f} and {1e3 * high:.2f} ms: this line, or a "
+            "busy computer, is too slow to say more; close other programs, or leave the step out with --skip delay"
         )
     return ComputingDelay(low, high, len(effects))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from firmware_protocol.errors import MemoryMapError
-from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
+from firmware_protocol.memory_map import MemoryMap, default_memory_map, open_places, parse_memory_map
 
 
 def load_memory_map(path: Path | None) -> MemoryMap:
@@ -15,7 +15,10 @@ def load_memory_map(path: Path | None) -> MemoryMap:
     if path is None:
         return default_memory_map()
     text = read_text(path, f"memory map {path}")
-    parse_toml(text, str(path))  # bounds how long and how deep it may be
+    try:
+        parse_toml(text, str(path))  # bounds how long and how deep it may be
+    except SpecError as error:
+        raise SpecError(f"{path}: {why}") if (why := open_places(text)) else error from None
     try:
         return parse_memory_map(text, str(path))
     except MemoryMapError as error:

@@ -52,6 +52,18 @@ EventKind = Literal[
 
 SLOW_LINE = "slow line: "
 """Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
+LATE_SET_POINTS = "late_set_points"
+"""Counter of the control periods that used an older set point than the one that was sent for them."""
+
+
+def late_set_points_line(count: float) -> str:
+    """What set points that were sent late mean, for people; `count` of them."""
+    return (
+        f"{count:.0f} set points taken a period late, or not at all: they were sent late, so the motion was "
+        "played with a jolt there; is the computer busy?"
+    )
+
+
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo=UTC)
 """Range of moments that fit into 64 bits of ns since 1970, as time stamps are written."""
 

@@ -217,8 +217,13 @@ class Controller:
         self.link.request(Release(named), Released)
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
-        """Joint → (P, I, D), each 0–20."""
-        return dict(zip(self.joints, self.link.request(ReportGains(), Gains).gains, strict=True))
+        """Joint → (P, I, D), each 0–20; empty where the bridge's memory map has no gains."""
+        try:
+            return dict(zip(self.joints, self.link.request(ReportGains(), Gains).gains, strict=True))
+        except RequestRefusedError as error:
+            if error.reason != Refusal.NOT_CAPABLE:
+                raise
+            return {}
 
     def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
         """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20."""

@@ -31,10 +31,14 @@ class RequestRefusedError(DaqError):
     def __init__(self, request: str, reason: int, why: str = "") -> None:
         self.request = request
         self.reason = reason
+        if reason == Refusal.NOT_CAPABLE and request in _BY_THE_MAP:
+            why = why or "its bridge's memory map leaves out the registers for it (docs/commissioning.md)"
         why = why or _EXPLANATION.get(reason, f"unknown reason {reason}")
         super().__init__(f"the controller refused {request}: {why}")
 
 
+_BY_THE_MAP = ("ReportGains", "SetGains", "ReadProcess", "WriteOutputs", "SetGripper")
+"""Requests that a bridge cannot carry out where its memory map leaves out their registers."""
 _EXPLANATION: dict[int, str] = {
     Refusal.UNKNOWN_OPCODE: "it does not know this request",
     Refusal.BAD_LENGTH: "the request has a wrong length",

@@ -80,5 +80,5 @@ class TimedExchange:
 def no_reply(connection: Connection, transaction: Transaction) -> str:
     """One line about a request that was never answered."""
     name = type(transaction.request).__name__
-    why = connection.complaint or "is the controller on?"
+    why = connection.complaint or "is the controller on, and are port and baud rate the right ones?"
     return f"{connection.description}: no reply to {name}, asked {transaction.written} times: {why}"

@@ -15,7 +15,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.labels import Outcome
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.trace import SLOW_LINE, TraceRecord
+from daq.contracts.trace import LATE_SET_POINTS, SLOW_LINE, TraceRecord, late_set_points_line
 from daq.driver import Controller, GainsNotTakenError
 from daq.link import LinkError
 from daq.runner.arm_control import ArmControl, StoppedError
@@ -168,8 +168,11 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
                 follower.tell("gains", change.kept_message)
             if ending.kind != "lost":
                 follower.observe(round(AFTERMATH / run.controller.period_s))
+        if follower.late_set_points:
+            follower.tell("note", late_set_points_line(follower.late_set_points))
         outcome = _outcome(ending, run.stop_requests.interrupted())
         counters = run.controller.link.counters_since(begun).numbers()
+        counters[LATE_SET_POINTS] = float(follower.late_set_points)
         path = writer.close(outcome, counters)
     return RunResult(outcome, ending.cause, path, recorder.samples, recorder.missing, counters)
 
@@ -201,7 +204,7 @@ def _trace_record(run: RunSetup, every: int) -> TraceRecord:
         machine=run.machine,
         memory_map=controller.memory_map.model_dump(mode="json"),
         spec=run.spec,
-        gains=controller.gains(),
+        gains=controller.gains() or None,
         period=controller.period_s,
         every=every,
         drive_unit="V",

@@ -17,6 +17,7 @@ from daq.runner.lag import Lag
 from daq.runner.rows import RowMaker
 from daq.safety import Event, RunningGuards, Verdict
 from daq.trajectories import Plan
+from firmware_protocol.commands import Capability
 
 RETRIES_LOOKED_AT_EVERY = 50
 """Ticks between two checks of the link's retries, for events in the trace."""
@@ -79,6 +80,9 @@ class Follower:
         self._lag = Lag(controller.period_s, every)
         self._retries = controller.counters.retries
         self.last: SampleRow | None = None
+        self.late_set_points = 0
+        """Periods in which the controller worked with an older set point than the one that was sent for them, because
+        it was sent late; a plan that is played so is deformed by a period there."""
 
     def arrive(self, joints: tuple[int, ...], within_counts: float, periods: int) -> Ending:
         """Waits until `joints` are at their set points, at most so many periods; a joint that is not by then trips."""
@@ -158,6 +162,7 @@ class Follower:
                 return self._stopped(self._ended() or str(error))
             self._observer.row(row)
             if go_on:
+                self._count_late(snapshot, before, self._set_points(plan, following))
                 for passed in range(index + 1, following + 1):
                     for mark in plan.marks_at(passed):
                         self._observer.event(row.time, mark.kind, mark.message, row.tick, mark.joint)
@@ -173,6 +178,13 @@ class Follower:
             hold = verdict.hold
             if index >= last and not hold:
                 return Ending("finished")
+
+    def _count_late(self, snapshot: BoardSnapshot, before: SampleRow | None, sent: dict[int, int]) -> None:
+        """Counts a period that did not use what was sent for it. Known only where each period has a sample, made by the
+        bridge; a set point that the controller has missed is counted as missed. The first one may come at any time."""
+        known = self._every == 1 and Capability.SAMPLE in self._controller.identity.capabilities
+        if known and before is not None and not snapshot.set_points_missed:
+            self.late_set_points += any(snapshot[joint].set_point != posture for joint, posture in sent.items())
 
     def _tick_after(self, periods: int) -> int | None:
         """Number of the period that ends so many periods from the last sample; None before the first sample."""

@@ -141,7 +141,12 @@ def _require_period(controller: Controller, machine: Machine) -> None:
 
 def _require_driven(controller: Controller, spec: ExperimentSpec, machine: Machine) -> None:
     """A joint whose P is 0 has no drive: it would fall, or lag, instead of following."""
-    gains = controller.gains() | spec.gains
+    own = controller.gains()
+    if not own:  # its memory map has no gains: a joint without drive then shows by its following error alone
+        if spec.gains:
+            raise SafetyError(f"{controller.link.url}: its memory map has no gains, so none can be set for a run")
+        return
+    gains = own | spec.gains
     limp = [joint for joint in range(1, len(machine.joints) + 1) if gains[joint][0] == 0]
     if limp:
         names = ", ".join(map(str, limp))

@@ -80,6 +80,8 @@ def _lead(
     """Fills `rows`; `limp` holds at every moment the joints without drive, with the gains that they had."""
     guards = RestGuards(machine, limits, arm.joints, led=joints, every=arm.every)
     before = arm.gains()
+    if not before:
+        raise TeachingError("the memory map has no gains, so no joint can be made limp to be led by hand")
     _follow_the_hand(arm, machine, joints, arm.next_sample())
     for joint in joints:
         limp[joint] = before[joint]

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import shipped_machines
+from daq.contracts.machine import load_machine, shipped_machines
 from daq.contracts.trace import Floats, Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
@@ -208,7 +208,9 @@ def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) ->
 
 def _description_text(trace: Trace) -> str:
     record = trace.record
-    machine = record.machine.name if record.machine and record.machine.name in shipped_machines() else None
+    own = record.machine
+    shipped = own is not None and own.name in shipped_machines() and own == load_machine(own.name)
+    machine = own.name if own is not None and shipped else None
     created = record.created.astimezone(UTC).isoformat().replace("+00:00", "Z")
     values: dict[str, str | None] = {
         "source": _toml_text(record.source),

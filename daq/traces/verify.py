@@ -11,7 +11,7 @@ import numpy as np
 from daq.contracts.errors import TraceError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace
+from daq.contracts.trace import LATE_SET_POINTS, Trace, late_set_points_line
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.reader import TOO_LARGE, trace_of
@@ -98,6 +98,8 @@ def _outcome(trace: Trace) -> Iterator[Finding]:
         yield Finding(level="warning", check="outcome", message="has no outcome: the recording has not ended")
     elif outcome not in ("complete", None):
         yield Finding(level="warning", check="outcome", message=f"the run ended as {outcome!r}")
+    if late := trace.record.counters.get(LATE_SET_POINTS, 0.0):
+        yield Finding(level="warning", check="set_points", message=late_set_points_line(late))
     if len(trace) == 0:
         yield Finding(level="warning", check="samples", message="has no samples")
 

@@ -25,6 +25,8 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
     if json:
         print_json({joint: dict(zip("pid", gain, strict=True)) for joint, gain in found.items()})
         return
+    if not found:
+        print("the robot's memory map has no gains: they stay as they are")
     for joint, (p, i, d) in found.items():
         print(f"joint {joint}: P {p:2d}  I {i:2d}  D {d:2d}" + ("" if p else "   LIMP: nothing holds it"))
 

@@ -112,11 +112,16 @@ def find(
             )
     written = found.memory_map("") is not None
     if json:
-        print_json(findings_data(found, proofs) | {"memory_map": str(output) if written else None})
+        print_json(
+            findings_data(found, proofs)
+            | {"memory_map": str(output) if written else None, "absent": list(found.absent())}
+        )
         return
     print(findings_text(found, proofs))
     print(f"findings: {findings}")
     print(f"memory map: {output}" if written else why_no_map(found, output))
+    if written and (absent := what_is_absent(found, output)):
+        print(absent)
 
 
 def search(
@@ -206,16 +211,20 @@ def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandP
 
 
 def keep_map(found: Findings, path: Path) -> bool:
-    """Writes the memory map; where a register has no place, a map to be completed beside it, and returns False."""
+    """Writes the memory map, and where a register has no place a map to be completed beside it. Returns whether there
+    is a memory map: False while one lacks a place that no map can be without."""
     from daq.commissioning.memory.map_text import begun_map_text, memory_map_text
     from daq_cli.app.output_file import replacing
 
     memory_map = found.memory_map("found at this arm")
-    if memory_map is None:
+    if found.missing() or memory_map is None:
         with replacing(begun_map(path)) as part:
             part.write_text(begun_map_text(found), "utf-8")
+    if memory_map is None:
         return False
-    remarks = ('Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with what was seen.',)
+    remarks = ['Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with what was seen.']
+    if absent := found.absent():
+        remarks.append(f"Left out, because they have no place: {', '.join(absent)}. Nothing reads or writes them.")
     with replacing(path) as part:
         part.write_text(memory_map_text(memory_map, remarks), "utf-8")
     return True
@@ -228,10 +237,27 @@ def begun_map(path: Path) -> Path:
 
 def why_no_map(found: Findings, path: Path) -> str:
     """What has no place, and what to do."""
-    names = sorted({one.register for one in found.missing()})
+    names = found.essential()
+    why = f"these have no place: {', '.join(names)}" if names else "errors of some joints have two bytes, of others one"
     return (
-        f"no memory map, for these have no place: {', '.join(names)}; {begun_map(path).name} has all others: put the "
-        f"addresses from your manual in place of its question marks, and save it as {path.name}"
+        f"no memory map, for {why}; {begun_map(path).name} has all others: put the addresses from your manual in place "
+        f"of its question marks, and save it as {path.name}"
+    )
+
+
+def what_is_absent(found: Findings, path: Path) -> str:
+    """What the memory map leaves out, and what that means; empty where it has everything."""
+    absent = found.absent()
+    if not absent:
+        return ""
+    gains = any(name.startswith("gain") for name in absent)
+    lost = ["gains can be neither read nor set: the arm keeps its own"] if gains else []
+    if any(not name.startswith("gain") for name in absent):
+        lost.append("process signals and the gripper are not offered")
+    return (
+        f"{path.name} leaves out {', '.join(absent)}, which have no place, so {'; '.join(lost)}. Nothing reads or "
+        f"writes them. With a manual: put the addresses in place of the question marks of {begun_map(path).name}, and "
+        f"save it as {path.name}"
     )
 
 

@@ -128,9 +128,11 @@ def _refusals(controller: Controller) -> Iterator[Checked]:
 def _settings(controller: Controller) -> Iterator[Checked]:
     from firmware_protocol.units import GAIN_MAX
 
-    gains = controller.gains()
-    above = [joint for joint, values in gains.items() if max(values) > GAIN_MAX]
-    yield Checked(f"has gains from 0 to {GAIN_MAX}", not above, "; ".join(f"{j}: {g}" for j, g in gains.items()))
+    if gains := controller.gains():
+        above = [joint for joint, values in gains.items() if max(values) > GAIN_MAX]
+        yield Checked(f"has gains from 0 to {GAIN_MAX}", not above, "; ".join(f"{j}: {g}" for j, g in gains.items()))
+    if not controller.memory_map.has_process:
+        return
     process = controller.process()
     yield Checked("reports inputs, outputs and gripper", process.gripper in (0, 1), f"{process}")
 

@@ -11,6 +11,7 @@ import typer
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError
+from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import print_json
 from daq_cli.robot.answers import AcquisitionFailedError
@@ -119,5 +120,7 @@ def print_result(finished: Finished) -> None:
     why = f" — {finished.reason}" if finished.reason else ""
     print(f"{finished.outcome}: {finished.samples} samples, {finished.missing} missing{why}")
     shown = ("retries", "damaged", "torn", "missed_set_points", "restarts")
+    if late := counters.get(LATE_SET_POINTS, 0.0):
+        print(late_set_points_line(late))
     print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in shown))
     print(f"trace: {finished.trace}")

@@ -81,10 +81,16 @@ class LocalRobot:
         with self._connected() as controller:
             board, gains = controller.status(), controller.gains()
             report = _report(self.call, machine, controller, limp_joints(gains))
+            unsure = (
+                limp_joints(gains) and "gain_p 1" in controller.memory_map.assumed and not controller.identity.simulated
+            )
         state = ", ".join(flag.name.lower().replace("_", " ") for flag in board.flags if flag.name) or "no flags"
         kind = "mock" if controller.identity.simulated else "REAL ARM"
         missed = f"{board.missed} set points missed since power-up"
-        return RobotState(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
+        told = f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}"
+        if unsure:
+            told += "; the gains' addresses are assumed: joints may be called limp wrongly"
+        return RobotState(report, told, gains)
 
     def gains(self) -> Mapping[int, Gain]:
         """Reads the board."""

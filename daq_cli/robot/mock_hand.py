@@ -59,6 +59,8 @@ class MockOperator:
     machine: Machine
     slow: float = 1.0
     """Factor on all times of a movement."""
+    tell: Callable[[str], None] = lambda _text: None
+    """Told what is done, and everything that a person would be shown."""
     postures: dict[int, float] = field(default_factory=dict)
     _path: list[tuple[dict[int, float | End], float]] = field(default_factory=list)
     _until: float = 0.0
@@ -72,6 +74,7 @@ class MockOperator:
     def begin(self, task: Task) -> bool:
         """Begins a task; everything can be done."""
         self._path, self._until = [], self.arm.now()
+        self.tell(f"    the mock's hand: {task.kind.replace('_', ' ')}{'' if task.joint is None else f' {task.joint}'}")
         if task.kind == "press_emergency_stop":
             held = self.arm.emergency_stop(pressed=True)
             self.postures = {joint: self._posture(joint, degrees) for joint, degrees in held.items()}
@@ -130,7 +133,8 @@ class MockOperator:
         return round(2 * self._degrees(joint, to)) / 2
 
     def show(self, text: str) -> None:
-        """Nobody reads it."""
+        """Passes it on."""
+        self.tell(text)
 
     def watch(self, postures: Mapping[int, int]) -> None:
         """Nobody looks."""
@@ -148,11 +152,14 @@ class MockRefusedError(DaqError):
 
 
 @contextmanager
-def mock_operator(control: str, machine: Machine, *, lock_step: bool) -> Iterator[MockOperator]:
-    """The stand-in at a mock's control port; unhurried where the mock follows the clock. Raises SpecError."""
+def mock_operator(
+    control: str, machine: Machine, tell: Callable[[str], None], *, lock_step: bool
+) -> Iterator[MockOperator]:
+    """The stand-in at a mock's control port; unhurried where the mock follows the clock. `tell` is told what it does.
+    Raises SpecError."""
     arm = ControlPortArm(control)
     try:
-        yield MockOperator(arm, machine, 1.0 if lock_step else IN_REAL_TIME)
+        yield MockOperator(arm, machine, 1.0 if lock_step else IN_REAL_TIME, tell)
     finally:
         arm.close()
 

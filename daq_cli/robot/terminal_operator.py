@@ -8,6 +8,7 @@ import select
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import typer
 
@@ -26,6 +27,8 @@ NO_PAUSE = (
     "plug_in",
 )
 """Tasks that are over when the person says that they are done."""
+LARGEST_ANGLE = 360
+"""Largest angle (degrees) of a joint, to either side, that can be typed."""
 AT_ONCE = ("release_emergency_stop",)
 """Tasks that begin without a question, for one has just been answered."""
 
@@ -60,7 +63,8 @@ def words(task: Task) -> str:
         "command": f"Joint {task.joint} will move by at most 4 posture units (a degree of a major axis) and back. "
         "Watch it; the emergency stop ends it.",
     }[task.kind]
-    return f"{text} (once more: {task.again})" if task.again else text
+    hint = "; is the emergency stop pressed, and does no other joint move?" if task.kind == "lead" else ""
+    return f"{text} (once more: {task.again}{hint})" if task.again else text
 
 
 class Lines:
@@ -123,23 +127,19 @@ class TerminalOperator:
         a person. Raises Abort for `q` and where the input has ended."""
         if not at_the_arm and (yes or not can_be_asked()):
             return True
-        self.lines.forget()
-        console().print("    Enter to begin, s to leave it open, q to end: ", end="")
-        return self._answer() != "s"
+        return self._choice("    Enter to begin, s to leave it open, q to end: ") != "s"
 
     def begin(self, task: Task) -> bool:
         """Asks. Raises Abort for `q` and where the input has ended."""
         self.step += 1
         console().print(f"\n[{self.step}] {words(task)}")
         self._waits = task.kind not in NO_PAUSE
-        self.lines.forget()
         if task.kind in AT_ONCE:
+            self.lines.forget()
             console().print("    Reading. Enter when it is done; q to end.")
             return True
         done = "Enter when you begin" if self._waits else "Enter when it is so"
-        console().print(f"    {done}, s to skip, q to end: ", end="")
-        answer = self._answer()
-        if answer == "s":
+        if self._choice(f"    {done}, s to skip, q to end: ") == "s":
             self._waits = False
             return False
         if self._waits:
@@ -152,26 +152,37 @@ class TerminalOperator:
             return True
         if self.read_line is None and not self.lines.ready():
             return False
+        if answer := self._answer():
+            console().print(f"    {answer!r}: Enter when you have finished, q to end")
+            return False
         self._waits = False
-        self._answer()
         return True
 
-    def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
+    def read_angle(
+        self, joint: int, number: int, wait: Callable[[float], None]
+    ) -> float | Literal["taken back"] | None:
         """Asks for the angle of a joint that was moved by hand."""
         del wait  # a person takes the time that it takes
         while True:
             self.lines.forget()
             console().print(
-                f"    joint {joint}, posture {number}: move and hold it, type its angle in degrees (Enter: no more): ",
+                f"    joint {joint}, posture {number}: move and hold it, type its angle in degrees "
+                "(Enter: no more, b: take the last one back): ",
                 end="",
             )
             answer = self._answer()
             if not answer:
                 return None
+            if answer == "b":
+                return "taken back"
             try:
-                return float(answer)
+                angle = float(answer)
             except ValueError:
                 console().print(f"    {answer!r} is no number")
+                continue
+            if abs(angle) <= LARGEST_ANGLE:
+                return angle
+            console().print(f"    {answer}°: a joint's angle is between -{LARGEST_ANGLE}° and {LARGEST_ANGLE}°")
 
     def show(self, text: str) -> None:
         """Prints a line."""
@@ -183,6 +194,16 @@ class TerminalOperator:
         if console().is_terminal and shown != self._shown:
             console().print(f"\r    {shown}", end="")
         self._shown = shown
+
+    def _choice(self, question: str) -> str:
+        """Asks until the answer is Enter or `s`, and returns it. Raises Abort for `q` and where the input ends."""
+        while True:
+            self.lines.forget()
+            console().print(question, end="")
+            answer = self._answer()
+            if answer in ("", "s"):
+                return answer
+            console().print(f"    {answer!r} is none of Enter, s and q")
 
     def _answer(self) -> str:
         line = self.read_line() if self.read_line else self.lines.read()

@@ -114,7 +114,10 @@ class Bridge:
         self._sees_period = sees_period
         self._compact = sees_period and compact
         self._lock_step = lock_step
+        told = self._board.host_memory.map
         capable = {Sample.OPCODE: sees_period, Advance.OPCODE: lock_step}
+        capable |= dict.fromkeys((ReportGains.OPCODE, SetGains.OPCODE), told.has_gains)
+        capable |= dict.fromkeys((ReadProcess.OPCODE, WriteOutputs.OPCODE, SetGripper.OPCODE), told.has_process)
         self._incapable = {opcode for opcode, can in capable.items() if not can}
         self._session = Session()
         self._advances = AdvanceOrder()

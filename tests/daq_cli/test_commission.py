@@ -17,6 +17,7 @@ from daq.commissioning.potentiometer import Interval, Potentiometer
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, load_machine, parse_machine
+from daq_cli.commands.commission.addresses import addresses_of
 from daq_cli.commands.commission.machine_text import machine_file_text, with_controller, with_limits, with_sensors
 from daq_cli.commands.commission.periods import Periods
 from daq_cli.commands.commission.record import Record
@@ -121,7 +122,7 @@ def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place
     assert sheet.answer.startswith(
         f"0 of {(n := len(STEPS))} steps are done, {n} are left out, 0 are open. Left out: Port and line, "
     )
-    blocks = [block for section in sheet.sections for block in section.blocks]
+    blocks = [block for section in sheet.sections[:-1] for block in section.blocks]
     assert len(blocks) == len(STEPS)
     assert all(isinstance(block, Text) and why in block.text for block in blocks)
     daq("--port", MOCK, "commission", "--folder", tmp_path, "--because", why).complains(2, "it needs --skip")
@@ -269,7 +270,7 @@ def test_a_result_of_another_memory_map_is_done_again(daq: CommandLine, tmp_path
     record = Record.of(tmp_path)
     record.keep("bridge", {"basis": {"port": MOCK, "memory_map": "of another one"}})
     record.keep("period", {})
-    (tmp_path / "memory_map.toml").write_text("another", "utf-8")
+    daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
     options = [word for step in STEPS for word in ("--skip", step.name)]
     assert "To be done again" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
     assert Record.of(tmp_path).steps["bridge"]["skipped"]
@@ -318,6 +319,54 @@ def test_lines_of_a_script_that_come_together_are_all_read() -> None:
     assert lines.ready()
     assert lines.read() == ""
     os.close(reading)
+
+
+def test_only_enter_s_and_q_are_answers() -> None:
+    assert operator(["banana\n", "\n"]).may_begin(at_the_arm=True, yes=True)
+    person = operator(["no\n", "\n", "no\n", "\n"])
+    assert person.begin(Task("switch_off_and_on"))
+    assert not person.finished(), "no is not: it is finished"
+    assert person.finished()
+    with pytest.raises(typer.Abort):
+        operator(["what?\n", "q\n"]).begin(Task("rest"))
+
+
+def test_an_angle_that_no_joint_has_is_asked_for_again_and_one_can_be_taken_back() -> None:
+    person, waits = operator(["500\n", "50\n", "b\n"]), list[float]()
+    assert person.read_angle(1, 1, waits.append) == 50
+    assert person.read_angle(1, 2, waits.append) == "taken back"
+
+
+def test_a_step_that_fails_leaves_the_results_that_there_were(daq: CommandLine, tmp_path: Path) -> None:
+    record = Record.of(tmp_path)
+    record.keep("ramp", {"trace": "gone.mcap", "basis": {"machine": "none"}})
+    record.keep("model", {"verdict": "kept", "basis": {"machine": "none"}})
+    assert daq("--port", MOCK, "commission", "--folder", tmp_path, "--only", "model").code != 0
+    assert Record.of(tmp_path).steps["model"]["verdict"] == "kept"
+
+
+def test_a_map_with_question_marks_is_refused_with_their_lines_before_anything_is_recorded(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    (tmp_path / "memory_map.toml").write_text("version = 1\nlow = [?, 0xFC01]\n", "utf-8")
+    said = daq("--port", MOCK, "commission", "--folder", tmp_path, "--skip", "memory")
+    said.complains(2, "line 2", "in place of each question mark")
+    assert not (tmp_path / "commissioning.toml").exists()
+
+
+def test_addresses_found_assumed_and_filled_in_by_hand_are_told_apart() -> None:
+    shipped = default_memory_map()
+    findings = [
+        {"register": "power", "joint": joint, "verdict": "found", "low": f"{low:04X}"}
+        for joint, low in enumerate(shipped["power"].low, start=1)
+    ]
+    findings[0] |= {"low": "FC7F"}  # found there, and changed by a person afterwards
+    findings.append({"register": "gripper", "verdict": "assumed", "low": f"{shipped['gripper'].low[0]:04X}"})
+    findings.append({"register": "process_outputs", "verdict": "unknown"})
+    told = addresses_of({"findings": findings}, shipped)
+    assert [len(told["power"][kind]) for kind in ("found", "assumed", "by hand")] == [5, 0, 1]
+    assert told["gripper"]["assumed"] == ["FC72"]
+    assert told["process_outputs"]["by hand"] == ["FC71"]
 
 
 def test_an_angle_that_is_no_number_is_asked_for_again() -> None:

@@ -20,7 +20,7 @@ def port(number: int) -> FoundPort:
 
 
 def test_the_port_is_the_one_that_appears_when_the_cable_is_plugged_in() -> None:
-    lists = iter([(port(1),), (port(1),), (port(1), port(0))])
+    lists = iter([(port(1), port(0)), (port(1),), (port(1),), (port(1), port(0))])
     waits: list[float] = []
     hand = Hand()
     assert port_by_plugging(hand, lambda: next(lists), waits.append) == port(0)
@@ -28,12 +28,19 @@ def test_the_port_is_the_one_that_appears_when_the_cable_is_plugged_in() -> None
     assert len(waits) == 1
 
 
+def test_a_cable_that_stays_plugged_in_is_told_at_once() -> None:
+    lists = iter([(port(1),), (port(1),), (), (port(1),)])
+    hand = Hand()
+    assert port_by_plugging(hand, lambda: next(lists), lambda _s: None) == port(1)
+    assert hand.tasks == ["unplug", "unplug", "plug_in"]
+
+
 def test_a_port_that_does_not_appear_and_two_that_do_are_one_line() -> None:
     waits: list[float] = []
     with pytest.raises(ReachError, match="no port appeared within 15 s"):
         port_by_plugging(Hand(), lambda: (port(1),), waits.append)
     assert 14 < sum(waits) < 16
-    lists = iter([(), (port(1), port(2))])
+    lists = iter([(), (), (port(1), port(2))])
     with pytest.raises(TransportError, match="plug in one cable"):
         port_by_plugging(Hand(), lambda: next(lists), waits.append)
     with pytest.raises(ReachError, match="not unplugged"):

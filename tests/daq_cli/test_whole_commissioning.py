@@ -23,6 +23,8 @@ from tests.daq_cli.invoke import CommandLine, Said
 
 SENSORS, MAP = 3, 7
 """Seeds of what is secret."""
+WITHOUT_GAINS = 2611
+"""Seed of a memory whose gains, outputs and gripper no search finds."""
 FOUND = ("set_point", "position", "error", "power")
 """Registers that a search proves at every joint."""
 
@@ -33,8 +35,10 @@ def mock(options: str) -> Iterator[MockProcess]:
     port = parse_port_url(f"mock://?lock_step=1&seed=5&secret_sensors={SENSORS}&{options}")
     assert isinstance(port, MockPort)
     found = start_mock(port)
-    yield found
-    found.close()
+    try:
+        yield found
+    finally:
+        found.close()
 
 
 def commission(daq: CommandLine, arm: MockProcess, folder: Path, *options: str) -> Said:
@@ -80,6 +84,33 @@ def test_the_bridge_the_stop_and_the_timing_of_an_arm_with_a_known_map(daq: Comm
     assert isinstance(controller, BoardPid)
     assert not controller.delay.assumed
     assert controller.delay.value == pytest.approx(1e-3 * true, abs=0.001)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_an_arm_whose_gains_and_gripper_nobody_knows_is_commissioned_without_them(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    secret = f"secret_map={WITHOUT_GAINS}"
+    with mock(secret) as arm:
+        said = commission(daq, arm, tmp_path)
+        assert said.code == 3
+        assert "make firmware MAP=" in said.err
+    absent = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]["memory"]["absent"]
+    assert absent == ["gain_p", "gain_i", "gain_d", "process_outputs", "gripper"]
+    skipped = [word for name in ("potentiometers", "end_stops", "emergency_stop") for word in ("--skip", name)]
+    with mock(f"{secret}&memory_map={tmp_path / 'memory_map.toml'}") as arm:
+        said = commission(daq, arm, tmp_path, *skipped, "--skip", "delay", "--skip", "gain", "--skip", "model")
+        written = told_by(str(arm.control), "written")["written"]
+    assert said.code == 0, said.err
+    steps = json.loads(said.out)["steps"]
+    assert steps["ramp"]["outcome"] == "complete"
+    assert steps["ramp"]["set_points_taken_late"] == 0
+    truth = draw_memory(WITHOUT_GAINS, "kept").map["set_point"]
+    assert {int(address, 16) for address in written} <= set(truth.addresses), "what has no place is never written"
+    page = (tmp_path / "acceptance.html").read_text("utf-8")
+    assert "left out: no place is known" in page
+    assert "sensors of joints 1, 2, 3, 4, 5, 6" in page
 
 
 @pytest.mark.slow

@@ -46,7 +46,7 @@ MISTAKES = {
     "overlap of two registers": ("[0xFC72]", "[0xFC71]", "gripper and process_outputs overlap at FC71"),
     "outside": ("[0xFC72]", "[0xFC80]", "gripper at FC80 lies outside FC00–FC7F"),
     "no address": ("[0xFC72]", "[0x1FC72]", r"gripper.low.0: .* less than or equal to 65535 \(found 130162\)"),
-    "missing": ("[registers.gripper]", "[registers.claw]", "register gripper is missing"),
+    "missing": ("[registers.gripper]", "[registers.claw]", "register claw is not one that the protocol knows"),
     "unknown key": ("[registers.gripper]", "[registers.gripper]\ncolour = 1", "registers.gripper.colour: Extra inputs"),
     "text for a number": ("bits = 12", 'bits = "12"', r"registers.position.bits: .* valid integer \(found '12'\)"),
     "number for a truth value": ("signed = false", "signed = 0", r"set_point.signed: .* valid boolean \(found 0\)"),

@@ -12,7 +12,7 @@ from daq.commissioning.memory.gains import Columns, gain_columns
 from daq.commissioning.memory.joint import LEAST_EPOCHS, JointEvidence, joint_evidence
 from daq.commissioning.memory.recording import Recording
 from daq.commissioning.memory.relations import Place
-from firmware_protocol.memory_map import JOINTS, MemoryMap, Register, default_memory_map
+from firmware_protocol.memory_map import GAIN_REGISTERS, JOINTS, MAY_BE_ABSENT, MemoryMap, Register, default_memory_map
 
 Verdict = Literal["found", "contradicts", "assumed", "unknown"]
 """found:       the evidence leaves no other byte
@@ -65,14 +65,32 @@ class Findings:
         """Registers without a place."""
         return [one for one in self.all if one.low is None]
 
+    def without_place(self) -> tuple[str, ...]:
+        """Names of the registers of which some joint's has no place, each once, in the order of the map."""
+        return tuple(dict.fromkeys(one.register for one in self.missing()))
+
+    def absent(self) -> tuple[str, ...]:
+        """Names of the registers that the memory map leaves out, because they have no place: nothing reads or writes
+        them. Gains are left out together."""
+        names = {name for name in self.without_place() if name in MAY_BE_ABSENT}
+        names |= set(GAIN_REGISTERS) if names & set(GAIN_REGISTERS) else set()
+        return tuple(name for name in MAY_BE_ABSENT if name in names)
+
+    def essential(self) -> tuple[str, ...]:
+        """Names of the registers without a place that no memory map can be without."""
+        return tuple(name for name in self.without_place() if name not in MAY_BE_ABSENT)
+
     def memory_map(self, name: str) -> MemoryMap | None:
-        """The memory map, with "found" and "assumed" for each address; None while a register has no place, and where
-        the errors of some joints have two bytes and of others one."""
+        """The memory map, with "found" and "assumed" for each address, without what is `absent`; None while a set
+        point, position, error or power has no place, and where the errors of some joints have two bytes and of others
+        one."""
         widths = {one.high is None for one in self.all if one.register == "error"}
-        if self.missing() or len(widths) > 1:
+        if self.essential() or len(widths) > 1:
             return None
-        shipped = default_memory_map()
-        registers = {key: self._register(key, register) for key, register in shipped.registers.items()}
+        shipped, absent = default_memory_map(), self.absent()
+        registers = {
+            key: self._register(key, register) for key, register in shipped.registers.items() if key not in absent
+        }
         return MemoryMap(version=1, name=name, base=self.base, size=self.size, registers=registers)
 
     def _register(self, name: str, shipped: Register) -> Register:

@@ -24,7 +24,7 @@ from daq_cli.commands.commission.record import FILE, Record
 
 Said = Literal["new", "same"]
 READINGS = 5
-OF_THE_ARM = (FILE, MAP, FINDINGS, MACHINE, CONFIG, "acceptance.html", "diagnosis.html")
+OF_THE_ARM = (FILE, MAP, FINDINGS, MACHINE, CONFIG, "acceptance.html", "diagnosis.html", "next_experiment.json")
 """Files of a folder that belong to one arm; its traces say themselves of which machine they are."""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from daq.commissioning.memory.procedure import Operator
 from daq.contracts import exit_codes
@@ -35,8 +35,11 @@ class Commissioner(Operator, Protocol):
     def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
         """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
 
-    def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
-        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more.
+    def read_angle(
+        self, joint: int, number: int, wait: Callable[[float], None]
+    ) -> float | Literal["taken back"] | None:
+        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more, and
+        "taken back" where the posture before was read wrongly.
         `wait` lets time (s) pass."""
 
 

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.commissioning.memory.procedure import Task
 from daq.contracts.errors import SpecError
+from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
 from daq_cli.commands.commission.arm import note_period
-from daq_cli.commands.commission.bench import Bench, NotCommissionedError, connected
+from daq_cli.commands.commission.bench import CONFIG, Bench, NotCommissionedError, connected
 from daq_cli.commands.commission.periods import followed_periods
+from firmware_protocol.commands import StatusFlag
 
 if TYPE_CHECKING:
     from daq.calibration.gain import GainEstimate
+    from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
 
@@ -20,14 +25,33 @@ TO_GAIN = (1, 2, 3)
 FLOORS = 2.0
 """Errors of this many times the noise floor are more than noise, and are diagnosed."""
 DIAGNOSIS = "diagnosis.html"
+NEXT = "next_experiment.json"
 WITHIN_TOLERANCES = "yes, within its tolerances"
 """What is said of an arm that differs from the file's numbers, but not from what the file says they may be."""
+
+
+def end_freeze(bench: Bench) -> None:
+    """Ends a stop that is in force, with the person's word; nothing moves by that. Raises NotCommissionedError where
+    it is to stay."""
+    with connected(bench) as controller:
+        status = controller.status()
+        if StatusFlag.FROZEN not in status.flags:
+            return
+        if not bench.operator.begin(Task("end_freeze")):
+            raise NotCommissionedError(
+                "the bridge holds the set points, so nothing can move: "
+                f"`daq --config {bench.folder / CONFIG} reset` ends that"
+            )
+        controller.release(status.stop)
 
 
 def stop(bench: Bench) -> dict[str, Any]:
     """The program's stop, from the request to the board's confirmation."""
     with connected(bench) as controller:
-        bench.consent.require(bench.call.port, controller.identity)
+        asked = replace(
+            bench.consent, what="it will be stopped where it stands, and released again", refused="it is stopped"
+        )
+        asked.require(bench.call.port, controller.identity)
         begun = time.perf_counter()
         confirmation = controller.stop()
         taken = 1e3 * (time.perf_counter() - begun)
@@ -120,7 +144,16 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
     robot = robot_access(bench.configured)
     spec = ExperimentSpec(name="commission-ramp", joints=joints)
     done = acquire_complete(robot, spec, robot.machine, robot.call.trace_folder, bench.consent)
-    return {"trace": str(done.trace), "samples": done.samples, "missing": done.missing, "outcome": done.outcome}
+    late = round(done.counters.get(LATE_SET_POINTS, 0.0))
+    if late:
+        bench.operator.show(late_set_points_line(late))
+    return {
+        "trace": str(done.trace),
+        "samples": done.samples,
+        "missing": done.missing,
+        "set_points_taken_late": late,
+        "outcome": done.outcome,
+    }
 
 
 def model(bench: Bench) -> dict[str, Any]:
@@ -183,5 +216,15 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
         "verdict": found.verdict.replace("-", " "),
         "diagnosis": said,
         "report": DIAGNOSIS,
-        "to_be_run_next": "nothing" if asked is None else asked.name,
+        "to_be_run_next": "nothing" if asked is None else _as_command(bench, asked.spec),
     }
+
+
+def _as_command(bench: Bench, spec: ExperimentSpec) -> str:
+    """Writes an experiment beside the results; the command that runs it."""
+    from daq_cli.app.output_file import replacing
+
+    path = bench.folder / NEXT
+    with replacing(path) as part:
+        part.write_text(spec.model_dump_json(indent=1) + "\n", "utf-8")
+    return f"daq --config {bench.folder / CONFIG} run spec {path}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq.commissioning.end_stops import EndStops, end_stops_of
 from daq.commissioning.memory.procedure import Task
-from daq.contracts.errors import SafetyError
+from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.commands.commission.bench import MACHINE, MAP, Bench, NotCommissionedError
 from daq_cli.robot.safe_release import give_power_back, release_after_interruption, typical
 from firmware_protocol.units import counts_to_posture
@@ -20,13 +20,16 @@ if TYPE_CHECKING:
 
 AVERAGED = 12
 """Number of readings of which the median is taken at each posture of a protractor."""
+LEAST_MOVED = 40
+"""ADC counts by which a joint is at least moved from one posture to the next, some 3° of a major axis."""
+ATTEMPTS = 3
+"""How often the postures of one joint are asked for."""
 PUSHED, STAYS = 25, 5
 """ADC counts by which a joint is to be pushed off its set point, and by which it may still move then."""
 
 
 def potentiometers(bench: Bench) -> dict[str, Any]:
     """Direction, zero, range and bend of the sensors, by a protractor."""
-    from daq.commissioning.potentiometer import calibrate_potentiometer
     from daq_cli.commands.commission.machine_text import with_sensors
     from daq_cli.robot.memory_page import open_page
 
@@ -37,19 +40,55 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
         if not bench.operator.begin(Task("press_emergency_stop")):
             raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
         for joint in bench.joints:
-            counts, angles = [], []
-            for number in range(1, bench.postures + 1):
-                angle = bench.operator.read_angle(joint, number, page.wait)
-                if angle is None:
-                    break
-                counts.append(typical(page, memory_map, "position", AVERAGED)[joint])
-                angles.append(math.radians(angle))
-            sensors.append(calibrate_potentiometer(joint, counts, angles))
+            sensors.append(_sensor(bench, page, memory_map, joint))
             bench.operator.show(sensor_line(sensors[-1]))
-            bench.write_machine(with_sensors(bench.machine_text(), sensors[-1:]))
+        bench.write_machine(with_sensors(bench.machine_text(), sensors))  # not before: what there was stays if it fails
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
+
+
+def _sensor(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> Potentiometer:
+    """The sensor of one joint. Postures that say too little are asked for again, `ATTEMPTS` times in all. Raises
+    SpecError."""
+    from daq.commissioning.potentiometer import calibrate_potentiometer
+
+    for attempt in range(1, ATTEMPTS + 1):
+        try:
+            return calibrate_potentiometer(joint, *_postures(bench, page, memory_map, joint))
+        except SpecError as error:
+            if attempt == ATTEMPTS:
+                raise
+            bench.operator.show(f"{error}. Once more from posture 1.")
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _postures(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> tuple[list[float], list[float]]:
+    """Readings (ADC counts) and angles (rad) of a joint at postures to which a person has moved it."""
+    from daq.commissioning.potentiometer import FEWEST
+
+    counts: list[float] = []
+    angles: list[float] = []
+    while len(counts) < bench.postures:
+        angle = bench.operator.read_angle(joint, len(counts) + 1, page.wait)
+        if angle == "taken back":
+            del counts[-1:], angles[-1:]
+            continue
+        if angle is None:
+            if len(counts) >= FEWEST:
+                break
+            bench.operator.show(f"joint {joint}: {len(counts)} postures, at least {FEWEST} are needed")
+            continue
+        reading = typical(page, memory_map, "position", AVERAGED)[joint]
+        if counts and abs(reading - counts[-1]) < LEAST_MOVED:
+            bench.operator.show(
+                f"joint {joint} has moved by {abs(reading - counts[-1]):.0f} counts since posture {len(counts)}, at "
+                f"least {LEAST_MOVED} are needed: not counted; move it further"
+            )
+            continue
+        counts.append(reading)
+        angles.append(math.radians(angle))
+    return counts, angles
 
 
 def sensor_line(found: Potentiometer) -> str:
@@ -127,12 +166,21 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
         after, power = (typical(page, memory_map, name, 5)[joint] for name in ("position", "power"))
         if abs(error) < PUSHED or abs(after - before) > STAYS or abs(power) < PUSHED / 2:
             raise NotCommissionedError(
-                f"joint {joint}: error {error:.0f} counts, power {power:.0f}, moved {after - before:.0f} counts; "
-                f"an arm without power stays where it was put, at least {PUSHED} counts off its set point"
+                f"{_why_not_stopped(joint, error, after - before)} (error {error:.0f} counts, power {power:.0f}, moved "
+                f"{after - before:.0f} counts; an arm without power stays {PUSHED} counts or more off its set point)"
             )
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
     return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
+
+
+def _why_not_stopped(joint: int, error: float, moved: float) -> str:
+    """What to look at where a pushed joint was not seen to stay."""
+    if abs(moved) > STAYS:
+        return f"joint {joint} did not stay where it was put: was the emergency stop pressed, and did you let go of it?"
+    if abs(error) < PUSHED:
+        return f"joint {joint} is at its set point: was the emergency stop pressed, and did you push it by 3°?"
+    return f"joint {joint}: its power did not rise with its error: is the memory map right?"
 
 
 def release_if_pressed(bench: Bench) -> None:

@@ -8,12 +8,14 @@ from typing import Annotated
 
 import typer
 
+from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import parse_joints
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from daq_cli.commands.commission.arm import Said, begin_anew, require_same_arm
 from daq_cli.commands.commission.bench import CONFIG, MAP, Bench
+from daq_cli.commands.commission.by_command import end_freeze
 from daq_cli.commands.commission.by_hand import release_if_pressed
 from daq_cli.commands.commission.port import port_by_plugging
 from daq_cli.commands.commission.record import Record
@@ -54,19 +56,17 @@ def commission(
     """Commission an arm: line, memory map, potentiometers, stop, period, gains, first ramps, model.
 
     Every result is kept at once; a step that is done is not done again. Nothing moves without your word."""
-    if not folder.is_dir():
-        raise SpecError(f"folder {folder}: there is none; make it first")
     left_out = {step_named(name).name for name in skip or ()}
-    if only and only in left_out:
-        raise SpecError(f"--only {only} --skip {only}: nothing would be done")
-    if only:
-        step_named(only)
-    if because and not left_out:
-        raise SpecError("--because: says why steps are left out, so it needs --skip")
+    _require_sensible(folder, only, left_out, because)
     call = _with_port(invocation(context), folder, find_port=find_port, baud=baud)
     record = begin_anew(folder) if arm == "new" else Record.of(folder)
-    if "memory" in left_out and not (folder / MAP).exists():
-        raise SpecError(f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map")
+    record.operator = call.configuration.operator or record.operator
+    if "memory" in left_out:
+        if not (folder / MAP).exists():
+            raise SpecError(
+                f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map"
+            )
+        load_memory_map(folder / MAP)  # refused before anything is recorded
     with person_at(call, mock_control) as person:
         bench = Bench(call, folder, person, ConsentPrompt(yes), record, parse_joints(joints), postures)
         chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]
@@ -83,11 +83,26 @@ def commission(
             if missing := lacking(step, record):
                 raise SpecError(f"step {step.name}: first do {', '.join(missing)}")
             _carry_out(bench, step)
+    if all(step.name in left_out for step in chosen):
+        console().print("Nothing is left to be done: --only STEP does one again, --arm new begins with another arm")
     page = write_sheet(record)
     if json:
         print_json({"page": page, "steps": record.steps})
     else:
         print(page)
+
+
+def _require_sensible(folder: Path, only: str | None, left_out: set[str], because: str) -> None:
+    """Refuses options that do not fit together, before anything is asked or recorded. Raises SpecError,
+    MemoryMapError."""
+    if not folder.is_dir():
+        raise SpecError(f"folder {folder}: there is none; make it first")
+    if only and only in left_out:
+        raise SpecError(f"--only {only} --skip {only}: nothing would be done")
+    if only:
+        step_named(only)
+    if because and not left_out:
+        raise SpecError("--because: says why steps are left out, so it needs --skip")
 
 
 def _with_port(call: Invocation, folder: Path, *, find_port: bool, baud: int | None) -> Invocation:
@@ -111,6 +126,14 @@ def _with_port(call: Invocation, folder: Path, *, find_port: bool, baud: int | N
     return call
 
 
+def _require_memory_map(path: Path) -> None:
+    """Refuses to leave out the search without a sound memory map, before anything is recorded. Raises SpecError,
+    MemoryMapError."""
+    if not path.exists():
+        raise SpecError(f"--skip memory: {path} is not there, and nothing may rely on an assumed memory map")
+    load_memory_map(path)
+
+
 def _carry_out(bench: Bench, step: Step) -> None:
     """One step: what it does, what to watch, how to stop; then its result is kept, and the page written anew."""
     number = 1 + [one.name for one in STEPS].index(step.name)
@@ -119,10 +142,11 @@ def _carry_out(bench: Bench, step: Step) -> None:
     if not bench.operator.may_begin(at_the_arm=step.at_the_arm, yes=bench.consent.given):
         return
     release_if_pressed(bench)
-    bench.record.drop([step.name])
-    if gone := bench.record.drop(resting_on([step.name])):
-        _say_dropped(gone, f"{step.name} is done again")
+    if "bridge" in step.needs and step.at_the_arm:
+        end_freeze(bench)
     result = step.run(bench)
+    if gone := bench.record.drop(resting_on([step.name])):  # not before: a step that fails leaves what there was
+        _say_dropped(gone, f"{step.name} is done again")
     bench.record.keep(step.name, {**result, "basis": bench.basis()})
     for name, value in result.items():
         if not isinstance(value, dict):

@@ -16,12 +16,20 @@ from daq_cli.robot.safe_release import typical
 if TYPE_CHECKING:
     from daq.commissioning.memory.commands import CommandProof
     from daq.commissioning.memory.findings import Findings
+    from daq.driver import Controller
+    from firmware_protocol.commands import Process
 
 ROUND_TRIPS = 200
 """Number of single bytes read to judge the line."""
 SAME_READING = 12
 """Largest difference (ADC counts) between a position by the bridge's memory map and by the one that was found."""
 GAINS, SIGNALS = ("gain_p", "gain_i", "gain_d"), ("process_inputs", "process_outputs")
+
+GIVE_IT = (
+    "Give it this one: for a board `make firmware MAP={map}`, loaded as docs/hardware.md says (for a mock: "
+    "--memory-map {map}); then run `daq commission` again"
+)
+"""What is to be done with a bridge that works by another memory map."""
 
 
 def line(bench: Bench) -> dict[str, Any]:
@@ -55,7 +63,7 @@ def line(bench: Bench) -> dict[str, Any]:
 
 def memory(bench: Bench) -> dict[str, Any]:
     """The memory map, by `daq memory find`."""
-    from daq_cli.commands.memory import findings_text, keep_map, search, why_no_map
+    from daq_cli.commands.memory import findings_text, keep_map, search, what_is_absent, why_no_map
 
     def when_found(found: Findings) -> None:
         if keep_map(found, bench.folder / MAP):
@@ -79,6 +87,8 @@ def memory(bench: Bench) -> dict[str, Any]:
     bench.configure()
     if found.memory_map("") is None:
         raise NotCommissionedError(f"{why_no_map(found, bench.folder / MAP)}; then go on with --skip memory")
+    if absent := what_is_absent(found, bench.folder / MAP):
+        bench.operator.show(absent)
     return _memory_result(found, proofs)
 
 
@@ -90,6 +100,7 @@ def _memory_result(found: Findings, proofs: Sequence[CommandProof]) -> dict[str,
         "findings": FINDINGS,
         "found": sum(one.is_found for one in found.all),
         "assumed": verdicts.count("assumed"),
+        "absent": list(found.absent()),
         "contradicts_the_documented": verdicts.count("contradicts"),
         "set_points_at_power_up": "the measured posture" if all(set_points) else "not seen",
         "proved_by_command": [proof.joint for proof in proofs if proof.proved and not proof.problem],
@@ -101,13 +112,21 @@ def bridge(bench: Bench) -> dict[str, Any]:
     """Whether the bridge works by the memory map that was found."""
     from daq_cli.robot.memory_page import open_page
 
-    memory_map = bench.memory_map()
+    memory_map, give_it = bench.memory_map(), GIVE_IT.format(map=bench.folder / MAP)
     with open_page(bench.call.port, memory_map) as page:
         own = {name: typical(page, memory_map, name, 5) for name in ("set_point", "position", "error", "power")}
-        still = {name: typical(page, memory_map, name, 5) for name in (*GAINS, *SIGNALS)}
+        names = (*(GAINS if memory_map.has_gains else ()), *(SIGNALS if memory_map.has_process else ()))
+        still = {name: typical(page, memory_map, name, 5) for name in names}
     with connected(bench) as controller:
         told = controller.errors_positions_powers()
-        gains, process = controller.gains(), controller.process()
+        gains = controller.gains()
+        process = _process(controller)
+    for what, there, wanted in (
+        ("gains", bool(gains), memory_map.has_gains),
+        ("process signals", process is not None, memory_map.has_process),
+    ):
+        if there != wanted:  # a place that the arm's map leaves out must not be written by the bridge either
+            raise NotCommissionedError(f"the bridge {'has' if there else 'lacks'} {what}, unlike {MAP}. {give_it}")
     far = [
         f"{name.replace('_', ' ')} {joint}"
         for name, values in own.items()
@@ -116,18 +135,31 @@ def bridge(bench: Bench) -> dict[str, Any]:
     ]
     far += [
         f"{name.replace('_', ' ')} {joint}"
-        for index, name in enumerate(GAINS)
+        for index, name in enumerate(GAINS if gains else ())
         for joint, value in still[name].items()
         if gains[joint][index] != value
     ]
-    signals = (process.inputs, process.outputs)
-    far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
+    if process is not None:
+        signals = (process.inputs, process.outputs)
+        far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
     if far:
         raise NotCommissionedError(
-            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. "
-            "Give it this one (a mock: --memory-map; a board: docs/hardware.md), then run `daq commission` again"
+            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. {give_it}"
         )
     return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
+
+
+def _process(controller: Controller) -> Process | None:
+    """The process signals; None where the bridge's memory map leaves out their registers."""
+    from daq.link import RequestRefusedError
+    from firmware_protocol.codes import Refusal
+
+    try:
+        return controller.process()
+    except RequestRefusedError as error:
+        if error.reason != Refusal.NOT_CAPABLE:
+            raise
+        return None
 
 
 def _page(bench: Bench) -> Any:

@@ -22,6 +22,8 @@ class Record:
     steps: dict[str, dict[str, Any]] = field(default_factory=dict)
     stop_pressed: bool = False
     """Whether the emergency stop was pressed and not yet released safely."""
+    operator: str = ""
+    """Who commissions the arm."""
     identity: dict[str, Any] = field(default_factory=dict)
     """What identifies the arm that the results belong to (`daq.commissioning.identity`)."""
 
@@ -38,7 +40,8 @@ class Record:
         identity = data.get("identity", {})
         if not isinstance(identity, dict):
             raise SpecError(f"{path}: identity: must be a table")
-        return Record(folder, steps, data.get("stop_pressed", False) is not False, identity)
+        operator = str(data.get("operator", ""))
+        return Record(folder, steps, data.get("stop_pressed", False) is not False, operator, identity)
 
     @property
     def done(self) -> dict[str, dict[str, Any]]:
@@ -80,6 +83,7 @@ class Record:
         from daq.config.toml_text import tables_text
         from daq_cli.app.output_file import replacing
 
-        data = {"version": 1, "stop_pressed": self.stop_pressed, "identity": self.identity, "step": self.steps}
+        data = {"version": 1, "stop_pressed": self.stop_pressed, "operator": self.operator}
+        data |= {"identity": self.identity, "step": self.steps}
         with replacing(self.folder / FILE) as part:
             part.write_text(tables_text(data), "utf-8")

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq_cli.commands.commission.bench import FINDINGS
+from daq_cli.commands.commission.addresses import address_blocks
+from daq_cli.commands.commission.bench import FINDINGS, MAP
 from daq_cli.commands.commission.record import FILE, Record
 from daq_cli.commands.commission.steps import STEPS
+from firmware_protocol.memory_map import JOINTS
 
 if TYPE_CHECKING:
     from model.reports.page import Block, Report
@@ -24,8 +27,36 @@ INTERVALS = ("range_deg", "at_zero_deg", "bend_percent")
 """Values with half the width of their interval."""
 UNITS = {"_deg": "°", "_percent": "%", "_ms": "ms"}
 """Ends of names that are units."""
+LABELS = {
+    "positions": "positions by the bridge's memory map (ADC counts, joints 1 to 6)",
+    "frozen": "set points held by the stop (posture units, joints 1 to 6)",
+    "confirmed_ms": "time from the request to the board's confirmation (ms)",
+    "power": "power while pushed (DAC counts)",
+    "error_counts": "error (ADC counts)",
+    "moved_counts": "moved by itself within a second (ADC counts)",
+    "error_in_floors": "error (multiples of the noise floor)",
+    "beyond_the_reading": "the joint goes on where the reading ends (lower, upper end)",
+    "readings": "readings there (ADC counts)",
+    "volts_per_rad": "gain (V/rad)",
+    "standard_error": "its standard error (V/rad)",
+    "dac_counts_per_adc_count": "gain (DAC counts per ADC count)",
+    "lowest": "lowest that agrees",
+    "highest": "highest that agrees",
+    "p": "gain P",
+    "different_errors": "number of different errors",
+    "absent": "left out of the memory map",
+    "set_points_taken_late": "set points taken a period late, or not at all",
+    "missing": "missing samples",
+    "found": "registers found",
+    "assumed": "registers assumed",
+    "drive_signs": "signs of the drives (1: towards the set point)",
+    "to_be_run_next": "experiment that would tell most next",
+}
+"""Names of the record that need more words, or units."""
 DRAWN = ("counts", "angles_deg", "residuals_deg")
 """What a picture shows, of potentiometers."""
+MEASURED = {"potentiometers": "sensors", "end_stops": "end stops", "gain": "gain"}
+"""Steps that measure joints one by one, and what they measure."""
 RAMPS = ("first_ramp", "ramp")
 """Steps that show their record."""
 COLUMNS, CELL = 16, 30
@@ -70,7 +101,7 @@ def write_sheet(record: Record) -> Path:
 
 def acceptance_sheet(record: Record) -> Report:
     """The page of everything that is done, and what is open."""
-    from model.reports.page import Report, Section
+    from model.reports.page import Cell, Report, Section, Table
 
     sections = tuple(
         Section(step.title, tuple(_blocks(record, step.name, step.does))) for step in STEPS if step.name in record.steps
@@ -78,8 +109,23 @@ def acceptance_sheet(record: Record) -> Report:
     facts = (
         ("folder", record.folder.absolute().name),
         ("port", str(record.steps.get("line", {}).get("port", "not known"))),
+        ("operator", record.operator or "not named: set `operator` in daq.toml"),
+        ("software", f"ma2000-daq {version('ma2000-daq')}"),
+        ("not measured", _not_measured(record)),
     )
-    return Report("Acceptance sheet", _answer(record), facts, sections, errors="Intervals hold 95 %.")
+    signed = Section("Accepted", (Table(("name", "date", "signature"), ((Cell("\u2003"), Cell(""), Cell("")),)),))
+    return Report("Acceptance sheet", _answer(record), facts, (*sections, signed), errors="Intervals hold 95 %.")
+
+
+def _not_measured(record: Record) -> str:
+    """The joints that no step has measured, by what was not."""
+    parts = []
+    for name, what in MEASURED.items():
+        done = record.done.get(name, {})
+        joints = [str(joint) for joint in range(1, JOINTS + 1) if f"joint_{joint}" not in done]
+        if joints:
+            parts.append(f"{what} of joints {', '.join(joints)}")
+    return "; ".join(parts) or "nothing"
 
 
 def _answer(record: Record) -> str:
@@ -101,7 +147,8 @@ def _blocks(record: Record, name: str, does: str) -> list[Block]:
     result = record.steps[name]
     when = _when(str(result["done"]))
     if name in record.left_out:
-        return [Text(f"Left out on {when}: {result.get('reason', NO_REASON)}.", "warning")]
+        left_out: list[Block] = [Text(f"Left out on {when}: {result.get('reason', NO_REASON)}.", "warning")]
+        return left_out + (_pictures(record, name, result) if name == "memory" else [])
     if "trace" in result:
         result = result | {"trace": _beside(record.folder, str(result["trace"]))}
     return [Text(f"{does} Done on {when}.", "quiet"), *_pictures(record, name, result), *_tables(result)]
@@ -144,6 +191,8 @@ def _tables(result: dict[str, Any]) -> list[Block]:
 def _words(name: str) -> str:
     """A name of the record as people write it."""
     name = name.strip()
+    if name in LABELS:
+        return LABELS[name]
     for suffix, unit in UNITS.items():
         if name.endswith(suffix):
             return f"{name.removesuffix(suffix).replace('_', ' ')} ({unit})"
@@ -166,10 +215,10 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
 
     if name == "memory" and (record.folder / FINDINGS).exists():
         try:
-            picture = memory_picture(json.loads((record.folder / FINDINGS).read_text("utf-8")))
+            found = json.loads((record.folder / FINDINGS).read_text("utf-8"))
+            return [Picture(memory_picture(found), LEGEND), *address_blocks(found, record.folder / MAP)]
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise SpecError(f"{record.folder / FINDINGS}: damaged ({type(error).__name__}): move it away") from error
-        return [Picture(picture, LEGEND)]
     sensors = {key: value for key, value in result.items() if key.startswith("joint_") and isinstance(value, dict)}
     if name == "potentiometers" and sensors:
         for joint, sensor in sensors.items():
@@ -246,16 +295,16 @@ def _ramp_picture(path: Path) -> str:
     moved = trace.joints if trace.record.spec is None else trace.record.spec.joints
 
     def draw(figure: Any) -> None:
-        axes = figure.subplots()
-        for number, joint in enumerate(moved):
+        panels = figure.subplots(1, len(moved), sharey=True, squeeze=False)[0]  # one a joint: joints move alike
+        for number, (axes, joint) in enumerate(zip(panels, moved, strict=True)):
             column = trace.column(joint)
             begin = trace.position[0, column]
             if trace.set_point is not None:
                 axes.plot(trace.time, np.rad2deg(trace.set_point[:, column] - begin), color="0.6")
             colour = COLOURS[number % len(COLOURS)]
-            axes.plot(trace.time, np.rad2deg(trace.position[:, column] - begin), color=colour, label=f"joint {joint}")
-        axes.set_xlabel("time, s")
-        axes.set_ylabel("from the start, degrees")
-        axes.legend()
+            axes.plot(trace.time, np.rad2deg(trace.position[:, column] - begin), color=colour)
+            axes.set_title(f"joint {joint}")
+            axes.set_xlabel("time, s")
+        panels[0].set_ylabel("from the start, degrees")
 
     return drawn(draw, 2.6)

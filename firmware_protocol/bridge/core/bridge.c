@@ -53,6 +53,7 @@ static void read_block(const uint8_t *payload)
     }
 }
 
+#if HAS_GAINS
 static void report_gains(void)
 {
     for (uint8_t joint = 0; joint < JOINTS; ++joint) {
@@ -61,6 +62,7 @@ static void report_gains(void)
         }
     }
 }
+#endif
 
 static void report_errors_positions_powers(uint8_t mask)
 {
@@ -74,12 +76,14 @@ static void report_errors_positions_powers(uint8_t mask)
     }
 }
 
+#if HAS_PROCESS
 static void read_process(void)
 {
     reply_u8(read_inputs());
     reply_u8(read_outputs());
     reply_u8(read_gripper());
 }
+#endif
 
 static void reply_tick_and_status(void)
 {
@@ -147,17 +151,21 @@ static void obey(const struct frame *frame)
     case WRITE_BLOCK:
         write_block(values, (uint8_t)(frame->length - STAMP_BYTES - 2u));
         break;
+#if HAS_GAINS
     case SET_GAINS:
         for (uint8_t gain = 0; gain < GAINS; ++gain) {
             write_gain((uint8_t)(values[0] - 1u), gain, values[1u + gain]);
         }
         break;
+#endif
+#if HAS_PROCESS
     case WRITE_OUTPUTS:
         write_outputs((uint8_t)((read_outputs() & (uint8_t)~values[0]) | (values[1] & values[0])));
         break;
     case SET_GRIPPER:
         write_gripper(values[0]);
         break;
+#endif
     default: /* RELEASE is done */
         break;
     }
@@ -181,15 +189,19 @@ static void carry_out(const struct frame *frame)
     case READ_BLOCK:
         read_block(frame->payload);
         break;
+#if HAS_GAINS
     case REPORT_GAINS:
         report_gains();
         break;
+#endif
     case REPORT_ERRORS_POSITIONS_POWERS:
         report_errors_positions_powers(frame->payload[0]);
         break;
+#if HAS_PROCESS
     case READ_PROCESS:
         read_process();
         break;
+#endif
     case READ_STATUS:
         read_status();
         break;

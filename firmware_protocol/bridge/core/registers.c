@@ -1,7 +1,6 @@
 #include "registers.h"
 
 #include "core.h"
-#include "memory_map.h"
 #include "numbers.h"
 
 #define MASK_OF(bits) ((uint16_t)((1ul << (bits)) - 1u))
@@ -16,7 +15,9 @@ static const uint8_t error_low[JOINTS] = ERROR_LOW;
 static const uint8_t error_high[JOINTS] = ERROR_HIGH;
 #endif
 static const uint8_t power_low[JOINTS] = POWER_LOW;
+#if HAS_GAINS
 static const uint8_t gain_low[GAINS][JOINTS] = {GAIN_P_LOW, GAIN_I_LOW, GAIN_D_LOW};
+#endif
 
 /* Registers are given as distances from the beginning of the shared memory. */
 static uint8_t read_at(uint8_t distance)
@@ -115,6 +116,7 @@ bool all_zero(const uint16_t counts[JOINTS])
     return any == 0;
 }
 
+#if HAS_GAINS
 uint8_t read_gain(uint8_t joint, uint8_t gain)
 {
     return read_at(gain_low[gain][joint]);
@@ -124,7 +126,9 @@ void write_gain(uint8_t joint, uint8_t gain, uint8_t value)
 {
     write_at(gain_low[gain][joint], value);
 }
+#endif
 
+#if HAS_PROCESS
 uint8_t read_inputs(void)
 {
     return read_at(PROCESS_INPUTS_LOW);
@@ -149,6 +153,7 @@ void write_gripper(uint8_t closed)
 {
     write_at(GRIPPER_LOW, closed);
 }
+#endif
 
 bool block_is_inside(uint16_t address, uint8_t count)
 {

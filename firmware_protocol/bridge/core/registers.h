@@ -5,7 +5,20 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "memory_map.h"
 #include "protocol.h"
+
+/* A memory map may leave out the gains, and registers of process signals and gripper: nobody knows then where they are. */
+#ifdef GAIN_P_LOW
+#define HAS_GAINS 1
+#else
+#define HAS_GAINS 0
+#endif
+#if defined(PROCESS_INPUTS_LOW) && defined(PROCESS_OUTPUTS_LOW) && defined(GRIPPER_LOW)
+#define HAS_PROCESS 1
+#else
+#define HAS_PROCESS 0
+#endif
 
 /* Whether a mask has the bit of a joint. */
 bool has_joint(uint8_t mask, uint8_t joint);
@@ -39,6 +52,7 @@ bool read_positions(uint16_t counts[JOINTS]);
 /* Whether no position is other than 0: the memory of a board without supply. */
 bool all_zero(const uint16_t counts[JOINTS]);
 
+/* Only of a memory map that has them. */
 uint8_t read_gain(uint8_t joint, uint8_t gain);
 void write_gain(uint8_t joint, uint8_t gain, uint8_t value);
 

@@ -54,6 +54,22 @@ static uint8_t length_of(uint8_t opcode)
     }
 }
 
+/* Whether the memory map has what a request is about. */
+static bool map_has(uint8_t opcode)
+{
+    switch (opcode) {
+    case REPORT_GAINS:
+    case SET_GAINS:
+        return HAS_GAINS;
+    case READ_PROCESS:
+    case WRITE_OUTPUTS:
+    case SET_GRIPPER:
+        return HAS_PROCESS;
+    default:
+        return true;
+    }
+}
+
 static bool mask_is_wrong(uint8_t mask)
 {
     return mask == 0 || mask > ALL_JOINTS;
@@ -125,7 +141,7 @@ enum refusal fault_of(const struct frame *frame, bool can_sample)
     if (length == NOT_A_REQUEST) {
         return UNKNOWN_OPCODE;
     }
-    if (frame->opcode == ADVANCE || (frame->opcode == SAMPLE && !can_sample)) {
+    if (frame->opcode == ADVANCE || (frame->opcode == SAMPLE && !can_sample) || !map_has(frame->opcode)) {
         return NOT_CAPABLE;
     }
     if (length != LENGTH_VARIES && frame->length != length) {

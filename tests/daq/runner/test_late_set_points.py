@@ -1,0 +1,30 @@
+"""Set points that the computer sends late are told: the controller has then worked with the one before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from daq.contracts.trace import LATE_SET_POINTS
+from daq.traces.verify import verify
+from tests.daq.runner.rig import rig
+
+
+def warnings(path: Path) -> list[str]:
+    return [one.message for one in verify(path).findings if one.level == "warning" and one.check == "set_points"]
+
+
+def test_a_set_point_that_was_sent_a_period_late_is_told_in_the_trace_and_by_verify(tmp_path: Path) -> None:
+    with rig(tmp_path, "seed=1") as arm:
+        in_time = arm.run()
+        clock = arm.controller.clock
+        # The computer is held up for a period, while set points change:
+        arm.ears.at_sample = {
+            len(arm.ears.rows) + 8: lambda: clock.sleep_until(clock.now() + 1.1 * arm.controller.period_s)
+        }
+        late = arm.run()
+    assert (in_time.counters[LATE_SET_POINTS], warnings(in_time.trace)) == (0, [])
+    assert late.counters[LATE_SET_POINTS] > 0
+    assert late.outcome == "complete"
+    assert f"{late.counters[LATE_SET_POINTS]:.0f} set points taken a period late" in warnings(late.trace)[0]
+    assert late.counters["missed_set_points"] == 0, "the controller has taken whatever was there"
+    assert any("taken a period late" in event.message for event in arm.ears.events if event.kind == "note")
