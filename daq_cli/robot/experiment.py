@@ -11,7 +11,6 @@ import typer
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError
-from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import print_json
 from daq_cli.robot.answers import AcquisitionFailedError
@@ -116,6 +115,8 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
 
 def print_result(finished: Finished) -> None:
     """Prints the result of a run for people."""
+    from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line  # loads numpy: not for the tab key
+
     counters = finished.counters
     why = f" — {finished.reason}" if finished.reason else ""
     print(f"{finished.outcome}: {finished.samples} samples, {finished.missing} missing{why}")

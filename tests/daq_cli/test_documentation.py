@@ -28,7 +28,7 @@ def commands() -> dict[tuple[str, ...], Any]:
     def below(words: tuple[str, ...], command: Any) -> Iterator[tuple[tuple[str, ...], Any]]:
         for name, sub in getattr(command, "commands", {}).items():
             yield from below((*words, name), sub)
-        if not getattr(command, "commands", {}):
+        if not getattr(command, "commands", {}) or command.invoke_without_command:
             yield words, command
 
     found: dict[tuple[str, ...], Any] = {}

@@ -20,8 +20,8 @@ WITHOUT = {"serve", "mock", "demo", "docs"} | {
     for group, commands in {
         "gains": "set",
         "io": "set gripper",
-        "queue": "pause resume",
-        "token": "add revoke",
+        "queue": "pause resume approve withdraw",
+        "token": "add revoke sign-out",
         "teach": "jog step program lead",
         "teach programs": "keep fetch delete",
         "teach edit": "insert move delete change rename",
