@@ -18,7 +18,17 @@ from tests.server.service import Service
 
 JSON = ("application/json", "application/problem+json")
 GUIDE = Path(__file__).parents[3].joinpath("docs", "service.md").read_text("utf-8")
-NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault", "head-too-large"}
+OF_SIGN_IN = {
+    "name-taken",
+    "no-name",
+    "no-role",
+    "provider-away",
+    "sign-in-not-proven",
+    "sign-in-refused",
+    "sign-in-unknown",
+}
+"""Told by the address to which a browser is sent back, and so in no answer of an operation."""
+NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault", "head-too-large"} | OF_SIGN_IN
 """Of the WebSocket, of addresses that are none, of what never happens, of requests whose address is not read."""
 
 
@@ -89,6 +99,9 @@ def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], se
             answer = _sent(service, operation, example["value"])
             if operation.endswith("/approval") and answer.status_code == 409:
                 assert answer.json()["type"].endswith("#no-review"), answer.text  # this robot's need none
+                continue
+            if answer.status_code == 422 and answer.json()["type"].endswith("#batch-size"):
+                assert answer.json()["detail"] == "filter: finds no trace", answer.text  # where no test made one before
                 continue
             assert answer.status_code in (200, 201, 202, 404), (operation, name, answer.text)
             if answer.status_code == 404:

@@ -143,5 +143,5 @@ def test_health_and_system_tell_how_it_is(service: Service) -> None:
     base = service.url
     assert service.client.get(f"{base}/healthz").json()["status"] == "ok"
     checks = service.client.get(f"{base}/readyz").json()["checks"]
-    assert checks == {"database": "", "room": "", "traces": "", "robot ma2000": ""}
+    assert checks == {"database": "", "room": "", "traces": "", "notifications": "", "robot ma2000": ""}
     assert service.client.get("/system").json()["storage"]["database"] == "sqlite"

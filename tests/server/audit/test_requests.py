@@ -43,7 +43,7 @@ def test_a_submission_is_in_the_log_with_what_was_asked_and_what_was_made(robot:
     made = robot.post("experiments", json=RAMP | {"priority": 7}).json()
     row = newest(robot)[0]
     assert row["action"] == "submit_experiment"
-    assert (row["actor"], row["role"], row["origin"]) == ("local", "operator", "127.0.0.1")
+    assert (row["actor"], row["role"], row["origin"]) == ("local", "owner", "127.0.0.1")
     assert row["request"] == "POST /api/v1/robots/ma2000/experiments"
     assert (row["robot"], row["subject"]) == ("ma2000", made["id"])
     assert (row["outcome"], row["status"]) == ("done", 201)
