@@ -172,7 +172,8 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
             follower.tell("note", late_set_points_line(follower.late_set_points))
         outcome = _outcome(ending, run.stop_requests.interrupted())
         counters = run.controller.link.counters_since(begun).numbers()
-        counters[LATE_SET_POINTS] = float(follower.late_set_points)
+        if follower.late_set_points is not None:
+            counters[LATE_SET_POINTS] = float(follower.late_set_points)
         path = writer.close(outcome, counters)
     return RunResult(outcome, ending.cause, path, recorder.samples, recorder.missing, counters)
 
