@@ -64,33 +64,47 @@ def line(bench: Bench) -> dict[str, Any]:
 
 
 def memory(bench: Bench) -> dict[str, Any]:
-    """The memory map, by `daq memory find`."""
-    from daq_cli.commands.memory import findings_text, keep_map, search, what_is_absent, why_no_map
+    """The memory map, by `daq memory find`. An earlier one, its findings and its record stay if this search ends
+    early."""
+    from daq_cli.commands.memory import (
+        adopt,
+        findings_text,
+        keep_map,
+        search,
+        until_complete,
+        what_is_absent,
+        why_no_map,
+    )
+
+    path, findings = bench.folder / MAP, bench.folder / FINDINGS
 
     def when_found(found: Findings) -> None:
-        if keep_map(found, bench.folder / MAP):
+        if keep_map(found, new_map) and new_map == path:
             bench.configure()
             note_memory(bench)
             bench.record.keep("memory", _memory_result(found, []))
 
     with _page(bench) as page:
+        new_map, new_findings = until_complete(path, findings, bench.operator)
         found, proofs = search(
             bench.call,
             page,
             bench.operator,
             bench.consent,
-            bench.folder / FINDINGS,
+            new_findings,
             inputs=True,
             commands=True,
             when_found=when_found,
             pressed=bench.record.note_stop,
         )
     bench.operator.show(findings_text(found, proofs))
+    complete = adopt(found, {new_map: path, new_findings: findings})
     bench.configure()
-    if found.memory_map("") is None:
+    if not complete:
         raise NotCommissionedError(f"{why_no_map(found, bench.folder / MAP)}; then go on with --skip memory")
     if absent := what_is_absent(found, bench.folder / MAP):
         bench.operator.show(absent)
+    note_memory(bench)
     return _memory_result(found, proofs)
 
 
