@@ -10,6 +10,9 @@ JUMP_WITHIN = 16
 """Largest positional error (ADC counts) at which gains are written: an assumption. A limp joint that becomes stiff
 jumps by its whole error, here by 1° at most on joints 1 to 3. The static error of a held joint is smaller."""
 
+GAINS_UNKNOWN = "gains unknown (the memory map leaves them out): a limp joint cannot be seen"
+"""What is told in place of limp joints where no gains can be read."""
+
 
 def limp_joints(gains: Mapping[int, tuple[int, int, int]]) -> list[int]:
     """Joints whose proportional gain is 0."""
@@ -22,8 +25,14 @@ def limp_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
     return f"JOINTS {', '.join(map(str, limp))} ARE LIMP (gain P is 0): nothing holds them" if limp else ""
 
 
+def doubts_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
+    """Why the arm may not hold its posture: its limp joints, or that no gains can be read; empty where it does."""
+    return limp_line(gains) if gains else GAINS_UNKNOWN
+
+
 def require_drive(gains: Mapping[int, tuple[int, int, int]]) -> None:
-    """Raises SafetyError when a joint is limp: neither keys nor programs may move such an arm."""
+    """Raises SafetyError when a joint is seen to be limp: neither keys nor programs may move such an arm. Without gains
+    none is seen."""
     line = limp_line(gains)
     if line:
         raise SafetyError(f"{line}; hold the arm, `daq reset --here`, then `daq gains set` them; nothing moved")

@@ -53,7 +53,8 @@ EventKind = Literal[
 SLOW_LINE = "slow line: "
 """Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
 LATE_SET_POINTS = "late_set_points"
-"""Counter of the control periods that used an older set point than the one that was sent for them."""
+"""Counter of the control periods that used an older set point than the one that was sent for them. A record lacks it
+where that is not known."""
 
 
 def late_set_points_line(count: float) -> str:

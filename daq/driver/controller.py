@@ -99,6 +99,9 @@ class Controller:
     """One motor controller. Every method may raise LinkError (LinkTimeoutError, LinkLostError), RequestRefusedError.
 
     `stop` may be called from any thread at any moment; everything else from one thread at a time.
+
+    Where `memory_map` leaves out gains, or process signals and gripper, no request for them is sent: a bridge that
+    works by another map would carry it out at places of which nothing is known.
     """
 
     def __init__(self, link: Link, memory_map: MemoryMap | None = None, clock: Clock | None = None) -> None:
@@ -217,7 +220,9 @@ class Controller:
         self.link.request(Release(named), Released)
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
-        """Joint → (P, I, D), each 0–20; empty where the bridge's memory map has no gains."""
+        """Joint → (P, I, D), each 0–20; empty where the memory map, the bridge's or the own one, has no gains."""
+        if not self.memory_map.has_gains:
+            return {}
         try:
             return dict(zip(self.joints, self.link.request(ReportGains(), Gains).gains, strict=True))
         except RequestRefusedError as error:
@@ -226,7 +231,9 @@ class Controller:
             return {}
 
     def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
-        """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20."""
+        """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20,
+        RequestRefusedError where the memory map has no gains."""
+        _require_mapped("SetGains", self.memory_map.has_gains)
         self.link.request(SetGains(joint, p, i, d), GainsSet)
         read = self.gains()[joint]
         if read != (p, i, d):
@@ -238,15 +245,19 @@ class Controller:
         return dict(reply.joints)
 
     def process(self) -> Process:
-        """Process inputs and outputs (bit fields) and gripper."""
+        """Process inputs and outputs (bit fields) and gripper. Raises RequestRefusedError where the memory map has
+        none; `write_outputs` and `set_gripper` as well."""
+        _require_mapped("ReadProcess", self.memory_map.has_process)
         return self.link.request(ReadProcess(), Process)
 
     def write_outputs(self, mask: int, values: int) -> None:
         """Process outputs in `mask` take the bits of `values`."""
+        _require_mapped("WriteOutputs", self.memory_map.has_process)
         self.link.request(WriteOutputs(mask, values), OutputsWritten)
 
     def set_gripper(self, *, closed: bool) -> None:
         """Closes or opens the gripper."""
+        _require_mapped("SetGripper", self.memory_map.has_process)
         self.link.request(SetGripper(int(closed)), GripperSet)
 
     def status(self) -> ControllerStatus:
@@ -305,3 +316,10 @@ class Controller:
         if Capability.SAMPLE in self.identity.capabilities:
             return RingSampling(deliveries, self.line_rate)
         return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))
+
+
+def _require_mapped(request: str, has_registers: bool) -> None:
+    """Raises RequestRefusedError where the host's own memory map leaves out the registers that `request` is about."""
+    if not has_registers:
+        why = "the memory map leaves out the registers for it (docs/commissioning.md), so it was not sent"
+        raise RequestRefusedError(request, Refusal.NOT_CAPABLE, why)

@@ -14,6 +14,7 @@ from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.labels import Outcome
 from daq.contracts.limits import Limits
+from daq.contracts.limp import GAINS_UNKNOWN
 from daq.contracts.machine import Machine
 from daq.contracts.trace import LATE_SET_POINTS, SLOW_LINE, TraceRecord, late_set_points_line
 from daq.driver import Controller, GainsNotTakenError
@@ -158,6 +159,8 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
     with writer, run.control.frozen_on_error():
         for change in changes:
             follower.tell("gains", change.message)
+        if record.gains is None:
+            follower.tell("note", GAINS_UNKNOWN)
         if rate.every > run.controller.link.scale.every:
             follower.tell("note", f"{SLOW_LINE}{rate.in_words}")
         ending = follower.follow(prepared.motion, _progress(run.listener, prepared.motion))
@@ -172,7 +175,8 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
             follower.tell("note", late_set_points_line(follower.late_set_points))
         outcome = _outcome(ending, run.stop_requests.interrupted())
         counters = run.controller.link.counters_since(begun).numbers()
-        counters[LATE_SET_POINTS] = float(follower.late_set_points)
+        if follower.late_set_points is not None:
+            counters[LATE_SET_POINTS] = float(follower.late_set_points)
         path = writer.close(outcome, counters)
     return RunResult(outcome, ending.cause, path, recorder.samples, recorder.missing, counters)
 

@@ -80,9 +80,11 @@ class Follower:
         self._lag = Lag(controller.period_s, every)
         self._retries = controller.counters.retries
         self.last: SampleRow | None = None
-        self.late_set_points = 0
+        known = every == 1 and Capability.SAMPLE in controller.identity.capabilities
+        self.late_set_points: int | None = 0 if known else None
         """Periods in which the controller worked with an older set point than the one that was sent for them, because
-        it was sent late; a plan that is played so is deformed by a period there."""
+        it was sent late; a plan that is played so is deformed by a period there. None where it is not known: only where
+        each period has a sample, made by the bridge, is it seen what each period worked with."""
 
     def arrive(self, joints: tuple[int, ...], within_counts: float, periods: int) -> Ending:
         """Waits until `joints` are at their set points, at most so many periods; a joint that is not by then trips."""
@@ -180,10 +182,9 @@ class Follower:
                 return Ending("finished")
 
     def _count_late(self, snapshot: BoardSnapshot, before: SampleRow | None, sent: dict[int, int]) -> None:
-        """Counts a period that did not use what was sent for it. Known only where each period has a sample, made by the
-        bridge; a set point that the controller has missed is counted as missed. The first one may come at any time."""
-        known = self._every == 1 and Capability.SAMPLE in self._controller.identity.capabilities
-        if known and before is not None and not snapshot.set_points_missed:
+        """Counts a period that did not use what was sent for it, where that is known; a set point that the controller
+        has missed is counted as missed. The first one may come at any time."""
+        if self.late_set_points is not None and before is not None and not snapshot.set_points_missed:
             self.late_set_points += any(snapshot[joint].set_point != posture for joint, posture in sent.items())
 
     def _tick_after(self, periods: int) -> int | None:

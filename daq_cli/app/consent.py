@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
 from daq.contracts.consent import Identity, lacks_consent
 from daq.contracts.errors import SafetyError
+from daq.contracts.limp import GAINS_UNKNOWN
 from daq_cli.app.context import console
+
+if TYPE_CHECKING:
+    from firmware_protocol.memory_map import MemoryMap
 
 T = TypeVar("T")
 
@@ -33,6 +37,10 @@ class ConsentPrompt:
     given: bool
     what: str = "it will move"
     refused: str = "it moves"
+
+    def for_gains_of(self, memory_map: MemoryMap) -> ConsentPrompt:
+        """The same, which says where this memory map lets no limp joint be seen."""
+        return self if memory_map.has_gains else replace(self, what=f"{self.what}; {GAINS_UNKNOWN}")
 
     def agreed(self, url: str) -> bool:
         """Asks the person at this terminal; returns False if nobody can be asked."""

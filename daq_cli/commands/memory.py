@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -99,18 +99,19 @@ def find(
             memory_map = load_memory_map(known)
             release_after_interruption(call.port, operator, memory_map, output.exists(), record.note_stop)
         with _page(call) as page:
+            new_map, new_findings = until_complete(output, findings, operator)
             found, proofs = search(
                 call,
                 page,
                 operator,
                 ConsentPrompt(yes),
-                findings,
+                new_findings,
                 inputs=inputs,
                 commands=commands,
-                when_found=lambda found: keep_map(found, output),
+                when_found=lambda found: keep_map(found, new_map),
                 pressed=record.note_stop,
             )
-    written = found.memory_map("") is not None
+    written = adopt(found, {new_map: output, new_findings: findings})
     if json:
         print_json(
             findings_data(found, proofs)
@@ -118,7 +119,7 @@ def find(
         )
         return
     print(findings_text(found, proofs))
-    print(f"findings: {findings}")
+    print(f"findings: {findings if written else new_findings}")
     print(f"memory map: {output}" if written else why_no_map(found, output))
     if written and (absent := what_is_absent(found, output)):
         print(absent)
@@ -227,6 +228,35 @@ def keep_map(found: Findings, path: Path) -> bool:
         remarks.append(f"Left out, because they have no place: {', '.join(absent)}. Nothing reads or writes them.")
     with replacing(path) as part:
         part.write_text(memory_map_text(memory_map, remarks), "utf-8")
+    return True
+
+
+def until_complete(path: Path, findings: Path, operator: Operator) -> tuple[Path, Path]:
+    """Where a search writes its map and findings: there at once where there is no map yet, so that nothing is lost;
+    beside them where an earlier search has left one, which stays if this one ends early. Then the person is told."""
+    if not path.exists():
+        return path, findings
+    new_map, new_findings = (one.with_name(f"{one.stem}.new{one.suffix}") for one in (path, findings))
+    operator.show(
+        f"{path.name} and {findings.name} stay as they are until this search is complete. If it ends early, what it "
+        f"has found is in {new_map.name} and {new_findings.name}: saved under the names of the others, they count."
+    )
+    for one in (new_map, begun_map(new_map), new_findings):
+        one.unlink(missing_ok=True)  # of an earlier search that has ended early
+    return new_map, new_findings
+
+
+def adopt(found: Findings, files: Mapping[Path, Path]) -> bool:
+    """Has what a complete search has written in place of the earlier result; `files` has the new file → the name under
+    which it counts. Returns whether there is a memory map; without one the earlier result stays."""
+    new_map, path = next(iter(files.items()))
+    if found.memory_map("") is None:
+        keep_map(found, path)  # writes the map to be completed, alone
+        return False
+    for new, one in files.items():
+        new.replace(one)
+    if begun_map(new_map).exists():
+        begun_map(new_map).replace(begun_map(path))
     return True
 
 

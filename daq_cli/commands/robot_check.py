@@ -126,6 +126,8 @@ def _refusals(controller: Controller) -> Iterator[Checked]:
 
 
 def _settings(controller: Controller) -> Iterator[Checked]:
+    from daq.link import RequestRefusedError
+    from firmware_protocol.commands import Refusal
     from firmware_protocol.units import GAIN_MAX
 
     if gains := controller.gains():
@@ -133,7 +135,12 @@ def _settings(controller: Controller) -> Iterator[Checked]:
         yield Checked(f"has gains from 0 to {GAIN_MAX}", not above, "; ".join(f"{j}: {g}" for j, g in gains.items()))
     if not controller.memory_map.has_process:
         return
-    process = controller.process()
+    try:
+        process = controller.process()
+    except RequestRefusedError as error:
+        if error.reason != Refusal.NOT_CAPABLE:
+            raise
+        return  # the bridge's own map leaves them out
     yield Checked("reports inputs, outputs and gripper", process.gripper in (0, 1), f"{process}")
 
 

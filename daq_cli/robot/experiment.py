@@ -121,7 +121,10 @@ def print_result(finished: Finished) -> None:
     why = f" — {finished.reason}" if finished.reason else ""
     print(f"{finished.outcome}: {finished.samples} samples, {finished.missing} missing{why}")
     shown = ("retries", "damaged", "torn", "missed_set_points", "restarts")
-    if late := counters.get(LATE_SET_POINTS, 0.0):
+    late = counters.get(LATE_SET_POINTS)
+    if late is None:
+        print("set points taken a period late: not known, for not every period has a sample of the bridge's making")
+    elif late:
         print(late_set_points_line(late))
     print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in shown))
     print(f"trace: {finished.trace}")

@@ -75,7 +75,7 @@ class LocalRobot:
 
     def state(self) -> RobotState:
         """The state that the board reports now."""
-        from daq.contracts.limp import limp_joints
+        from daq.contracts.limp import GAINS_UNKNOWN, limp_joints
 
         machine = self.machine
         with self._connected() as controller:
@@ -88,6 +88,8 @@ class LocalRobot:
         kind = "mock" if controller.identity.simulated else "REAL ARM"
         missed = f"{board.missed} set points missed since power-up"
         told = f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}"
+        if not gains:
+            told += f"; {GAINS_UNKNOWN}"
         if unsure:
             told += "; the gains' addresses are assumed: joints may be called limp wrongly"
         return RobotState(report, told, gains)
@@ -163,7 +165,7 @@ class LocalRobot:
 
     def reset(self, *, adopt_posture: bool) -> ResetDone:
         """Ends the stop that the board is in. Raises NotFrozenError."""
-        from daq.contracts.limp import limp_line
+        from daq.contracts.limp import doubts_line
         from firmware_protocol.commands import StatusFlag
 
         with self._connected() as controller:
@@ -177,7 +179,7 @@ class LocalRobot:
                     raise NotFrozenError(f"reset --here: {stopped.problem}; the set points are not known to be here")
                 stop = controller.status().stop
             controller.release(stop)
-            limp = limp_line(controller.gains())
+            limp = doubts_line(controller.gains())
         if not frozen and not adopt_posture:
             return ResetDone("was not stopped", limp)
         holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"

@@ -30,6 +30,7 @@ def acquire_locally(
     Raises AcquisitionFailedError if there is no trace, SpecError for a folder or a port that is not valid.
     """
     from daq.acquisition.messages import Finished, Job
+    from daq.config.robot_files import load_memory_map
     from daq.transport import parse_port_url
 
     if not str(folder).isprintable():
@@ -53,7 +54,8 @@ def acquire_locally(
         kind = _NoConsentError if end.needs_consent else AcquisitionFailedError
         raise kind(end.message, end.exit_code)
 
-    return consent.attempt(call.port, attempt, _NoConsentError)
+    memory_map = load_memory_map(call.settings.robot.memory_map)
+    return consent.for_gains_of(memory_map).attempt(call.port, attempt, _NoConsentError)
 
 
 def _run(job: Job) -> Finished | Failed:

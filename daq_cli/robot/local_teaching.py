@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from daq.contracts.errors import SafetyError, SpecError
-from daq.contracts.limp import require_drive
+from daq.contracts.limp import GAINS_UNKNOWN, require_drive
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.app.keyboard import open_keyboard
@@ -112,9 +112,12 @@ class LocalTeaching:
             def hold(moves_real_arm: bool) -> OwnedRobot:
                 return held.enter_context(owned_robot(robot, self.call.port, memory_map, Consent(moves_real_arm)))
 
-            owned = self.consent.attempt(self.call.port, hold, MissingConsentError)
+            owned = self.consent.for_gains_of(memory_map).attempt(self.call.port, hold, MissingConsentError)
             try:
-                require_drive(owned.controller.gains())
+                gains = owned.controller.gains()
+                require_drive(gains)
+                if not gains:
+                    console().print(GAINS_UNKNOWN)
                 prepared = prepare(owned)
             except (SafetyError, SpecError):
                 held.close()  # without the error, which would freeze the arm

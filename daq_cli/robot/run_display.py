@@ -33,9 +33,10 @@ class RunDisplay:
         """Shows an event of the trace; `time` is in s from the start of the record."""
         from rich.markup import escape
 
+        from daq.contracts.limp import GAINS_UNKNOWN
         from daq.contracts.trace import SLOW_LINE
 
-        if kind not in self._quiet or message.startswith(SLOW_LINE):
+        if kind not in self._quiet or message.startswith((SLOW_LINE, GAINS_UNKNOWN)):
             line = escape(f"{kind.replace('_', ' ')}: {message}")
             self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True, markup=True)
 

@@ -6,7 +6,7 @@ import time
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
-from daq.contracts.limp import limp_line, require_no_jump
+from daq.contracts.limp import doubts_line, require_no_jump
 from daq.link import RequestRefusedError
 from daq.runner import StoppedError
 from daq.safety import Event, State
@@ -132,7 +132,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     if (cause := robot.end_cause()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")
-    limp = limp_line(robot.read_gains())
+    limp = doubts_line(robot.read_gains())
     holds = "the arm takes set points again" if limp else "the arm holds its posture and takes set points again"
     return (
         f"released: {holds}"

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 import pytest
 import typer
@@ -15,9 +16,13 @@ import typer
 from daq.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
 from daq.commissioning.potentiometer import Interval, Potentiometer
 from daq.config.robot_files import load_memory_map
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.machine import BoardPid, load_machine, parse_machine
+from daq_cli.app.consent import ConsentPrompt
+from daq_cli.app.context import Invocation
 from daq_cli.commands.commission.addresses import addresses_of
+from daq_cli.commands.commission.bench import Bench, Commissioner
+from daq_cli.commands.commission.by_hand import potentiometers
 from daq_cli.commands.commission.machine_text import machine_file_text, with_controller, with_limits, with_sensors
 from daq_cli.commands.commission.periods import Periods
 from daq_cli.commands.commission.record import Record
@@ -343,6 +348,17 @@ def test_a_step_that_fails_leaves_the_results_that_there_were(daq: CommandLine, 
     record.keep("model", {"verdict": "kept", "basis": {"machine": "none"}})
     assert daq("--port", MOCK, "commission", "--folder", tmp_path, "--only", "model").code != 0
     assert Record.of(tmp_path).steps["model"]["verdict"] == "kept"
+
+
+def test_the_machine_file_stays_where_the_power_is_not_given_back_safely(tmp_path: Path) -> None:
+    hand = Hand(times=1)  # presses the emergency stop, and does not switch the controller off and on
+    call = Invocation(port_option=MOCK)
+    bench = Bench(call, tmp_path, cast("Commissioner", hand), ConsentPrompt(True), Record.of(tmp_path), joints=())
+    with pytest.raises(SafetyError, match="was not switched off and on"):
+        potentiometers(bench)
+    assert hand.tasks == ["press_emergency_stop", "switch_off_and_on"]
+    assert not (tmp_path / "machine.toml").exists()
+    assert Record.of(tmp_path).stop_pressed
 
 
 def test_a_map_with_question_marks_is_refused_with_their_lines_before_anything_is_recorded(

@@ -144,14 +144,14 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
     robot = robot_access(bench.configured)
     spec = ExperimentSpec(name="commission-ramp", joints=joints)
     done = acquire_complete(robot, spec, robot.machine, robot.call.trace_folder, bench.consent)
-    late = round(done.counters.get(LATE_SET_POINTS, 0.0))
+    late = done.counters.get(LATE_SET_POINTS)
     if late:
         bench.operator.show(late_set_points_line(late))
     return {
         "trace": str(done.trace),
         "samples": done.samples,
         "missing": done.missing,
-        "set_points_taken_late": late,
+        "set_points_taken_late": "not known" if late is None else round(late),
         "outcome": done.outcome,
     }
 

@@ -42,9 +42,9 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
         for joint in bench.joints:
             sensors.append(_sensor(bench, page, memory_map, joint))
             bench.operator.show(sensor_line(sensors[-1]))
-        bench.write_machine(with_sensors(bench.machine_text(), sensors))  # not before: what there was stays if it fails
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
+    bench.write_machine(with_sensors(bench.machine_text(), sensors))  # not before: what there was stays if it fails
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
 

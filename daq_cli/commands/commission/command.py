@@ -62,11 +62,7 @@ def commission(
     record = begin_anew(folder) if arm == "new" else Record.of(folder)
     record.operator = call.configuration.operator or record.operator
     if "memory" in left_out:
-        if not (folder / MAP).exists():
-            raise SpecError(
-                f"--skip memory: {folder / MAP} is not there, and nothing may rely on an assumed memory map"
-            )
-        load_memory_map(folder / MAP)  # refused before anything is recorded
+        _require_memory_map(folder / MAP)
     with person_at(call, mock_control) as person:
         bench = Bench(call, folder, person, ConsentPrompt(yes), record, parse_joints(joints), postures)
         chosen = [step_named(only)] if only else [step for step in STEPS if step.name not in record.steps]

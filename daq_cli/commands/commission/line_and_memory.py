@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from daq.commissioning.memory.commands import CommandProof
     from daq.commissioning.memory.findings import Findings
     from daq.driver import Controller
-    from firmware_protocol.commands import Process
+    from firmware_protocol.commands import Reply, Request
+
+R = TypeVar("R", bound="Reply")
 
 ROUND_TRIPS = 200
 """Number of single bytes read to judge the line."""
@@ -62,33 +64,47 @@ def line(bench: Bench) -> dict[str, Any]:
 
 
 def memory(bench: Bench) -> dict[str, Any]:
-    """The memory map, by `daq memory find`."""
-    from daq_cli.commands.memory import findings_text, keep_map, search, what_is_absent, why_no_map
+    """The memory map, by `daq memory find`. An earlier one, its findings and its record stay if this search ends
+    early."""
+    from daq_cli.commands.memory import (
+        adopt,
+        findings_text,
+        keep_map,
+        search,
+        until_complete,
+        what_is_absent,
+        why_no_map,
+    )
+
+    path, findings = bench.folder / MAP, bench.folder / FINDINGS
 
     def when_found(found: Findings) -> None:
-        if keep_map(found, bench.folder / MAP):
+        if keep_map(found, new_map) and new_map == path:
             bench.configure()
             note_memory(bench)
             bench.record.keep("memory", _memory_result(found, []))
 
     with _page(bench) as page:
+        new_map, new_findings = until_complete(path, findings, bench.operator)
         found, proofs = search(
             bench.call,
             page,
             bench.operator,
             bench.consent,
-            bench.folder / FINDINGS,
+            new_findings,
             inputs=True,
             commands=True,
             when_found=when_found,
             pressed=bench.record.note_stop,
         )
     bench.operator.show(findings_text(found, proofs))
+    complete = adopt(found, {new_map: path, new_findings: findings})
     bench.configure()
-    if found.memory_map("") is None:
+    if not complete:
         raise NotCommissionedError(f"{why_no_map(found, bench.folder / MAP)}; then go on with --skip memory")
     if absent := what_is_absent(found, bench.folder / MAP):
         bench.operator.show(absent)
+    note_memory(bench)
     return _memory_result(found, proofs)
 
 
@@ -111,6 +127,7 @@ def _memory_result(found: Findings, proofs: Sequence[CommandProof]) -> dict[str,
 def bridge(bench: Bench) -> dict[str, Any]:
     """Whether the bridge works by the memory map that was found."""
     from daq_cli.robot.memory_page import open_page
+    from firmware_protocol.commands import Gains, Process, ReadProcess, ReportGains
 
     memory_map, give_it = bench.memory_map(), GIVE_IT.format(map=bench.folder / MAP)
     with open_page(bench.call.port, memory_map) as page:
@@ -119,8 +136,9 @@ def bridge(bench: Bench) -> dict[str, Any]:
         still = {name: typical(page, memory_map, name, 5) for name in names}
     with connected(bench) as controller:
         told = controller.errors_positions_powers()
-        gains = controller.gains()
-        process = _process(controller)
+        told_gains = _of_the_bridge(controller, ReportGains(), Gains)
+        gains = dict(enumerate(told_gains.gains if told_gains else (), start=1))
+        process = _of_the_bridge(controller, ReadProcess(), Process)
     for what, there, wanted in (
         ("gains", bool(gains), memory_map.has_gains),
         ("process signals", process is not None, memory_map.has_process),
@@ -149,13 +167,14 @@ def bridge(bench: Bench) -> dict[str, Any]:
     return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
 
 
-def _process(controller: Controller) -> Process | None:
-    """The process signals; None where the bridge's memory map leaves out their registers."""
+def _of_the_bridge(controller: Controller, request: Request, wanted: type[R]) -> R | None:
+    """What the bridge reads by its own memory map; None where that leaves out the registers. The controller would not
+    ask for what the arm's map leaves out, and whether the bridge has it all the same is the question here."""
     from daq.link import RequestRefusedError
     from firmware_protocol.codes import Refusal
 
     try:
-        return controller.process()
+        return controller.link.request(request, wanted)
     except RequestRefusedError as error:
         if error.reason != Refusal.NOT_CAPABLE:
             raise

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from daq.contracts.trace import LATE_SET_POINTS
 from daq.traces.verify import verify
 from tests.daq.runner.rig import rig
@@ -28,3 +30,13 @@ def test_a_set_point_that_was_sent_a_period_late_is_told_in_the_trace_and_by_ver
     assert f"{late.counters[LATE_SET_POINTS]:.0f} set points taken a period late" in warnings(late.trace)[0]
     assert late.counters["missed_set_points"] == 0, "the controller has taken whatever was there"
     assert any("taken a period late" in event.message for event in arm.ears.events if event.kind == "note")
+
+
+@pytest.mark.parametrize("options", ["baud=19200", "no_sample=1"])
+def test_where_not_every_period_has_a_sample_of_the_bridge_no_number_is_told(tmp_path: Path, options: str) -> None:
+    with rig(tmp_path, f"seed=1&{options}") as arm:
+        result = arm.run()
+    assert result.outcome == "complete"
+    assert LATE_SET_POINTS not in result.counters
+    assert LATE_SET_POINTS not in arm.trace(result).record.counters
+    assert warnings(result.trace) == []
