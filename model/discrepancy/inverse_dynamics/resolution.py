@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import TorqueCase
@@ -38,7 +38,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
         return False
     if any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
         return False
-    if found.stated and not any(_is_far(p, found.fit.values[p.name]) for p in found.stated):
+    if not is_far_everywhere(found.stated, found.fit.values):
         return False
     return found.effect not in OF_CHANGES or slower_evidence(found, before, case) >= case.options.least_evidence
 
@@ -74,14 +74,20 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
     return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
 
 
-def _is_far(p: Parameter, value: float) -> bool:
+def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) -> bool:
+    """Whether every joint of which the file states numbers has one that is far from that: an effect on several joints
+    names all of them. True where none are stated."""
+    joints = {p.joints for p in stated}
+    return joints == {p.joints for p in stated if is_far(p, values[p.name])}
+
+
+def is_far(p: Parameter, value: float) -> bool:
     """Whether a number is far from what the file states.
 
-    A number that cannot be negative is stated to a share of itself: twice and half as much are then equally far.
+    A number that cannot be negative is stated to a share of itself: twice and half as much are then equally far. In
+    distances no number down to zero is far from one that is stated to a quarter of itself or worse.
     """
     deviation = p.deviation or 0.0
-    if abs(value - p.value) <= FAR * deviation:
-        return False
     if p.low < 0.0 or p.value <= 0.0:
-        return True
+        return abs(value - p.value) > FAR * deviation
     return value <= 0.0 or abs(math.log(value / p.value)) > FAR * deviation / p.value

@@ -15,7 +15,9 @@ from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.inverse_dynamics.resolution import is_far, is_far_everywhere
 from model.machine_model.model import base_model
+from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.worlds.folder import write_world
 
@@ -77,6 +79,49 @@ def test_friction_within_what_the_file_states_is_no_effect(true: float) -> None:
     found = slide({"viscous": true}, machine=machine)
     assert found.verdict == "nothing-significant", found.summary
     assert found.model_after.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(true, rel=0.1)
+
+
+def stated(share: float, low: float = 0.0, joint: int = 1) -> Parameter:
+    """A friction of 10 that a file states to a share of itself."""
+    return Parameter(
+        name=f"joint{joint}.coulomb_friction.level",
+        kind=Kind.EFFECT,
+        component="coulomb_friction",
+        part="level",
+        unit="N",
+        value=10.0,
+        low=low,
+        high=1e4,
+        deviation=10.0 * share,
+        joints=(joint,),
+    )
+
+
+@pytest.mark.parametrize(("share", "factor"), [(0.1, 1.49), (0.3, 3.32), (0.5, 7.39)])
+def test_a_number_that_cannot_be_negative_is_far_by_a_factor_up_and_down(share: float, factor: float) -> None:
+    for beyond, far in ((1.02, True), (0.98, False)):
+        assert is_far(stated(share), 10.0 * factor * beyond) is far
+        assert is_far(stated(share), 10.0 / (factor * beyond)) is far
+    assert is_far(stated(share), 0.0)
+
+
+def test_a_number_that_may_be_negative_is_far_by_its_distance() -> None:
+    assert is_far(stated(0.3, low=-1e4), -2.1)
+    assert not is_far(stated(0.3, low=-1e4), -1.9)
+
+
+def test_a_group_is_far_only_where_every_joint_of_it_is() -> None:
+    own = [stated(0.3, joint=j) for j in (1, 2)]
+    first, second = (p.name for p in own)
+    assert is_far_everywhere(own, {first: 50.0, second: 50.0})
+    assert not is_far_everywhere(own, {first: 50.0, second: 11.0})
+    assert not is_far_everywhere(own, {first: 9.0, second: 11.0})
+    assert is_far_everywhere((), {})
+
+
+def test_a_joint_is_far_where_one_of_its_numbers_is() -> None:
+    own = [stated(0.3), replace(stated(0.3), name="joint1.coulomb_friction.other", part="other")]
+    assert is_far_everywhere(own, {own[0].name: 50.0, own[1].name: 10.0})
 
 
 def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> None:
