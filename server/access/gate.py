@@ -200,7 +200,7 @@ class Gate:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
             caller = await self._known(scope, token.strip())
-            if caller is None:
+            if caller is None or caller.expires is not None:  # a session's secret is good as a cookie alone
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
             return caller
