@@ -134,8 +134,8 @@ class RobotServices:
             raise ProblemError(403, "owner-needed", line, advice)
 
     def approval(self, caller: Caller, content: str) -> Given:
-        """Returns the caller's approval of some content. Raises a 403 where only owners of the robot may approve, and a
-        409 where nobody needs to."""
+        """Returns the caller's approval of some content. Raises a 403 for callers without a token, who may be the author,
+        and where only owners of the robot may approve; a 409 where nobody needs to."""
         reviewer, is_owner = self.queue.review.reviewer, caller.owns(self.owners)
         if reviewer is None:
             line = f"experiments of {self.robot.name} need no approval"
@@ -143,6 +143,9 @@ class RobotServices:
         if reviewer == "owner" and not is_owner:
             line = f"an owner of {self.robot.name} must approve its experiments, and {caller.name} is none"
             raise ProblemError(403, "owner-needed", line, "ask an owner of the robot")
+        if caller.token is None:  # they may have submitted it by their token: nobody can tell
+            line = "a user of this computer without a token cannot be told from whoever submitted the experiment"
+            raise ProblemError(403, "own-experiment", line, "approve it with a token, or sign in on the page")
         return Given(content, caller.name, is_owner)
 
     def word(self, lease: str | None, said: float) -> Word:

@@ -200,7 +200,7 @@ class Gate:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
             caller = await self._known(scope, token.strip())
-            if caller is None:
+            if caller is None or caller.expires is not None:  # a session's secret is good as a cookie alone
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
             return caller
@@ -212,8 +212,9 @@ class Gate:
                     line = "this ticket was used, is too old, or its token was revoked"
                     raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
                 return caller
+        local = LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
         if secret := session_of(headers):
-            caller = await self._known(scope, secret)
+            caller = await self._of_session(scope, secret, needed=local is None)
             if caller is not None and (not self.tokens.is_over(caller) or _is_post(scope, STOP)):
                 changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
                 if changes and not says_where_it_is_from(headers):
@@ -222,7 +223,18 @@ class Gate:
                     )
                     raise ProblemError(403, "other-origin", line, "programs send a token")
                 return caller
-        return LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
+        return local
+
+    async def _of_session(self, scope: Scope, secret: str, *, needed: bool) -> Caller | None:
+        """Returns the person of a session. A stop that does not need the session waits for the database STOP_WAITS s at
+        most, and then counts whom it knew last: an old cookie must not delay or refuse it."""
+        if needed or not _is_post(scope, STOP):
+            return await self._known(scope, secret)
+        last = self.tokens.last_known(secret)
+        reading = asyncio.ensure_future(self._known(scope, secret))
+        reading.add_done_callback(lambda done: done.cancelled() or done.exception())  # somebody has to take its error
+        await asyncio.wait({reading}, timeout=STOP_WAITS)
+        return reading.result() if reading.done() and reading.exception() is None else last
 
     async def _known(self, scope: Scope, token: str) -> Caller | None:
         """Returns the caller of a token or a session's secret; None for an unknown one. A stop does not wait for the

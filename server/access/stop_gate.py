@@ -13,6 +13,10 @@ from server.access.session_cookie import says_where_it_is_from, session_of
 from server.problems import ProblemError
 
 
+class TokensCannotBeReadError(Exception):
+    """The database has not been read, so it is not known who may stop the robot."""
+
+
 class Tokens(Protocol):
     """Finds the caller of a token."""
 
@@ -36,7 +40,7 @@ class StopGate:
     service_port: int
 
     def admit(self, headers: Mapping[str, str]) -> Caller:
-        """Returns the caller. Raises a 401 or 403."""
+        """Returns the caller. Raises a 401 or 403, and TokensCannotBeReadError."""
         host = headers.get("host", "")
         if not is_known_name(host, self.names, loopback_only=self.open_on_loopback):
             line = f"this service is not called {host!r:.100}"
@@ -46,10 +50,16 @@ class StopGate:
             raise ProblemError(403, "other-origin", line, "use the page that this service serves")
         kind, _, token = headers.get("authorization", "").partition(" ")
         if not token or kind.lower() != "bearer":
-            caller = self._of_session(headers)
+            local = self.open_on_loopback and is_this_computers_user(headers)
+            try:
+                caller = self._of_session(headers)
+            except TokensCannotBeReadError:
+                if not local:
+                    raise
+                caller = None  # an old cookie must not refuse a stop that needs none
             if caller is not None:
                 return caller
-            if self.open_on_loopback and is_this_computers_user(headers):
+            if local:
                 return LOCAL
             advice = "sign in on the page, or send the header Authorization: Bearer TOKEN; `daq token add` makes one"
             raise ProblemError(401, "token-needed", "this service needs a token", advice)

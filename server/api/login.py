@@ -75,7 +75,7 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     except ProblemError as problem:
         return _told(services, problem)
     log.info("%s (%s) has signed in", caller.name, caller.role)
-    services.signed_in(caller)
+    await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))
     answer = RedirectResponse(f"/?robot={way.robot}" if way.robot else "/", 303)
     _forget_cookie(answer, services, ON_THE_WAY, "/api/v1/login")
@@ -89,7 +89,7 @@ async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> 
     address = None
     if caller.expires is not None and caller.token is not None:
         await run_in_threadpool(services.sessions.end, caller.token)
-        services.signed_out(caller)
+        await run_in_threadpool(services.signed_out, caller)
         log.info("%s has signed out", caller.name)
         if services.provider is not None:
             address = await services.provider.sign_out_address(services.clock.monotonic())

@@ -62,6 +62,31 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
         raise BackupError(f"database {database.name}: its queue cannot be paused: {error}") from error
 
 
+_NOT_APPROVED = "approved_content = NULL, approved_by = NULL, approved_as_owner = NULL, approved = NULL"
+_REVIEWED = ("experiments", "schedules")
+_FORGOTTEN = {
+    "sessions": "DELETE FROM sessions",
+    "experiments": f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
+    "schedules": f"UPDATE schedules SET {_NOT_APPROVED}",
+    "outbox": "UPDATE outbox SET state = 'given-up', ended = :now, problem = 'a backup was restored' "
+    "WHERE state = 'waiting'",
+}
+"""What a restore ends, by table."""
+
+
+def forget_what_may_have_ended(database: Path, now: datetime) -> None:
+    """Ends what may have been ended after the backup was made: sessions, approvals of what has not begun, and
+    notifications that wait. Tables and columns that an older version did not have are left out. Raises BackupError."""
+    words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            for table, line in _FORGOTTEN.items():
+                if _has_table(connection, table) and (table not in _REVIEWED or _has_approvals(connection, table)):
+                    connection.execute(line, words)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: its sessions cannot be ended: {error}") from error
+
+
 def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
     """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, as `source`
     says. Raises BackupError."""
@@ -118,6 +143,10 @@ def add_to_audit(database: Path, note: AuditNote) -> None:
 def _has_table(connection: sqlite3.Connection, name: str) -> bool:
     found = connection.execute("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (name,))
     return bool(found.fetchone()[0])
+
+
+def _has_approvals(connection: sqlite3.Connection, table: str) -> bool:
+    return any(row[1] == "approved_content" for row in connection.execute(f"PRAGMA table_info({table})"))
 
 
 def require_known(revision: str | None) -> None:

@@ -20,6 +20,7 @@ from daq.traces.layout import PART_SUFFIX, SUFFIX
 from server.audit.command import by_command, computers_user
 from server.backup.database import (
     add_to_audit,
+    forget_what_may_have_ended,
     head_of_audit,
     hold_queue,
     require_known,
@@ -129,6 +130,7 @@ class _Staged:
             line = "restored from a backup: look at the arm, then resume the queue"
             for robot in self._places.traces:
                 hold_queue(self._staged(DATABASE), robot, line, self._now)
+            forget_what_may_have_ended(self._staged(DATABASE), self._now)
 
     def note_in_audit_log(self, manifest: Manifest) -> None:
         """Notes in the restored audit log which log it takes the place of: rows that the backup does not have are in

@@ -20,10 +20,9 @@ from typing import Any
 from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.robot import StopResult
 from server.access.caller import Caller
-from server.access.stop_gate import StopGate
+from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
 from server.stopping.arm import together
-from server.stopping.tokens import TokensCannotBeReadError
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
 ALL = "/api/v1/fleet/stop"

@@ -16,6 +16,7 @@ from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
 from server.access.digest import digest_of
 from server.access.session_cookie import STOPS_FOR
+from server.access.stop_gate import TokensCannotBeReadError
 
 READ_AGAIN_AFTER = 2.0
 """Time (s) between two reads, after which a revoked token is refused."""
@@ -38,10 +39,6 @@ TOKENS = (
 
 Callers = dict[str, Caller]
 """The caller of each token, by the token's digest, without revoked tokens."""
-
-
-class TokensCannotBeReadError(Exception):
-    """The database has not been read, so it is not known who may stop the robot."""
 
 
 class StopTokens:

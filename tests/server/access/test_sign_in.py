@@ -175,6 +175,14 @@ def test_a_secret_of_a_session_is_not_in_the_database(browser: Browser, provider
     assert all(secret.encode() not in path.read_bytes() for path in files)
 
 
+def test_a_session_s_secret_is_no_token(browser: Browser, provider: Provider) -> None:
+    browser.sign_in(provider)
+    headers = {"Authorization": f"Bearer {browser.client.cookies['daq-session']}"}
+    for path in ("/api/v1/robots/ma2000/queue/pause", "/api/v1/robots/ma2000/stop"):
+        answer = httpx.post(f"{browser.service.url}{path}", headers=headers, timeout=TIMEOUT)
+        assert kind_of(answer) == (401, "token-unknown")
+
+
 @pytest.mark.parametrize(
     ("claims", "kind"),
     [

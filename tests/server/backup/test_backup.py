@@ -15,17 +15,20 @@ from hypothesis import strategies as st
 from sqlalchemy import select
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
+from server.access.sessions import Person, SessionStore
 from server.backup.manifest import MANIFEST, verify
 from server.backup.places import DATABASE, BackupError, Places, places_of
 from server.backup.restore import restore
 from server.backup.write import back_up
+from server.experiments.review import Given, Review
 from server.store.archived import Archived, ArchivedStore
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
 from server.store.queues import QueueState, QueueStore
-from server.store.tables import TraceRow
+from server.store.tables import OutboxRow, TraceRow
 from server.store.traces import NewTrace, TraceStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.service import Service
@@ -149,6 +152,28 @@ def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) 
     line = "restored from a backup: look at the arm, then resume the queue"
     expected = before if before is not None and before.paused else QueueState(True, line, later)
     assert QueueStore(store).get("ma2000") == expected
+    store.close()
+
+
+def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
+    here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
+    store = Store(here.url)
+    SessionStore(store).begin(Person("https://id", "1", "anna", "owner"), NOW, timedelta(days=9))
+    experiments, review = ExperimentStore(store), Review.of("ma2000", load_machine("ma2000"), "operator")
+    made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+    content = review.content(experiments.get("ma2000", made.id).content)
+    experiments.approve("ma2000", made.id, review, Given(content, "bert", False), NOW)
+    with store.writing() as session:
+        row = {"id": "1", "destination": "x", "payload": "{}", "created": NOW, "next_attempt": NOW, "attempts": 0}
+        session.add(OutboxRow(**row, state="waiting"))
+    store.close()
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
+    restore(tmp_path / "arm.zip", there, NOW + timedelta(days=1), quietly)
+    store = Store(there.url)
+    assert SessionStore(store).callers(NOW) == {}
+    assert ExperimentStore(store).get("ma2000", made.id).approval is None
+    with store.reading() as session:
+        assert list(session.scalars(select(OutboxRow.state))) == ["given-up"]
     store.close()
 
 

@@ -227,6 +227,19 @@ def test_nobody_approves_their_own_nor_without_the_role(people: dict[str, Person
     assert kind_of(people["bert"].ask("PUT", path, {})) == (422, "not-valid")
 
 
+def test_nobody_approves_without_a_token_what_they_may_have_submitted_with_one(
+    people: dict[str, Person], robot: httpx.Client
+) -> None:
+    anna = people["anna"]
+    identity = anna.submit()
+    body = {"content": _content(anna, identity)}
+    assert kind_of(robot.put(f"/experiments/{identity}/approval", json=body)) == (403, "own-experiment")
+    every = anna.ask("POST", "/schedules", {"spec": SPEC, "every": 86400, "starts": LATER}).json()
+    body = {"content": every["content"]}
+    assert kind_of(robot.put(f"/schedules/{every['id']}/approval", json=body)) == (403, "own-experiment")
+    assert anna.ask("GET", f"/experiments/{identity}").json()["approval"] is None
+
+
 def test_a_change_ends_the_approval_and_whoever_changed_it_cannot_give_it(people: dict[str, Person]) -> None:
     anna, bert, olga = people["anna"], people["bert"], people["olga"]
     identity = anna.submit()

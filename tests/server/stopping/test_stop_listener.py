@@ -27,14 +27,14 @@ from daq.contracts.service.robot import StopResult
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.origin import beside
-from server.access.stop_gate import StopGate
+from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.access.tokens import KnownTokens, TokenStore
 from server.listening import ListenError, listening
 from server.problems import ProblemError
 from server.stopping.door import StopDoor
 from server.stopping.listener import StopListener
 from server.stopping.messages import Begin
-from server.stopping.tokens import UNKNOWN_FOR, StopTokens, TokensCannotBeReadError, reader_of
+from server.stopping.tokens import UNKNOWN_FOR, StopTokens, reader_of
 from server.store.engine import Store
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
@@ -359,6 +359,14 @@ def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() 
     answered.set()
     found.close()
     never.close()
+
+
+def test_an_old_cookie_refuses_no_stop_that_needs_no_token(tmp_path: Path) -> None:
+    stale = {"host": "127.0.0.1:8301", "cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"}
+    with closing(StopTokens(reader_of("sqlite://", tmp_path / "none.sqlite"))) as unread:
+        assert StopGate(unread, True, (), 8300).admit(stale) == LOCAL
+        with pytest.raises(TokensCannotBeReadError):
+            StopGate(unread, False, (), 8300).admit(stale)
 
 
 def _begin(folder: Path) -> Begin:
