@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -11,6 +12,9 @@ from websockets.sync.client import ClientConnection, connect
 
 from daq.contracts.service.live import LiveFrame
 from tests.server.service import Service
+
+WATCH_AT_MOST = 60.0
+"""Time (s) for what a test waits for. Other news comes all the while: a limit for each frame would never end a wait."""
 
 
 @contextmanager
@@ -22,10 +26,12 @@ def watching(service: Service, robot: str = "ma2000", **request: Any) -> Iterato
         yield socket
 
 
-def frames(socket: ClientConnection) -> Iterator[LiveFrame]:
-    """What comes, as the contract has it."""
-    while True:
-        yield LiveFrame.model_validate_json(socket.recv(60))
+def frames(socket: ClientConnection, within: float = WATCH_AT_MOST) -> Iterator[LiveFrame]:
+    """What comes, as the contract has it. Raises TimeoutError when it has been read for longer than `within` (s)."""
+    end = time.monotonic() + within
+    while (left := end - time.monotonic()) > 0:
+        yield LiveFrame.model_validate_json(socket.recv(left))
+    raise TimeoutError(f"what is waited for did not come within {within:g} s")
 
 
 def messages(socket: ClientConnection, topic: str) -> Iterator[Any]:
