@@ -24,7 +24,7 @@ def base_parameter_section(found: BaseParameters) -> Section:
         blocks.append(Text(f"No motion shows {listed(found.without_effect)}."))
     if found.left_out:
         blocks.append(
-            Text(f"Taken as known, because torques are not linear in them: {listed(found.left_out)}.", "quiet")
+            Text(f"Held at the model's values: {listed(found.left_out)}. Deviations are with these held.", "quiet")
         )
     blocks.append(Points(tuple(f"{symbol}: {words}" for symbol, words in WORDS.items())))
     return Section("Base parameters", tuple(blocks))

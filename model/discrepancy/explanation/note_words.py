@@ -23,10 +23,10 @@ def _cutoff(v: Values) -> str:
 
 
 def _drive_timing(v: Values) -> str:
-    times = ", ".join(f"{1e3 * t:.2g} ms" for t in v["delays"])
+    late = ", ".join(f"{samples:.2g}" for samples in v["late"])
     return (
-        f"the drive is taken to act {times} after its sample: up to {v['samples']:g} samples are how a drive is formed "
-        "and held, which no record tells, and are not named as a delay"
+        f"drives are taken to act {late} samples of their record late: up to {v['samples']:g} samples are how a drive "
+        "is formed and held, which no record tells, and are not named as a delay"
     )
 
 

@@ -245,8 +245,7 @@ class _Workflow:
         late = samples_late(self.model, self.now.values)
         if late.max() < SLIGHTLY_LATE:
             return ()
-        period = min(record.sampled for record in self.case.records)
-        return (Note(kind="drive-timing", values={"delays": list(map(float, late * period)), "samples": MOST}),)
+        return (Note(kind="drive-timing", values={"late": list(map(float, late)), "samples": MOST}),)
 
     def _predicted(self, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""

@@ -116,15 +116,23 @@ def note_on_noise(observation: Observation, rms: Sequence[float], joints: Sequen
 
 
 def readings_apart(observation: Observation, signals: Signals) -> tuple[NDArray[np.bool_], ...]:
-    """Readings (m, n) per record that lie `FAR` from what their neighbours say, and further than these do from theirs:
-    no arm can jump there and back between two samples. What a fit leaves there (signals, rad) must be as far off."""
+    """Readings (m, n) per record that lie `FAR` from what their neighbours say, and further than these do from theirs.
+    What a fit leaves there (signals, rad) must be as far off.
+
+    None of a joint that is sampled so slowly, for how fast it moves, that it may go there and back between two samples:
+    one whose simulated motion somewhere lies as far from what its neighbours say.
+    """
     found = []
     for record, signal in zip(observation.records, signals, strict=True):
         apart = np.zeros(signal.shape, dtype=np.bool_)
         for run in record.runs:
             for column, deviation in enumerate(observation.deviations):
-                own = _alone(record.measured[run, column] / deviation)
-                own &= np.abs(signal[run, column] / deviation) > FAR * _robust(signal[run, column] / deviation)
+                readings, left = (s[run, column] / deviation for s in (record.measured, signal))
+                moves = _off_neighbours(readings - left)
+                if np.any(moves > FAR * _robust(moves)):
+                    continue
+                own = _alone(readings)
+                own &= np.abs(left) > FAR * _robust(left)
                 apart[run, column] = own
         found.append(apart)
     return tuple(found)
@@ -133,14 +141,23 @@ def readings_apart(observation: Observation, signals: Signals) -> tuple[NDArray[
 def _alone(readings: Floats) -> NDArray[np.bool_]:
     """Which readings (m,), in deviations, lie apart from two neighbours on either side."""
     found = np.zeros(len(readings), dtype=np.bool_)
-    if len(readings) < len(FOUR_NEIGHBOURS):
+    off = _off_neighbours(readings)
+    if not len(off):
         return found
-    off = np.abs(readings[2:-2] - np.convolve(readings, FOUR_NEIGHBOURS, "valid"))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(off, 2), 5).max(axis=1)
     found[2:-2] = (off > FAR * GAIN * max(1.0, _robust(off) / GAIN)) & (off >= around)
     return found
 
 
+def _off_neighbours(readings: Floats) -> Floats:
+    """How far each reading (m,) but two at either end lies from what its neighbours say, (m − 4,)."""
+    if len(readings) < len(FOUR_NEIGHBOURS):
+        return np.zeros(0)
+    return np.asarray(np.abs(readings[2:-2] - np.convolve(readings, FOUR_NEIGHBOURS, "valid")))
+
+
 def _robust(signal: Floats) -> float:
     """Standard deviation of a signal without its outliers, at least one."""
+    if not len(signal):
+        return 1.0
     return max(1.0, GAUSSIAN * float(np.median(np.abs(signal))))

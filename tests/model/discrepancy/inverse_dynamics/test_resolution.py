@@ -54,7 +54,7 @@ def test_how_a_drive_is_held_is_no_effect() -> None:
     assert found.verdict == "nothing-significant", found.summary
     assert found.model_after.effects == found.model_before.effects
     told = next(note for note in found.notes_data if note.kind == "drive-timing")
-    assert told.values["delays"][0] == pytest.approx(1.6 * SAMPLE, rel=0.1)
+    assert told.values["late"][0] == pytest.approx(1.6, rel=0.1)
 
 
 def test_a_delay_beyond_two_samples_is_named_whole() -> None:

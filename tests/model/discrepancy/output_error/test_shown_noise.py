@@ -44,8 +44,7 @@ def with_far_readings(given: Point) -> Point:
     left = slow(given)
     left[list(FAR_OFF), 1] += DISTANCE
     record = given.observation.records[0]
-    measured = record.measured.copy()
-    measured[list(FAR_OFF), 1] += DISTANCE * given.observation.deviations[1]
+    measured = record.measured - given.residuals[0] + left * given.observation.deviations
     (prepared,) = given.observation.prepared
     there = replace(
         given.observation,
@@ -105,6 +104,17 @@ def test_readings_that_are_far_off_are_left_out_and_no_others(given: Point) -> N
     observation = with_noise(point.observation, noise, point.residuals)
     assert np.abs(observation.in_deviations(point.residuals)).max() < 0.5 * DISTANCE
     assert observation.rms(point.residuals)[1] < point.observation.rms(point.residuals)[1]
+
+
+def test_no_reading_is_far_off_where_the_joint_itself_can_be(given: Point) -> None:
+    """Sampled slowly: joint 2 swings once in four samples, by 20 deviations, and so may do in a single one."""
+    point = with_far_readings(given)
+    record = point.observation.records[0]
+    measured, begun = record.measured.copy(), 500
+    swing = 20.0 * np.sin(0.5 * np.pi * np.arange(20)) * point.observation.deviations[1]
+    measured[begun : begun + 20, 1] += swing
+    fast = replace(point.observation, records=(replace(record, measured=measured),))
+    assert not any(apart.any() for apart in readings_apart(fast, point.residuals))
 
 
 def test_a_simulation_that_gets_the_recorded_drive_is_not_given_far_readings(given: Point) -> None:
