@@ -88,6 +88,12 @@ class StopTokens:
         with self._changed:
             self._callers = {**(self._callers or {}), digest: caller}
 
+    def remove(self, digest: str) -> None:
+        """Forgets a session that was left. It is not in the database any more, so the next read has it not, either."""
+        with self._changed:
+            if self._callers is not None:
+                self._callers = {one: caller for one, caller in self._callers.items() if one != digest}
+
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
         """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
         return self._remembered(digest_of(token))
