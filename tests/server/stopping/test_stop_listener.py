@@ -337,6 +337,19 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
         never.look_up(anna)
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path, alone: bool) -> None:
+    file = tmp_path / "service.sqlite"
+    store = Store(f"sqlite:///{file}")
+    store.migrate()
+    token = TokenStore(store).add("anna", "viewer", HandClock().utc())
+    with store.writing() as session:
+        session.execute(text("DROP TABLE sessions"))
+    store.close()
+    found = reader_of(store.url, file if alone else None)()
+    assert found == {digest_of(token): Caller("anna", "viewer")}
+
+
 def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() -> None:
     asked, answered, clock = threading.Event(), threading.Event(), HandClock()
 
