@@ -169,7 +169,11 @@ def _tell_sessions(services: Services, gate: Gate, door: StopDoor) -> None:
         gate.tokens.add(caller)
         door.add(caller)
 
-    services.signed_in, services.signed_out = signed_in, gate.tokens.forget
+    def signed_out(caller: Caller) -> None:
+        gate.tokens.forget(caller)
+        door.remove(caller)
+
+    services.signed_in, services.signed_out = signed_in, signed_out
 
 
 class _Server(uvicorn.Server):

@@ -9,12 +9,14 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime, timedelta
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
-from server.stopping.messages import NEWS, Begin, Joined, Known, Owned, Ready, Stopped
+from server.access.session_cookie import STOPS_FOR
+from server.stopping.messages import NEWS, Begin, Joined, Known, Left, Order, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
 """Time (s) for the process to start on a busy computer."""
@@ -46,6 +48,8 @@ class StopDoor:
         self._begin_again_after = begin_again_after
         self._lock = threading.Lock()
         self._owned: dict[str, Owned] = {}
+        self._joined: dict[str, Caller] = {}
+        """Sessions that have begun since the service has read the tokens, for a process that is started again."""
         self._ready = threading.Event()
         self._closing = threading.Event()
         self._process = self._start()
@@ -81,7 +85,19 @@ class StopDoor:
         """Passes on a session that has just begun, so that its person can stop the robot whatever the database does."""
         assert caller.token is not None
         with self._lock:
-            self._send(Joined(digest=caller.token, name=caller.name, role=caller.role))
+            self._joined = {digest: one for digest, one in self._joined.items() if not _stops_nothing(one)}
+            self._joined[caller.token] = caller
+            self._send(_joined(caller))
+
+    def remove(self, caller: Caller) -> None:
+        """Tells that a session was left: neither this process nor one that is started later takes its stops."""
+        assert caller.token is not None
+        with self._lock:
+            self._joined.pop(caller.token, None)
+            if (known := self._begin.tokens) is not None:
+                left = {digest: who for digest, who in known.items() if digest != caller.token}
+                self._begin = self._begin.model_copy(update={"tokens": left})
+            self._send(Left(digest=caller.token))
 
     def close(self) -> None:
         """Ends the process, after it has answered the requests under way."""
@@ -105,11 +121,11 @@ class StopDoor:
         )
         self._process = process
         self._send(self._begin.model_copy(update={"descriptor": descriptor}))
-        for told in self._owned.values():
+        for told in (*self._owned.values(), *(_joined(caller) for caller in self._joined.values())):
             self._send(told)
         return process
 
-    def _send(self, message: Begin | Known | Joined | Owned) -> None:
+    def _send(self, message: Order) -> None:
         """If the process has died, the message is sent again to its successor."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError, ValueError):
@@ -163,3 +179,13 @@ class StopDoor:
                         self.stopped(news)
                 except Exception:  # half a line of a process that was killed, or a listener's fault
                     log.exception("stop listener: %.200r", line)
+
+
+def _joined(caller: Caller) -> Joined:
+    assert caller.token is not None
+    return Joined(digest=caller.token, name=caller.name, role=caller.role)
+
+
+def _stops_nothing(caller: Caller) -> bool:
+    """Whether a session ended so long ago that it does not even stop the robot."""
+    return caller.expires is not None and caller.expires + timedelta(seconds=STOPS_FOR) < datetime.now(UTC)

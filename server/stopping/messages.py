@@ -45,6 +45,13 @@ class Joined(FrozenRecord):
     role: Role
 
 
+class Left(FrozenRecord):
+    """A session that its person has left, by the digest of its secret: it stops nothing any more."""
+
+    kind: Literal["left"] = "left"
+    digest: str
+
+
 class Owned(FrozenRecord):
     """Which process owns a robot's port now; None if none does. `terminal`: the pseudo-terminal at which the robot was
     reached, by number, time of creation and holder, as `daq.transport` knows it."""
@@ -80,7 +87,6 @@ class Stopped(FrozenRecord):
     at: AwareDatetime
 
 
-ORDER: TypeAdapter[Begin | Known | Joined | Owned] = TypeAdapter(
-    Annotated[Begin | Known | Joined | Owned, Field(discriminator="kind")]
-)
+Order = Begin | Known | Joined | Left | Owned
+ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])
 NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(Annotated[Ready | Stopped, Field(discriminator="kind")])

@@ -17,7 +17,7 @@ from server.access.stop_gate import StopGate
 from server.steady import keep_steady
 from server.stopping.arm import Reach, stop_arm
 from server.stopping.listener import Asked, StopListener
-from server.stopping.messages import ORDER, Begin, Joined, Known, Owned, Ready, Stopped
+from server.stopping.messages import ORDER, Begin, Joined, Known, Left, Owned, Ready, Stopped
 from server.stopping.teller import Teller
 from server.stopping.tokens import Callers, StopTokens, reader_of
 
@@ -90,6 +90,8 @@ def main() -> int:
             tokens.update(_callers(order.tokens) or {})
         elif isinstance(order, Joined):
             tokens.add(order.digest, Caller(order.name, order.role, order.digest))
+        elif isinstance(order, Left):
+            tokens.remove(order.digest)
     listener.close()
     teller.close(TOLD_WITHIN)
     tokens.close()

@@ -7,7 +7,7 @@ import math
 import sqlite3
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -31,11 +31,12 @@ ANSWERED_WITHIN = 2
 """Time (s) for a database server to accept a connection, and to answer each statement."""
 log = logging.getLogger("server.stop")
 
-TOKENS = (
-    "SELECT digest, name, role FROM tokens WHERE revoked IS NULL "
-    "UNION ALL SELECT digest, name, role FROM sessions WHERE expires > :ended"
-)
-"""Everybody who may stop the robot, also those whose session has ended lately."""
+TOKENS = "SELECT digest, name, role FROM tokens WHERE revoked IS NULL"
+SESSIONS = "SELECT digest, name, role FROM sessions WHERE expires > :ended"
+"""Sessions that may stop the robot, also those that have ended lately. They are read by themselves, so that a fault in
+their table, or a database that has none yet, takes nobody's token."""
+
+NO_SESSIONS = "sessions cannot be read: who has signed in cannot stop here meanwhile; tokens can: %s"
 
 Callers = dict[str, Caller]
 """The caller of each token, by the token's digest, without revoked tokens."""
@@ -87,6 +88,12 @@ class StopTokens:
         """Takes a session that has just begun. It is in the database, so the next read has it, too."""
         with self._changed:
             self._callers = {**(self._callers or {}), digest: caller}
+
+    def remove(self, digest: str) -> None:
+        """Forgets a session that was left. It is not in the database any more, so the next read has it not, either."""
+        with self._changed:
+            if self._callers is not None:
+                self._callers = {one: caller for one, caller in self._callers.items() if one != digest}
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
         """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
@@ -151,19 +158,33 @@ def _of_file(file: Path) -> Callers:
     (WAL)."""
     uri = f"{file.absolute().as_uri()}?mode=ro"
     with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_WITHIN)) as connection:
-        rows = connection.execute(TOKENS.replace(":ended", "?"), [_ended().isoformat(" ", "microseconds")]).fetchall()
+        rows = connection.execute(TOKENS).fetchall()
+        try:
+            rows += connection.execute(SESSIONS, {"ended": _ended().isoformat(" ", "microseconds")}).fetchall()
+        except sqlite3.Error as error:
+            log.warning(NO_SESSIONS, error)
+    return _callers(rows)
+
+
+def _callers(rows: Iterable[Sequence[str]]) -> Callers:
     return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
 def _of_database(url: str) -> Callable[[], Callers]:
     from sqlalchemy import create_engine, text
+    from sqlalchemy.exc import SQLAlchemyError
 
     options = {"connect_timeout": ANSWERED_WITHIN, "options": f"-c statement_timeout={ANSWERED_WITHIN * 1000}"}
     engine = create_engine(url, connect_args=options if url.startswith("postgresql") else {})
 
     def read() -> Callers:
         with engine.connect() as connection:
-            rows = connection.execute(text(TOKENS), {"ended": _ended()}).all()
-        return {row[0]: Caller(row[1], role_of(row[2]), row[0]) for row in rows}
+            rows = list(connection.execute(text(TOKENS)).all())
+        try:
+            with engine.connect() as connection:  # a failed statement would end the transaction of the tokens
+                rows += connection.execute(text(SESSIONS), {"ended": _ended()}).all()
+        except SQLAlchemyError as error:
+            log.warning(NO_SESSIONS, error)
+        return _callers(rows)
 
     return read

@@ -337,6 +337,19 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
         never.look_up(anna)
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path, alone: bool) -> None:
+    file = tmp_path / "service.sqlite"
+    store = Store(f"sqlite:///{file}")
+    store.migrate()
+    token = TokenStore(store).add("anna", "viewer", HandClock().utc())
+    with store.writing() as session:
+        session.execute(text("DROP TABLE sessions"))
+    store.close()
+    found = reader_of(store.url, file if alone else None)()
+    assert found == {digest_of(token): Caller("anna", "viewer")}
+
+
 def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() -> None:
     asked, answered, clock = threading.Event(), threading.Event(), HandClock()
 
@@ -399,6 +412,32 @@ def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_w
         last = door.pid
     with pytest.raises(ProcessLookupError):
         os.kill(last, 0)
+
+
+def test_a_listener_that_is_started_again_knows_who_signed_in_and_not_who_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
+    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, _begin(tmp_path))) as door:
+        stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
+        anna, bert = (Caller(name, "viewer", digest_of(f"daq_{name}")) for name in ("anna", "bert"))
+
+        def answer(name: str) -> int:
+            return httpx.post(stop, headers={"Authorization": f"Bearer daq_{name}"}, timeout=60).status_code
+
+        door.set_tokens({digest_of("daq_token"): Caller("token", "viewer"), digest_of("daq_bert"): bert})
+        for caller in (anna, bert):
+            door.add(caller)
+        door.wait_ready()
+        while answer("bert") != 200:
+            pass
+        door.remove(bert)
+        while answer("bert") == 200:
+            pass
+        os.kill(door.pid, signal.SIGKILL)
+        while answer("anna") != 200:  # it is told once it listens
+            pass
+        assert (answer("token"), answer("bert")) == (200, 401)
 
 
 def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
