@@ -80,8 +80,7 @@ class BaseParameters(FrozenRecord):
     smallest_kept: float
     largest_dropped: float
     left_out: tuple[str, ...] = ()
-    """Effects of the model that no base parameter has in it: they keep the model's values, and deviations are with
-    these held."""
+    """Effects of the model that no base parameter has in it: they are held at the model's values."""
     excitation: Excitation | None = None
     no_excitation: str | None = None
     """Why records could not be judged; one line."""
