@@ -134,8 +134,8 @@ class RobotServices:
             raise ProblemError(403, "owner-needed", line, advice)
 
     def approval(self, caller: Caller, content: str) -> Given:
-        """Returns the caller's approval of some content. Raises a 403 for callers without a token, who may be the author,
-        and where only owners of the robot may approve; a 409 where nobody needs to."""
+        """Returns the caller's approval of some content. Raises a 403 for callers without a token, who may be the
+        author, and where only owners of the robot may approve; a 409 where nobody needs to."""
         reviewer, is_owner = self.queue.review.reviewer, caller.owns(self.owners)
         if reviewer is None:
             line = f"experiments of {self.robot.name} need no approval"
