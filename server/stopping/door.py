@@ -121,8 +121,10 @@ class StopDoor:
         )
         self._process = process
         self._send(self._begin.model_copy(update={"descriptor": descriptor}))
-        for told in (*self._owned.values(), *(_joined(caller) for caller in self._joined.values())):
+        for told in self._owned.values():
             self._send(told)
+        for caller in self._joined.values():
+            self._send(_joined(caller))
         return process
 
     def _send(self, message: Order) -> None:
