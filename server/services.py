@@ -89,6 +89,8 @@ AUDIT_KEPT = "audit-waiting.jsonl"
 """File of the rows of the audit log that could not be written before the service ended."""
 ENDING = 0.5
 """Time (s) to write the last rows of the audit log and of the outbox when the service ends."""
+KEEPING = 0.3
+"""Share (s) of that time in which rows that could not be written are kept in a file."""
 log = logging.getLogger("server")
 
 
@@ -244,7 +246,7 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
-        _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING)])
+        _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)])
         self.store.close()
 
     def end_processes(self) -> None:

@@ -87,8 +87,10 @@ def sessions(context: typer.Context, json: JsonOption = False) -> None:
 def sign_out(context: typer.Context, name: Annotated[str, typer.Argument(help="Name of the person.")]) -> None:
     """End all sessions of a person; within two seconds they must sign in again."""
     from server.access.sessions import SessionStore
+    from server.audit.command import computers_user
+    from server.clock import SystemClock
 
-    count = SessionStore(_store(invocation(context))).end_all(name)
+    count = SessionStore(_store(invocation(context))).end_all(name, SystemClock().utc(), computers_user())
     if count == 0:
         raise SpecError(f"{shown(name)} has no session; `daq token sessions` lists those there are")
     print(f"{count} session{'s' * (count > 1)} of {name} ended")

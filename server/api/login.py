@@ -38,6 +38,7 @@ async def get_login_ways(services: ServicesDep) -> LoginWays:
 @router.get("/login/start", include_in_schema=False)
 async def start_login(
     services: ServicesDep,
+    request: Request,
     robot: Annotated[str, Query(pattern=r"^([a-z0-9][a-z0-9_-]{0,31})?$", description="What to show afterwards.")] = "",
 ) -> Response:
     """Sends the browser to the provider of OpenID Connect."""
@@ -47,7 +48,7 @@ async def start_login(
     try:
         address, asked = await provider.ask(services.clock.monotonic())
     except ProblemError as problem:
-        return _told(services, problem)
+        return _told(request, services, problem)
     answer = RedirectResponse(address, 303)
     word = services.sign_ins.begin(asked, robot)
     _set_cookie(answer, services, ON_THE_WAY, word, int(GOOD_FOR), "lax", "/api/v1/login")
@@ -67,13 +68,13 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     way = services.sign_ins.back(given.get("state", ""), request.cookies.get(ON_THE_WAY, ""))
     if way is None:
         line = "this answer of the provider was used, is too old, or was asked for by another browser"
-        return _told(services, ProblemError(403, "sign-in-unknown", line, "begin anew"))
+        return _told(request, services, ProblemError(403, "sign-in-unknown", line, "begin anew"))
     try:
         person = await provider.answered(way.asked, given, services.clock.monotonic())
         lasts = timedelta(hours=services.settings.server.oidc.hours)
         secret, caller = await run_in_threadpool(services.sessions.begin, person, services.clock.utc(), lasts)
     except ProblemError as problem:
-        return _told(services, problem)
+        return _told(request, services, problem)
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))
@@ -138,8 +139,21 @@ def _forget_cookie(answer: Response, services: Services, name: str, path: str) -
     answer.delete_cookie(name, path=path, secure=_is_over_tls(services), httponly=True)
 
 
-def _told(services: Services, problem: ProblemError) -> Response:
-    """Sends the browser to the page's sign-in, which has words for each kind of problem; the log has the details."""
+def _told(request: Request, services: Services, problem: ProblemError) -> Response:
+    """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details. The
+    audit log counts them, since anybody can cause them without end."""
     log.warning("sign-in: %s: %s", problem.kind, problem.detail)
     services.metrics.count_refusal(problem.kind)
+    services.audit.writer.count(
+        AuditNote(
+            at=services.clock.utc(),
+            actor=None,
+            origin=request.client.host if request.client else "unknown",
+            action=request.scope["route"].name,
+            request=f"GET {request.scope['path']}",
+            outcome="refused",
+            status=303,
+            detail=problem.kind,
+        )
+    )
     return RedirectResponse(f"/?sign-in={problem.kind}", 303)

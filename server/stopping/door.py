@@ -121,8 +121,8 @@ class StopDoor:
         )
         self._process = process
         self._send(self._begin.model_copy(update={"descriptor": descriptor}))
-        for owned in self._owned.values():
-            self._send(owned)
+        for told in self._owned.values():
+            self._send(told)
         for caller in self._joined.values():
             self._send(_joined(caller))
         return process

@@ -10,7 +10,9 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
@@ -36,7 +38,7 @@ SESSIONS = "SELECT digest, name, role FROM sessions WHERE expires > :ended"
 """Sessions that may stop the robot, also those that have ended lately. They are read by themselves, so that a fault in
 their table, or a database that has none yet, takes nobody's token."""
 
-NO_SESSIONS = "sessions cannot be read: who has signed in cannot stop here meanwhile; tokens can: %s"
+NO_SESSIONS = "sessions cannot be read; those read last stay valid: %s"
 
 Callers = dict[str, Caller]
 """The caller of each token, by the token's digest, without revoked tokens."""
@@ -145,7 +147,16 @@ class StopTokens:
 def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
     """Returns a function that reads all tokens: from a SQLite file with the standard library, from another database as
     the service does."""
-    return (lambda: _of_file(sqlite)) if sqlite is not None else _of_database(database_url)
+    read_both = partial(_of_file, sqlite) if sqlite is not None else _of_database(database_url)
+    last: Callers = {}
+
+    def read() -> Callers:
+        nonlocal last
+        tokens, sessions = read_both()
+        last = last if sessions is None else sessions  # like tokens, those read last stay valid
+        return tokens | last
+
+    return read
 
 
 def _ended() -> datetime:
@@ -153,38 +164,40 @@ def _ended() -> datetime:
     return datetime.now(UTC).replace(tzinfo=None) - timedelta(seconds=STOPS_FOR)
 
 
-def _of_file(file: Path) -> Callers:
-    """Reads the tokens over a new connection. A suspended service that holds the write lock does not block readers
-    (WAL)."""
+def _of_file(file: Path) -> tuple[Callers, Callers | None]:
+    """Reads tokens and sessions (None: these cannot be read) over a new connection. A suspended service that holds the
+    write lock does not block readers (WAL)."""
     uri = f"{file.absolute().as_uri()}?mode=ro"
     with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_WITHIN)) as connection:
-        rows = connection.execute(TOKENS).fetchall()
+        tokens = _callers(connection.execute(TOKENS).fetchall())
         try:
-            rows += connection.execute(SESSIONS, {"ended": _ended().isoformat(" ", "microseconds")}).fetchall()
+            sessions = connection.execute(SESSIONS, {"ended": _ended().isoformat(" ", "microseconds")}).fetchall()
         except sqlite3.Error as error:
             log.warning(NO_SESSIONS, error)
-    return _callers(rows)
+            return tokens, None
+    return tokens, _callers(sessions)
 
 
-def _callers(rows: Iterable[Sequence[str]]) -> Callers:
+def _callers(rows: Iterable[Sequence[Any]]) -> Callers:
     return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
-def _of_database(url: str) -> Callable[[], Callers]:
+def _of_database(url: str) -> Callable[[], tuple[Callers, Callers | None]]:
     from sqlalchemy import create_engine, text
     from sqlalchemy.exc import SQLAlchemyError
 
     options = {"connect_timeout": ANSWERED_WITHIN, "options": f"-c statement_timeout={ANSWERED_WITHIN * 1000}"}
     engine = create_engine(url, connect_args=options if url.startswith("postgresql") else {})
 
-    def read() -> Callers:
+    def read() -> tuple[Callers, Callers | None]:
         with engine.connect() as connection:
-            rows = list(connection.execute(text(TOKENS)).all())
+            tokens = _callers(connection.execute(text(TOKENS)).all())
         try:
             with engine.connect() as connection:  # a failed statement would end the transaction of the tokens
-                rows += connection.execute(text(SESSIONS), {"ended": _ended()}).all()
+                sessions = _callers(connection.execute(text(SESSIONS), {"ended": _ended()}).all())
         except SQLAlchemyError as error:
             log.warning(NO_SESSIONS, error)
-        return _callers(rows)
+            return tokens, None
+        return tokens, sessions
 
     return read

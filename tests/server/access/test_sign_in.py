@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
@@ -16,6 +17,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from server.access.sessions import SessionStore
+from server.store.engine import Store
 from tests.server.access.people import LATER, SPEC, kind_of
 from tests.server.access.provider import Provider, running_provider
 from tests.server.service import Service, running_service
@@ -173,6 +176,29 @@ def test_a_secret_of_a_session_is_not_in_the_database(browser: Browser, provider
     files = [path for path in (browser.service.folder / "service").glob("service.sqlite*") if path.is_file()]
     assert files
     assert all(secret.encode() not in path.read_bytes() for path in files)
+
+
+def _rows(service: Service, action: str, subject: str | None = None) -> list[tuple[str, str]]:
+    """Outcome and detail of the audit log's rows, as soon as there is one."""
+    query = "SELECT outcome, detail FROM audit WHERE action = ? AND (? IS NULL OR subject = ?)"
+    while True:
+        with closing(sqlite3.connect(service.folder / "service" / "service.sqlite")) as connection:
+            found = connection.execute(query, (action, subject, subject)).fetchall()
+        if found:
+            return found
+
+
+def test_refused_sign_ins_and_sign_outs_by_command_have_rows(provider: Provider, tmp_path: Path) -> None:
+    with service_of_people(tmp_path, provider.url) as service, _browser(service) as browser:
+        assert browser.back(f"{service.url}/api/v1/login/callback?state=unknown") == "/?sign-in=sign-in-unknown"
+        assert _rows(service, "finish_login") == [("refused", "sign-in-unknown")]
+        browser.sign_in(provider)
+        store = Store(f"sqlite:///{service.folder / 'service' / 'service.sqlite'}")
+        now = datetime.now(UTC)
+        assert SessionStore(store).end_all("anna", now, "root") == 1
+        assert SessionStore(store).end_all("anna", now, "root") == 0
+        store.close()
+        assert _rows(service, "sign_out", "anna") == [("done", "")]
 
 
 def test_a_session_s_secret_is_no_token(browser: Browser, provider: Provider) -> None:

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from server.clock import SystemClock
-from tests.server.access.people import LATER, SPEC, people_at
+from tests.server.access.people import SPEC, people_at
 from tests.server.access.provider import Provider, running_provider
 from tests.server.access.test_sign_in import OPERATORS, service_of_people
 from tests.server.dashboard.browser import PATIENCE_MS, WIDE
@@ -100,16 +100,18 @@ def test_somebody_else_s_experiment_is_looked_at_and_approved(
     with service_inside(tmp_path, SystemClock(), monkeypatch, review="operator") as robot, _tab(browser) as page:
         robot.post("/connect")
         robot.post("/queue/pause")
-        anna = people_at(robot, tmp_path, {"anna": "operator"})["anna"]
-        identity = anna.submit()
-        own = robot.post("/experiments", json={"spec": SPEC | {"name": "mine"}, "at": LATER}).json()["id"]
+        people = people_at(robot, tmp_path, {"anna": "operator", "bert": "operator"})
+        identity = people["anna"].submit()
+        own = people["bert"].submit(spec=SPEC | {"name": "mine"})
+        token = people["bert"].headers["Authorization"].removeprefix("Bearer ")
+        page.add_init_script(f"sessionStorage.setItem('ma2000-token', '{token}')")
         page.goto(f"http://127.0.0.1:{robot.base_url.port}/#/experiments")
         page.get_by_role("button", name="Look at warm-up").click()
         expect(page.get_by_role("button", name="Look at mine")).to_have_count(0)
         expect(page.get_by_text("not approved: another operator must look at it")).to_have_count(2)
         _fits(page, "review")
         page.get_by_role("button", name="Approve warm-up").click()
-        expect(page.get_by_text("approved by local")).to_be_visible()
+        expect(page.get_by_text("approved by bert")).to_be_visible()
         _fits(page, "approved")
-        assert robot.get(f"/experiments/{identity}").json()["approval"]["by"] == "local"
+        assert robot.get(f"/experiments/{identity}").json()["approval"]["by"] == "bert"
         assert robot.get(f"/experiments/{own}").json()["approval"] is None

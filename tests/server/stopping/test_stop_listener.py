@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,6 +28,7 @@ from daq.contracts.service.robot import StopResult
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.origin import beside
+from server.access.sessions import Person, SessionStore
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.access.tokens import KnownTokens, TokenStore
 from server.listening import ListenError, listening
@@ -343,11 +345,16 @@ def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path, alone: boo
     store = Store(f"sqlite:///{file}")
     store.migrate()
     token = TokenStore(store).add("anna", "viewer", HandClock().utc())
+    person = Person("https://id", "1", "bert", "viewer")
+    _, bert = SessionStore(store).begin(person, datetime.now(UTC), timedelta(hours=1))
+    known, unread = (reader_of(store.url, file if alone else None) for _ in range(2))
+    everybody = {digest_of(token): Caller("anna", "viewer"), bert.token: bert}
+    assert known() == everybody
     with store.writing() as session:
         session.execute(text("DROP TABLE sessions"))
     store.close()
-    found = reader_of(store.url, file if alone else None)()
-    assert found == {digest_of(token): Caller("anna", "viewer")}
+    assert known() == everybody, "who was known stays so"
+    assert unread() == {digest_of(token): Caller("anna", "viewer")}
 
 
 def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() -> None:
