@@ -65,10 +65,11 @@ def test_over_the_socket_it_is_not_that_at_which_the_command_before_it_was_done(
     one = cast(
         Any,
         SimpleNamespace(
-            robot=SimpleNamespace(clock=clock),
+            robot=SimpleNamespace(clock=clock, name="ma2000"),
             teaching=teaching,
             require_motion=lambda _lease: None,
             hub=SimpleNamespace(shown=lambda _topics: []),
+            audit=SimpleNamespace(writer=SimpleNamespace(count=lambda _note: None), utc=clock.utc),
         ),
     )
 
@@ -88,7 +89,7 @@ def test_over_the_socket_it_is_not_that_at_which_the_command_before_it_was_done(
 
     async def served() -> None:
         client, heard = Client(Outbox(clock.monotonic()), "anna"), asyncio.Queue[Any](WAITING_MESSAGES)
-        carrying_out = asyncio.create_task(_carry_out(one, client, LOCAL, heard))
+        carrying_out = asyncio.create_task(_carry_out(one, client, LOCAL, "127.0.0.1", heard))
         await _receive(cast(Any, Socket(first, second, let_go_of_the_key_long_ago)), one, client, heard)
         carrying_out.cancel()
 
