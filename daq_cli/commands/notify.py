@@ -38,9 +38,11 @@ def try_all(
 
     destinations = destinations_of(invocation(context).configuration.notifications)
     chosen = [one for one in destinations if name in (None, one.name)]
+    if not destinations:
+        raise SpecError("notifications: nobody is told; name somebody in [notifications] (docs/notifications.md)")
     if not chosen:
-        there = ", ".join(one.name for one in destinations) or "none"
-        raise SpecError(f"notifications: no destination {'' if name is None else shown(name)}; there is {there}")
+        there = ", ".join(one.name for one in destinations)
+        raise SpecError(f"notifications: no destination {shown(str(name))}; there is {there}")
     told = Notification(topic="test", kind="attention", at=SystemClock().utc(), text="a test: nothing has happened")
     found, failed = [], False
     for one in chosen:

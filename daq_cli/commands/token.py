@@ -79,6 +79,8 @@ def sessions(context: typer.Context, json: JsonOption = False) -> None:
     if json:
         print_json([{"name": one.name, "role": one.role, "expires": one.expires} for one in found])
         return
+    if not found:
+        print("nobody is signed in")
     for one in found:
         print(f"{one.name:20} {one.role:9} until {one.expires:%Y-%m-%d %H:%M} UTC")
 

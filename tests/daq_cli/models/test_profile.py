@@ -28,10 +28,8 @@ def test_an_interval_holds_the_true_value_and_is_written_as_json_csv_and_page(
     daq: CommandLine, rod: Path, tmp_path: Path
 ) -> None:
     table, page = tmp_path / "profile.csv", tmp_path / "profile.html"
-    said = daq(
-        "profile", rod / "rod.toml", rod / "rod.mcap", "--parameter", MASS, "--parameter", ROTOR, "--no-priors",
-        "-o", table, "--report", page, "--json",
-    )  # fmt: skip
+    asked = ("--parameter", MASS, "--parameter", ROTOR, "--no-priors")
+    said = daq("profile", rod / "rod.toml", rod / "rod.mcap", *asked, "-o", table, "--report", page, "--json")
     mass, rotor = json.loads(said.out)["profiles"]
     assert (mass["name"], rotor["name"]) == (MASS, ROTOR)
     assert mass["low"] < TRUTH[MASS] < mass["high"]

@@ -82,6 +82,8 @@ def test_a_command_tries_every_destination(
         assert problems["webhook far"].startswith("127.1: it leads to a private address")
     daq("notify", "test", "nobody").complains(2, "no destination 'nobody'", "there is lab, far")
     assert PATH not in daq("config", "show").out
+    (tmp_path / "daq.toml").write_text("")
+    daq("notify", "test").complains(2, "nobody is told", "[notifications]")
 
 
 def test_a_service_with_a_wrong_secret_does_not_start(
