@@ -37,7 +37,7 @@ from daq.executors.local import cores
 from daq.executors.workers import ending
 from model.machine_model.model import base_model
 
-STEPS, JOBS, EMPTY = 3_000_000, 48, 1000
+STEPS, JOBS, EMPTY = 8_000_000, 200, 1000
 WORKERS = (1, 2, 4)
 OVERHEAD_MS, EFFICIENCY = 20.0, 0.95
 MANY = 1000
