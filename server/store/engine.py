@@ -157,11 +157,13 @@ def _planned_anew(connection: Any, _record: Any) -> None:
     """Sets up a connection to PostgreSQL for short statements, each planned for its own values.
 
     A plan for any text, which it makes once a driver has prepared a statement, reads the whole index of trigrams for a
-    text that this index says nothing about. Compiling a plan takes 0.4 s, more than any statement here.
+    text that this index says nothing about. Compiling a plan takes 0.4 s, more than any statement here; and looking for
+    the best order of eight joins takes 30 ms (`terms_asked`), where the order that is written takes 0.8 ms and serves.
     """
     with connection.cursor() as cursor:
         cursor.execute("SET plan_cache_mode = force_custom_plan")
         cursor.execute("SET jit = off")
+        cursor.execute("SET join_collapse_limit = 1")
     connection.commit()
 
 
