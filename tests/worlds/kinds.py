@@ -122,6 +122,30 @@ REPORTING: dict[str, Kind] = {
     "six-volts": replace(
         _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
     ),
+    "axis-steps": replace(
+        _AXIS, rate=(250.0,), bits=(15,), contacts=(TANH, BRISTLE), motions=("steps", "random steps"), body=True
+    ),
+    "axis-current-table": replace(
+        _AXIS,
+        drive=CURRENT,
+        rate=(400.0,),
+        bits=(20,),
+        contacts=(SWITCH,),
+        horizontal=True,
+        motions=("sines", "via points"),
+        recorded=("drive",),
+        known_loop=False,
+    ),
+    "planar-current": replace(
+        _PLANAR,
+        drive=CURRENT,
+        rate=(400.0,),
+        bits=(17,),
+        contacts=(SWITCH,),
+        motions=("sines", "via points"),
+        recorded=("set_point", "drive", "velocity"),
+        known_loop=False,
+    ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
 
