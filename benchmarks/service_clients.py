@@ -129,7 +129,11 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
     loop = asyncio.get_running_loop()
 
     def told() -> None:
-        if parent.recv() == "end":
+        try:
+            word = parent.recv()
+        except EOFError:  # whoever measures was killed
+            word = "end"
+        if word == "end":
             loop.remove_reader(parent.fileno())
             over.set()
         else:
