@@ -8,7 +8,8 @@ second's jitter, less the first's, is what the load adds. Then experiments are s
 the same load; the moments of a stop are the mock's own record, on the clock that all processes of a machine share.
 An application of FastAPI that does nothing is asked meanwhile, in a process of its own: the floor of a plain GET under
 this load; and at last once more with nothing beside it. With --where the answers of the service say where their time
-went, which is printed for the slowest hundredth.
+went, which is printed for the slowest hundredth. With --busy 2 two programs that have nothing to do with the service
+compute without pause meanwhile.
 """
 
 from __future__ import annotations
@@ -33,7 +34,17 @@ from benchmarks.lasting_fit import LastingFit
 from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
 from benchmarks.service_clients import Seen, clients
-from benchmarks.service_process import COMMAND, ROBOT, RunningService, child, children, dice, ramp, started_service, sway
+from benchmarks.service_process import (
+    COMMAND,
+    ROBOT,
+    RunningService,
+    child,
+    children,
+    dice,
+    ramp,
+    started_service,
+    sway,
+)
 from benchmarks.slow_answers import where_it_went
 from benchmarks.stop_latency import record_of_stop
 from daq.contracts.service.system import stop_port_after
@@ -202,8 +213,18 @@ def empty_app() -> Iterator[str]:
             process.terminate()
 
 
-def measure(seconds: float, stops: int, command: Sequence[str] = COMMAND) -> Measured:
-    """Everything, in one go, of a service that `command` starts."""
+@contextlib.contextmanager
+def computing(count: int) -> Iterator[None]:
+    """So many programs that compute without pause, each in a session of its own, as another person's would."""
+    with contextlib.ExitStack() as programs:
+        for _ in range(count):
+            command = [sys.executable, "-c", "while True: sum(range(100_000))"]
+            programs.callback(subprocess.Popen(command, start_new_session=True).kill)
+        yield
+
+
+def measure(seconds: float, stops: int, busy: int = 0, command: Sequence[str] = COMMAND) -> Measured:
+    """Everything, in one go, of a service that `command` starts, beside `busy` programs that compute."""
     found = Measured()
     with (
         tempfile.TemporaryDirectory() as name,
@@ -223,6 +244,7 @@ def measure(seconds: float, stops: int, command: Sequence[str] = COMMAND) -> Mea
             clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load,
             clients(empty, 0, ("/",), FLOOR_RATE) as floor,
             LastingFit(service, short) as fit,
+            computing(busy),
         ):
             while not fit.runs():
                 time.sleep(0.1)
@@ -236,9 +258,9 @@ def measure(seconds: float, stops: int, command: Sequence[str] = COMMAND) -> Mea
                 **{name: [number] for name, number in load.processes.items()},
                 "stops and questions": [os.getpid()],
             }
-            busy = ProcessorTime(processes)
+            spent = ProcessorTime(processes)
             found.loaded, lost = record(service, seconds, found)
-            found.busy = busy.shares()
+            found.busy = spent.shares()
             found.lost = (lost, len(found.loaded))
             stop_again_and_again(service, control, fit, stops, found)
         found.seen, found.floor = load.seen, floor.seen
@@ -314,14 +336,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks service_load", description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="length of each of the two recordings")
     parser.add_argument("--stops", type=int, default=60)
+    parser.add_argument("--busy", type=int, default=0, help="programs that compute beside all of it")
     parser.add_argument("--where", action="store_true", help="where the time of the slowest hundredth went")
     parser.add_argument("--quick", action="store_true", help="10 s and 10 stops")
     given = parser.parse_args()
     seconds, stops = (10.0, 10) if given.quick else (given.seconds, given.stops)
-    found = measure(seconds, stops, TIMED if given.where else COMMAND)
+    found = measure(seconds, stops, given.busy, TIMED if given.where else COMMAND)
     if given.where:
         print(where_it_went(found.seen.answers))
-    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit; 50 Hz at {BAUD} baud"
+    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit, {given.busy} programs; 50 Hz at {BAUD} baud"
     return show(title, "python -m benchmarks service_load", figures_of(found))
 
 

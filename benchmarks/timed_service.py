@@ -101,7 +101,7 @@ def main() -> None:
 
     serve.make_app = timed_app
     serve.Connection = TimedConnection  # type: ignore[misc]
-    from daq_cli import main as daq  # noqa: PLC0415 - what it imports is replaced first
+    from daq_cli import main as daq
 
     sys.argv[0] = "daq"
     daq()

@@ -19,8 +19,8 @@ from pydantic import ValidationError
 from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
-from sqlalchemy.sql.selectable import SelectBase
 from sqlalchemy.sql.dml import UpdateBase
+from sqlalchemy.sql.selectable import SelectBase
 from sqlalchemy.sql.util import find_tables
 
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
