@@ -6,8 +6,10 @@ The mock behind a pseudo-terminal at 115200 baud, the service, its worker proces
 machine's cores. First an experiment is recorded while nobody watches, then another one under the whole load; the
 second's jitter, less the first's, is what the load adds. Then experiments are stopped by REST at random moments, under
 the same load; the moments of a stop are the mock's own record, on the clock that all processes of a machine share.
-At last an application of FastAPI that does nothing is asked as often, by the same clients, with nothing beside it: the
-floor of a plain GET.
+An application of FastAPI that does nothing is asked meanwhile, in a process of its own: the floor of a plain GET under
+this load; and at last once more with nothing beside it. With --where the answers of the service say where their time
+went, which is printed for the slowest hundredth. With --busy 2 two programs that have nothing to do with the service
+compute without pause meanwhile.
 """
 
 from __future__ import annotations
@@ -22,16 +24,28 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
 
 from benchmarks.figures import Figure, at_most, quantile, show
+from benchmarks.lasting_fit import LastingFit
 from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
-from benchmarks.service_clients import Clients, Seen, clients
-from benchmarks.service_process import ROBOT, RunningService, child, dice, ramp, started_service, sway
+from benchmarks.service_clients import Seen, clients
+from benchmarks.service_process import (
+    COMMAND,
+    ROBOT,
+    RunningService,
+    child,
+    children,
+    dice,
+    ramp,
+    started_service,
+    sway,
+)
+from benchmarks.slow_answers import where_it_went
 from benchmarks.stop_latency import record_of_stop
 from daq.contracts.service.system import stop_port_after
 from daq.traces.reader import read_trace
@@ -47,7 +61,9 @@ USED_TARGET_MS = 55.0
 GET_TARGET_MS = 25.0
 OTHERS = "other programs"
 OWN_DOOR, STOP_DOOR = "through the service", "through the stop listener"
-FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
+FLOOR_RATE = 20.0
+"""GETs a second of the empty application beside the service: few, since they are part of the load."""
+TIMED = (sys.executable, "-m", "benchmarks.timed_service")
 EMPTY_APP = """
 import sys, uvicorn
 from fastapi import FastAPI
@@ -79,6 +95,9 @@ class Measured:
     """Share of one core that each process took while the second experiment was recorded."""
     seen: Seen = field(default_factory=Seen)
     floor: Seen = field(default_factory=Seen)
+    """The empty application under the same load."""
+    alone: Seen = field(default_factory=Seen)
+    """The empty application with nothing beside it."""
 
 
 def jitter(path: Path) -> tuple[list[float], int]:
@@ -109,7 +128,7 @@ def record(service: RunningService, seconds: float, found: Measured) -> tuple[li
 class ProcessorTime:
     """Processor time of processes by name, and of everything else on this machine, from now on."""
 
-    def __init__(self, processes: dict[str, int]) -> None:
+    def __init__(self, processes: dict[str, Sequence[int]]) -> None:
         self._processes = processes
         self._begun = time.monotonic()
         self._before = self._now()
@@ -121,7 +140,8 @@ class ProcessorTime:
         return shares | {OTHERS: max(0.0, shares[OTHERS] - sum(shares.values()) + shares[OTHERS])}
 
     def _now(self) -> dict[str, float]:
-        return {name: _processor_time(number) for name, number in self._processes.items()} | {OTHERS: _machine_time()}
+        own = {name: sum(map(_processor_time, numbers)) for name, numbers in self._processes.items()}
+        return own | {OTHERS: _machine_time()}
 
 
 def _machine_time() -> float:
@@ -143,7 +163,9 @@ def stop(line: http.client.HTTPConnection) -> tuple[float, bool]:
     return at, bool(json.loads(line.getresponse().read())["confirmed"])
 
 
-def stop_again_and_again(service: RunningService, control: MockControl, fit: str, times: int, found: Measured) -> None:
+def stop_again_and_again(
+    service: RunningService, control: MockControl, fit: LastingFit, times: int, found: Measured
+) -> None:
     """Stops experiments while they are recorded, at moments that have nothing to do with the control period.
 
     Through the service's own door, on a connection that is open already, and through the stop listener's beside it,
@@ -172,7 +194,7 @@ def stop_again_and_again(service: RunningService, control: MockControl, fit: str
         found.frozen[door].append(frozen - at)
         found.used[door].append(used - at)
         found.unconfirmed += not confirmed
-        found.fitting += service.ask("GET", f"/jobs/{fit}")["state"] == "running"
+        found.fitting += fit.runs()
         service.ended("experiments", experiment)
         ready_again(service)
     for line in doors.values():
@@ -191,14 +213,24 @@ def empty_app() -> Iterator[str]:
             process.terminate()
 
 
-def measure(seconds: float, stops: int) -> Measured:
-    """Everything, in one go."""
+@contextlib.contextmanager
+def computing(count: int) -> Iterator[None]:
+    """So many programs that compute without pause, each in a session of its own, as another person's would."""
+    with contextlib.ExitStack() as programs:
+        for _ in range(count):
+            command = [sys.executable, "-c", "while True: sum(range(100_000))"]
+            programs.callback(subprocess.Popen(command, start_new_session=True).kill)
+        yield
+
+
+def measure(seconds: float, stops: int, busy: int = 0, command: Sequence[str] = COMMAND) -> Measured:
+    """Everything, in one go, of a service that `command` starts, beside `busy` programs that compute."""
     found = Measured()
     with (
         tempfile.TemporaryDirectory() as name,
         started_mock("--pty", "--baud", str(BAUD)) as mock,
         MockControl(mock.control) as control,
-        started_service(Path(name), f"{mock.url}?baud={BAUD}") as service,
+        started_service(Path(name), f"{mock.url}?baud={BAUD}", command=command) as service,
     ):
         service.ask("POST", "/connect")
         found.idle, _ = record(service, seconds, found)
@@ -207,44 +239,38 @@ def measure(seconds: float, stops: int) -> Measured:
             "jobs",
             service.ask("POST", "/jobs", json={"kind": "compare", "traces": [short], "models": ["machine"]})["id"],
         )
-        with clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load:
-            fit = service.ask("POST", "/jobs", json=FIT | {"traces": [short]})["id"]
+        with (
+            empty_app() as empty,
+            clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load,
+            clients(empty, 0, ("/",), FLOOR_RATE) as floor,
+            LastingFit(service, short) as fit,
+            computing(busy),
+        ):
+            while not fit.runs():
+                time.sleep(0.1)
+            load.begin_anew()
+            floor.begin_anew()
             processes = {
-                "service": service.process.pid,
-                "owner of the port": child(service.process.pid, b"server.owner"),
-                "fit": child(service.process.pid, b"spawn_main"),
-                "mock": mock.number,
-                **load.processes,
-                "stops and questions": os.getpid(),
+                "service": [service.process.pid],
+                "owner of the port": [child(service.process.pid, b"server.owner")],
+                "jobs": list(children(service.process.pid, b"spawn_main")),
+                "mock": [mock.number],
+                **{name: [number] for name, number in load.processes.items()},
+                "stops and questions": [os.getpid()],
             }
-            _under_load(service, control, load, fit, seconds, stops, processes, found)
-        found.seen = load.seen
-        service.ask("POST", f"/jobs/{fit}/cancel")
+            spent = ProcessorTime(processes)
+            found.loaded, lost = record(service, seconds, found)
+            found.busy = spent.shares()
+            found.lost = (lost, len(found.loaded))
+            stop_again_and_again(service, control, fit, stops, found)
+        found.seen, found.floor = load.seen, floor.seen
+        if fit.problem:
+            found.endings.append(f"the fits ended: {fit.problem}")
         service.ask("POST", "/disconnect")
     with empty_app() as url, clients(url, 0, ("/",), RATE) as alone:
         time.sleep(min(seconds, 10.0))
-    found.floor = alone.seen
+    found.alone = alone.seen
     return found
-
-
-def _under_load(
-    service: RunningService,
-    control: MockControl,
-    load: Clients,
-    fit: str,
-    seconds: float,
-    stops: int,
-    processes: dict[str, int],
-    found: Measured,
-) -> None:
-    while service.ask("GET", f"/jobs/{fit}")["state"] == "queued":
-        time.sleep(0.1)
-    load.begin_anew()
-    busy = ProcessorTime(processes)
-    found.loaded, lost = record(service, seconds, found)
-    found.busy = busy.shares()
-    found.lost = (lost, len(found.loaded))
-    stop_again_and_again(service, control, fit, stops, found)
 
 
 def figures_of(found: Measured) -> list[Figure]:
@@ -252,8 +278,9 @@ def figures_of(found: Measured) -> list[Figure]:
     idle, loaded = (1e3 * quantile(times, 0.99) for times in (found.idle, found.loaded))
     lost, count = found.lost
     seen = found.seen
-    gets, floor, late = (
-        [1e3 * one for one in times] for times in (seen.latencies, found.floor.latencies, seen.own_lateness)
+    gets, floor, alone, late = (
+        [1e3 * one for one in times]
+        for times in (seen.latencies, found.floor.latencies, found.alone.latencies, seen.own_lateness)
     )
 
     def spread(times: list[float]) -> str:
@@ -285,7 +312,12 @@ def figures_of(found: Measured) -> list[Figure]:
             f"a fit ran beside {found.fitting} of {sum(map(len, found.used.values()))}",
         ),
         at_most("plain GET, p99", quantile(gets, 0.99), GET_TARGET_MS, "ms", f"{spread(gets)}, {len(gets)} requests"),
-        Figure("an empty FastAPI application, alone, p99", f"{quantile(floor, 0.99):.3g} ms", beside=spread(floor)),
+        Figure(
+            "an empty FastAPI application, under the same load, p99",
+            f"{quantile(floor, 0.99):.3g} ms",
+            beside=f"{spread(floor)}, {len(floor)} requests",
+        ),
+        Figure("an empty FastAPI application, alone, p99", f"{quantile(alone, 0.99):.3g} ms", beside=spread(alone)),
         Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),
         Figure("processor time, of one core", f"{100 * sum(found.busy.values()):.0f} %", beside=busy),
         Figure("until all watchers had the last 60 s", f"{seen.joining:.2f} s", beside="all of them join at once"),
@@ -304,11 +336,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks service_load", description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="length of each of the two recordings")
     parser.add_argument("--stops", type=int, default=60)
+    parser.add_argument("--busy", type=int, default=0, help="programs that compute beside all of it")
+    parser.add_argument("--where", action="store_true", help="where the time of the slowest hundredth went")
     parser.add_argument("--quick", action="store_true", help="10 s and 10 stops")
     given = parser.parse_args()
     seconds, stops = (10.0, 10) if given.quick else (given.seconds, given.stops)
-    found = measure(seconds, stops)
-    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit; 50 Hz at {BAUD} baud"
+    found = measure(seconds, stops, given.busy, TIMED if given.where else COMMAND)
+    if given.where:
+        print(where_it_went(found.seen.answers))
+    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit, {given.busy} programs; 50 Hz at {BAUD} baud"
     return show(title, "python -m benchmarks service_load", figures_of(found))
 
 

@@ -7,7 +7,7 @@ import random
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ ANSWER_WITHIN = 100.0
 END_WITHIN = 15.0
 ENDS = ("done", "failed", "cancelled", "interrupted")
 DATABASES = ("sqlite", "postgresql")
-COMMAND = [sys.executable, "-c", "from daq_cli import main; main()"]
+COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
 
 
 @dataclass
@@ -81,11 +81,12 @@ def database_of(kind: str, folder: Path) -> Iterator[str]:
         yield server.database()
 
 
-def serving(folder: Path, port: str, *options: str) -> subprocess.Popen[bytes]:
-    """The process of `daq serve`, which may not answer yet; it keeps everything in `folder`, its log too."""
+def serving(folder: Path, port: str, *options: str, command: Sequence[str] = COMMAND) -> subprocess.Popen[bytes]:
+    """The process of `daq serve`, which may not answer yet; it keeps everything in `folder`, its log too. `command` is
+    the program `daq`."""
     with (folder / "service.log").open("ab") as log:
         return subprocess.Popen(
-            [*COMMAND, "--port", port, "serve", "--port", "0", *options],
+            [*command, "--port", port, "serve", "--port", "0", *options],
             cwd=folder,
             env=environment_of(folder),
             stdout=subprocess.PIPE,
@@ -94,9 +95,11 @@ def serving(folder: Path, port: str, *options: str) -> subprocess.Popen[bytes]:
 
 
 @contextlib.contextmanager
-def started_service(folder: Path, port: str, *options: str) -> Iterator[RunningService]:
+def started_service(
+    folder: Path, port: str, *options: str, command: Sequence[str] = COMMAND
+) -> Iterator[RunningService]:
     """A service that answers, ended with the block."""
-    process = serving(folder, port, *options)
+    process = serving(folder, port, *options, command=command)
     assert process.stdout is not None
     try:
         url = process.stdout.readline().decode().strip()
@@ -133,8 +136,15 @@ def dice(seed: int) -> random.Random:
 
 def child(process: int, mark: bytes) -> int:
     """The child of a process whose command line has this in it. Raises RuntimeError when there is none."""
+    found = next(children(process, mark), None)
+    if found is None:
+        raise RuntimeError(f"process {process} has no child with {mark!r} in its command line")
+    return found
+
+
+def children(process: int, mark: bytes) -> Iterator[int]:
+    """The children of a process whose command lines have this in them, in the order in which they began."""
     for thread in Path(f"/proc/{process}/task").iterdir():
         for number in (thread / "children").read_text("utf-8").split():
             if mark in Path(f"/proc/{number}/cmdline").read_bytes():
-                return int(number)
-    raise RuntimeError(f"process {process} has no child with {mark!r} in its command line")
+                yield int(number)

@@ -18,6 +18,7 @@ from server.access.caller import Caller
 from server.access.connections import Connection
 from server.access.gate import Gate
 from server.access.origin import is_loopback
+from server.access.session_cookie import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.audit.words import line_of
@@ -107,6 +108,7 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         stop_port,
         metrics.count_request,
         metrics.count_refusal,
+        cookie=session_cookie(section.oidc.address),
         audit=services.audit,
     )
 
@@ -124,6 +126,7 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         service_port=listener.getsockname()[1],
         open_on_loopback=_is_open_here(section),
         names=tuple(name.lower() for name in section.names),
+        cookie=session_cookie(section.oidc.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
         database_url=section.database_url,
         sqlite=sqlite_file(section.database_url),

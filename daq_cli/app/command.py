@@ -17,6 +17,7 @@ from daq.contracts.errors import DaqError, SpecError
 from daq_cli.app.context import Invocation
 from daq_cli.app.lazy import ALL_ROBOTS, HERE, LazyGroup
 from firmware_protocol.errors import ProtocolError
+from firmware_protocol.invalid import message_of
 
 WRONG_NAMES = frozenset(
     {
@@ -155,7 +156,9 @@ def _print_whatever_files_are_called() -> None:
 def _show_usage_error(error: Any) -> NoReturn:
     """Ends with one line on what is wrong with the command line and where help is; without any words, with the help
     itself."""
-    message = error.format_message().strip()
+    if getattr(error, "message", ""):  # typer has pydantic look at some values, and passes on its words
+        error.message = message_of({"msg": error.message})
+    message = error.format_message().strip().removesuffix(".")
     if type(error).__name__ == "NoArgsIsHelpError":
         print(message, file=sys.stderr)
         raise SystemExit(exit_codes.WRONG_INPUT)

@@ -24,7 +24,7 @@ from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
-from server.access.session_cookie import says_where_it_is_from, session_of
+from server.access.session_cookie import says_where_it_is_from, session_cookie, session_of
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.access.turns import Turns
@@ -54,6 +54,7 @@ class Gate:
     stop_port:        the port of the stop listener, at which the page may request a stop, too
     observed:         called with method, status and duration (s) of every request
     refused:          called with the kind of problem of every request and WebSocket that is refused
+    cookie:           the name of the cookie of people who have signed in
     """
 
     tokens: KnownTokens
@@ -68,6 +69,7 @@ class Gate:
     """Number of open WebSockets by caller's name."""
     turns: Turns = field(default_factory=Turns)
     look_every: float = LOOK_EVERY
+    cookie: str = session_cookie(None)
     audit: Audit | None = None
     """Notes what is asked; None where nothing is noted."""
 
@@ -213,7 +215,7 @@ class Gate:
                     raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
                 return caller
         local = LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
-        if secret := session_of(headers):
+        if secret := session_of(headers, self.cookie):
             caller = await self._of_session(scope, secret, needed=local is None)
             if caller is not None and (not self.tokens.is_over(caller) or _is_post(scope, STOP)):
                 changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS

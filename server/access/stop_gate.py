@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 from server.access.caller import LOCAL, Caller
 from server.access.origin import is_known_name, is_this_computers_user, name_of
-from server.access.session_cookie import says_where_it_is_from, session_of
+from server.access.session_cookie import says_where_it_is_from, session_cookie, session_of
 from server.problems import ProblemError
 
 
@@ -32,12 +32,13 @@ class Tokens(Protocol):
 @dataclass(frozen=True)
 class StopGate:
     """Admits everybody who may see the robot. `service_port`: the port of the service's page, which may request a stop,
-    too."""
+    too. `cookie`: the name of the cookie of people who have signed in."""
 
     tokens: Tokens
     open_on_loopback: bool
     names: tuple[str, ...]
     service_port: int
+    cookie: str = session_cookie(None)
 
     def admit(self, headers: Mapping[str, str]) -> Caller:
         """Returns the caller. Raises a 401 or 403, and TokensCannotBeReadError."""
@@ -71,7 +72,7 @@ class StopGate:
 
     def _of_session(self, headers: Mapping[str, str]) -> Caller | None:
         """Returns the person who has signed in. Their request must come from the page."""
-        secret = session_of(headers)
+        secret = session_of(headers, self.cookie)
         return self._known(secret) if secret and says_where_it_is_from(headers) else None
 
     def _known(self, token: str) -> Caller | None:

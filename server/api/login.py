@@ -13,16 +13,13 @@ from fastapi.responses import RedirectResponse
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import LoginWays, OpenIdWay, SignedOut
 from server.access.caller import Caller
-from server.access.session_cookie import OVER_TLS, PLAIN
+from server.access.session_cookie import is_over_tls, session_cookie, sign_in_cookie
 from server.access.sign_in import GOOD_FOR
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS, ProblemError, not_found
 from server.services import Services
 
 START = "/api/v1/login/start"
-ON_THE_WAY = "daq-sign-in"
-"""Name of the cookie that ties an answer of the provider to the browser that asked. It must come with a link from the
-provider's page, so it is `lax`; the session's cookie is `strict`."""
 router = APIRouter(tags=["system"], responses=PROBLEMS)
 log = logging.getLogger("server.access")
 
@@ -51,7 +48,8 @@ async def start_login(
         return _told(request, services, problem)
     answer = RedirectResponse(address, 303)
     word = services.sign_ins.begin(asked, robot)
-    _set_cookie(answer, services, ON_THE_WAY, word, int(GOOD_FOR), "lax", "/api/v1/login")
+    # It must come with a link from the provider's page, so it is `lax`; the session's cookie is `strict`.
+    _set_cookie(answer, services, sign_in_cookie(_address(services)), word, int(GOOD_FOR), "lax", "/api/v1/login")
     return answer
 
 
@@ -65,7 +63,7 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     if provider is None:
         raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
     given = dict(request.query_params)
-    way = services.sign_ins.back(given.get("state", ""), request.cookies.get(ON_THE_WAY, ""))
+    way = services.sign_ins.back(given.get("state", ""), request.cookies.get(sign_in_cookie(_address(services)), ""))
     if way is None:
         line = "this answer of the provider was used, is too old, or was asked for by another browser"
         return _told(request, services, ProblemError(403, "sign-in-unknown", line, "begin anew"))
@@ -79,8 +77,8 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))
     answer = RedirectResponse(f"/?robot={way.robot}" if way.robot else "/", 303)
-    _forget_cookie(answer, services, ON_THE_WAY, "/api/v1/login")
-    _set_cookie(answer, services, session_cookie(services), secret, int(lasts.total_seconds()), "strict", "/")
+    _forget_cookie(answer, services, sign_in_cookie(_address(services)), "/api/v1/login")
+    _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict", "/")
     return answer
 
 
@@ -94,7 +92,7 @@ async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> 
         log.info("%s has signed out", caller.name)
         if services.provider is not None:
             address = await services.provider.sign_out_address(services.clock.monotonic())
-    _forget_cookie(response, services, session_cookie(services), "/")
+    _forget_cookie(response, services, session_cookie(_address(services)), "/")
     return SignedOut(provider=address)
 
 
@@ -112,13 +110,8 @@ def _of_sign_in(request: Request, caller: Caller, services: Services) -> AuditNo
     )
 
 
-def session_cookie(services: Services) -> str:
-    """Returns the name of the session's cookie."""
-    return OVER_TLS if _is_over_tls(services) else PLAIN
-
-
-def _is_over_tls(services: Services) -> bool:
-    return (services.settings.server.oidc.address or "").startswith("https://")
+def _address(services: Services) -> str | None:
+    return services.settings.server.oidc.address
 
 
 def _set_cookie(
@@ -129,14 +122,14 @@ def _set_cookie(
         value,
         max_age=seconds,
         path=path,
-        secure=_is_over_tls(services),
+        secure=is_over_tls(_address(services)),
         httponly=True,
         samesite=same_site,  # type: ignore[arg-type]
     )
 
 
 def _forget_cookie(answer: Response, services: Services, name: str, path: str) -> None:
-    answer.delete_cookie(name, path=path, secure=_is_over_tls(services), httponly=True)
+    answer.delete_cookie(name, path=path, secure=is_over_tls(_address(services)), httponly=True)
 
 
 def _told(request: Request, services: Services, problem: ProblemError) -> Response:

@@ -62,7 +62,13 @@ def metrics(services: ServicesDep, _: Viewer) -> Response:
 async def get_me(services: ServicesDep, caller: Viewer) -> Me:
     """Returns the name and the role of the caller."""
     owned = tuple(rig.robot.name for rig in services.robots() if caller.owns(rig.owners))
-    return Me(name=caller.name, role=caller.role, owner_of=owned, session_until=caller.expires)
+    return Me(
+        name=caller.name,
+        role=caller.role,
+        owner_of=owned,
+        is_known=caller.token is not None,
+        session_until=caller.expires,
+    )
 
 
 @router.get("/system")

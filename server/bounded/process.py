@@ -15,9 +15,11 @@ from daq.contracts.errors import DaqError
 from server.bounded.messages import ORDER, Answer, Limits, ReadUpload
 from server.bounded.motion import preview_of
 from server.bounded.upload import read_upload
+from server.core_sharing import ask_for_slices, weigh_session
 from server.problems import NO_ROOM
 
-NICENESS = 10
+NICENESS, SESSION_NICENESS = 10, 5
+"""Nice values of the process, and of its session: somebody waits for the answer, but the service goes first."""
 GROWN = 256 << 20
 """Peak resident memory in bytes beyond which a process ends after its answer, and is not reused."""
 LONGEST_LINE = 300
@@ -28,6 +30,8 @@ OOM_SCORE = "800"
 def main() -> int:
     """Reads the limits, then reads orders and answers them until the service closes its end."""
     os.nice(NICENESS)
+    weigh_session(SESSION_NICENESS)
+    ask_for_slices(0)  # the service's are short, and inherited
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE, "ascii")
     orders: queue.SimpleQueue[str] = queue.SimpleQueue()

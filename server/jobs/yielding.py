@@ -11,16 +11,16 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from pathlib import Path
 
 from daq.executors.parent import end_with_parent
 from server import logs
+from server.core_sharing import ask_for_slices, weigh_session
 
 NICENESS = 19
 """Nice value of the process within its session."""
-AUTOGROUP, SESSION_NICENESS = Path("/proc/self/autogroup"), 5
-"""Nice value of the session: it has a third of an ordinary session's weight, so that jobs progress even on a computer
-that is always busy."""
+SESSION_NICENESS = 10
+"""Nice value of the session: it has a tenth of an ordinary session's weight, so that jobs progress even on a computer
+that is always busy. With a third (5) the service itself waited for a core in most of its slowest answers."""
 
 
 def begin_worker() -> None:
@@ -37,7 +37,7 @@ def give_way() -> None:
         os.setsid()
     os.nice(NICENESS)
     if sys.platform == "linux":
-        with contextlib.suppress(OSError):  # the kernel has no autogroups
-            AUTOGROUP.write_text(str(SESSION_NICENESS), "ascii")
+        weigh_session(SESSION_NICENESS)
         with contextlib.suppress(OSError):  # forbidden in some containers
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        ask_for_slices(0)  # the service's are short, and inherited

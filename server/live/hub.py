@@ -32,6 +32,9 @@ LOOK_EVERY = 1.0
 """Longest time (s) between two reads of the status, when nothing has announced a change."""
 MOST_OFTEN = 0.05
 """Shortest time (s) between two reads of the status."""
+MANY, WAITS = 8, 0.02
+"""From so many watchers on, messages other than samples wait for the next sample, at most so long (s): the end of an
+experiment brings ten messages at once, and to send one to 50 watchers takes the event loop some 3 ms."""
 PROGRESS_EVERY = 0.2
 """Time (s) between two messages about progress."""
 log = logging.getLogger("server.live")
@@ -71,6 +74,8 @@ class Hub:
         self._dirty = asyncio.Event()
         self._shown: dict[str, str] = {}
         self._watching: asyncio.Task[None] | None = None
+        self._sending: asyncio.TimerHandle | None = None
+        """Ends the wait of messages for the next sample."""
         self._experiment: Callable[[], str | None] = lambda: None
         self._progressed = 0.0
 
@@ -175,9 +180,19 @@ class Hub:
 
     def _put(self, topic: Topic, message: str, tick: int | None) -> None:
         now = self._clock.monotonic()
+        waits = tick is None and len(self._clients) >= MANY and self.clients >= MANY
         for client in self._clients:
             if topic in client.topics and (tick is None or tick % client.every == 0):
                 client.outbox.put(message, now, sample=tick is not None)
+                if not (waits and client.watches):
+                    client.something.set()
+        if waits and self._sending is None and self._loop is not None:
+            self._sending = self._loop.call_later(WAITS, self._send_what_waits)
+
+    def _send_what_waits(self) -> None:
+        self._sending = None
+        for client in self._clients:
+            if client.outbox:
                 client.something.set()
 
     async def _watch(self) -> None:

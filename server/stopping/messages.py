@@ -21,6 +21,8 @@ class Begin(FrozenRecord):
     service_port: int
     open_on_loopback: bool
     names: tuple[str, ...]
+    cookie: str
+    """Name of the cookie of people who have signed in."""
     urls: dict[str, str]
     database_url: str
     sqlite: Path | None

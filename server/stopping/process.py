@@ -59,7 +59,7 @@ def main() -> int:
     assert isinstance(begin, Begin)
     robots = Robots(begin.urls)
     tokens = StopTokens(reader_of(begin.database_url, begin.sqlite), _callers(begin.tokens))
-    gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port)
+    gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port, begin.cookie)
     teller = Teller(sys.stdout.fileno())
 
     def told(robot: str, result: StopResult, asked: Asked) -> None:

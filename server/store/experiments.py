@@ -40,7 +40,7 @@ class ExperimentStore:
         self._store = store
         self._counting = threading.Lock()
         self._waiting: dict[str, int] = {}
-        self.page = Remembered(store, self._page)
+        self.page = Remembered(store, self._page, (ExperimentRow,))
 
     @contextmanager
     def _changing(self, *robots: str) -> Iterator[Session]:
@@ -311,6 +311,7 @@ def as_experiment(row: ExperimentRow) -> Experiment:
         submitted=row.submitted,
         submitted_by=row.submitted_by,
         owner=row.owner,
+        changed_by=row.changed_by,
         content=digest_of(spec, row.at) if row.state == "queued" else "",
         approval=approval_of(row),
         started=row.started,

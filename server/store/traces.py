@@ -85,7 +85,7 @@ class TraceStore:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self.page = Remembered(store, self._page)
+        self.page = Remembered(store, self._page, (TraceRow, TraceTagRow, ArchivedRow))
 
     def insert(self, new: NewTrace, is_there: Callable[[str], bool] = lambda _file: True) -> None:
         """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and

@@ -89,6 +89,8 @@ class Experiment(Wire):
     owner: str = ""
     """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule. Empty at
     an older service."""
+    changed_by: str | None = None
+    """Who changed its specification last: like its owner and whoever submitted it, they cannot approve it."""
     content: str = ""
     """While it waits: a digest of all that an approval is bound to. It changes with the specification, the start time,
     the machine file and the limits."""

@@ -30,6 +30,9 @@ class Me(Wire):
     role: Role
     owner_of: tuple[str, ...] = ()
     """Robots of which they are an owner: there they may change and cancel everybody's experiments."""
+    is_known: bool = True
+    """Whether a token or a session says who they are. A user of this computer without one cannot approve experiments:
+    nobody can tell them from whoever submitted them."""
     session_until: AwareDatetime | None = None
     """When they must sign in again; None for a token, and for a user of this computer."""
 

@@ -35,7 +35,13 @@ def people(robot: httpx.Client, tmp_path: Path) -> dict[str, Person]:
 
 @pytest.mark.parametrize(("name", "owned"), [("vera", []), ("anna", []), ("olga", ["ma2000"]), ("ada", ["ma2000"])])
 def test_everybody_is_told_their_role_and_their_arms(people: dict[str, Person], name: str, owned: list[str]) -> None:
-    assert people[name].me() == {"name": name, "role": PEOPLE[name], "owner_of": owned, "session_until": None}
+    assert people[name].me() == {
+        "name": name,
+        "role": PEOPLE[name],
+        "owner_of": owned,
+        "is_known": True,
+        "session_until": None,
+    }
 
 
 def test_an_operator_changes_and_cancels_their_own(people: dict[str, Person]) -> None:

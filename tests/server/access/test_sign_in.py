@@ -120,6 +120,11 @@ def _browser(service: Service) -> Iterator[Browser]:
         yield Browser(service, client)
 
 
+def _cookie(service: Service) -> str:
+    """Name of its sessions' cookie."""
+    return f"daq-session-{urlsplit(service.url).port}"
+
+
 def _sessions(service: Service) -> int:
     file = service.folder / "service" / "service.sqlite"
     with closing(sqlite3.connect(file)) as connection:
@@ -167,13 +172,42 @@ def test_cookies_are_for_this_page_alone(browser: Browser, provider: Provider) -
     assert "HttpOnly" in started.headers["set-cookie"]
     assert "SameSite=lax" in started.headers["set-cookie"]
     back = provider.sign_in(started.headers["location"], "anna-1")
-    cookie = next(one for one in browser.client.get(back).headers.get_list("set-cookie") if "daq-session=" in one)
+    made = browser.client.get(back).headers.get_list("set-cookie")
+    cookie = next(one for one in made if one.startswith(f"{_cookie(browser.service)}="))
     assert all(part in cookie for part in ("HttpOnly", "SameSite=strict", "Path=/", "Max-Age=43200"))
+
+
+def test_two_services_at_one_host_name_keep_their_sessions_apart(
+    service: Service, provider: Provider, tmp_path: Path
+) -> None:
+    provider.person("berta-1", preferred_username="berta", groups=["robot-guests"])
+    # This client sends cookies as browsers do: to every port of the host.
+    with service_of_people(tmp_path, provider.url) as other, httpx.Client(timeout=TIMEOUT) as client:
+
+        def begin(at: Service) -> str:
+            return str(client.get(f"{at.url}/api/v1/login/start").headers["location"])
+
+        def me(at: Service) -> str:
+            return str(client.get(f"{at.url}/api/v1/me").json().get("name"))
+
+        def stops(at: Service) -> int:
+            port = client.get(f"{at.url}/api/v1/system").json()["stop_port"]
+            listener = f"http://127.0.0.1:{port}/api/v1/fleet/stop"
+            return client.post(listener, headers={"Origin": at.url}).status_code
+
+        both = [(provider.sign_in(begin(at), subject), at) for at, subject in ((service, "anna-1"), (other, "berta-1"))]
+        for back, _ in both:
+            assert client.get(back).headers["location"] == "/"
+        assert (me(service), me(other)) == ("anna", "berta")
+        assert [stops(at) for _, at in both] == [200, 200]
+        assert client.post(f"{other.url}/api/v1/logout", headers={"Origin": other.url}).status_code == 200
+        assert (me(service), me(other)) == ("anna", "None")
+        assert [stops(at) for _, at in both] == [200, 401]
 
 
 def test_a_secret_of_a_session_is_not_in_the_database(browser: Browser, provider: Provider) -> None:
     browser.sign_in(provider)
-    secret = browser.client.cookies["daq-session"]
+    secret = browser.client.cookies[_cookie(browser.service)]
     files = [path for path in (browser.service.folder / "service").glob("service.sqlite*") if path.is_file()]
     assert files
     assert all(secret.encode() not in path.read_bytes() for path in files)
@@ -204,7 +238,7 @@ def test_refused_sign_ins_and_sign_outs_by_command_have_rows(provider: Provider,
 
 def test_a_session_s_secret_is_no_token(browser: Browser, provider: Provider) -> None:
     browser.sign_in(provider)
-    headers = {"Authorization": f"Bearer {browser.client.cookies['daq-session']}"}
+    headers = {"Authorization": f"Bearer {browser.client.cookies[_cookie(browser.service)]}"}
     for path in ("/api/v1/robots/ma2000/queue/pause", "/api/v1/robots/ma2000/stop"):
         answer = httpx.post(f"{browser.service.url}{path}", headers=headers, timeout=TIMEOUT)
         assert kind_of(answer) == (401, "token-unknown")
@@ -318,7 +352,7 @@ def test_both_doors_stop_for_a_session_of_every_role(provider: Provider, service
                 assert kind_of(browser.ask("POST", "/robots/ma2000/connect")) == (403, "operator-needed")
             assert browser.ask("POST", "/robots/ma2000/stop").json()["delivered"] is not None
             listener = f"http://127.0.0.1:{stop_port}/api/v1/robots/ma2000/stop"
-            cookie = {"Cookie": f"daq-session={browser.client.cookies['daq-session']}"}
+            cookie = {"Cookie": f"{_cookie(service)}={browser.client.cookies[_cookie(browser.service)]}"}
             page = {"Origin": service.url}
             answer = httpx.post(listener, headers=cookie | page, timeout=TIMEOUT)
             assert answer.status_code == 200, answer.text
@@ -340,11 +374,11 @@ def test_a_session_outlasts_the_provider_and_a_restart_and_ends_in_time(tmp_path
         provider.person("anna-1", **OPERATORS)
         with service_of_people(tmp_path, provider.url) as service, _browser(service) as browser:
             browser.sign_in(provider)
-            cookie = browser.client.cookies["daq-session"]
+            cookie = browser.client.cookies[_cookie(browser.service)]
         provider.end()
     with service_of_people(tmp_path, provider.url) as service, _browser(service) as browser:
         assert browser.begin() == "/?sign-in=provider-away"
-        browser.client.cookies.set("daq-session", cookie)
+        browser.client.cookies.set(_cookie(service), cookie)
         assert browser.me().json()["name"] == "anna"
         port = browser.client.get("/api/v1/system").json()["stop_port"]
         file = service.folder / "service" / "service.sqlite"
@@ -355,7 +389,7 @@ def test_a_session_outlasts_the_provider_and_a_restart_and_ends_in_time(tmp_path
         assert kind_of(browser.ask("POST", "/robots/ma2000/queue/pause")) == (401, "token-needed")
         assert browser.ask("POST", "/robots/ma2000/stop").status_code == 200, "an ended session still stops for an hour"
         listener = f"http://127.0.0.1:{port}/api/v1/fleet/stop"
-        headers = {"Cookie": f"daq-session={cookie}", "Origin": service.url}
+        headers = {"Cookie": f"{_cookie(service)}={cookie}", "Origin": service.url}
         assert httpx.post(listener, headers=headers, timeout=TIMEOUT).status_code == 200
         with closing(sqlite3.connect(file)) as connection, connection:
             connection.execute("UPDATE sessions SET expires = datetime('now', '-2 hours') || '.000000'")
@@ -392,7 +426,7 @@ def test_a_stop_waits_neither_for_the_database_nor_for_the_provider(tmp_path: Pa
         browser.sign_in(provider)
         assert browser.ask("POST", "/robots/ma2000/connect").status_code == 200
         port = browser.client.get("/api/v1/system").json()["stop_port"]
-        cookie = browser.client.cookies["daq-session"]
+        cookie = browser.client.cookies[_cookie(browser.service)]
         provider.end()
         file = service.folder / "service" / "service.sqlite"
         with closing(sqlite3.connect(file, isolation_level=None)) as connection:
@@ -400,7 +434,7 @@ def test_a_stop_waits_neither_for_the_database_nor_for_the_provider(tmp_path: Pa
             try:
                 begun = time.monotonic()
                 assert browser.ask("POST", "/robots/ma2000/stop").json()["confirmed"] is True
-                headers = {"Cookie": f"daq-session={cookie}", "Origin": service.url}
+                headers = {"Cookie": f"{_cookie(service)}={cookie}", "Origin": service.url}
                 listener = f"http://127.0.0.1:{port}/api/v1/robots/ma2000/stop"
                 assert httpx.post(listener, headers=headers, timeout=TIMEOUT).json()["confirmed"] is True
                 assert time.monotonic() - begun < 5.0, "SQLite waits 5 s for a lock"

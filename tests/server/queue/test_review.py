@@ -232,6 +232,7 @@ def test_nobody_approves_without_a_token_what_they_may_have_submitted_with_one(
 ) -> None:
     anna = people["anna"]
     identity = anna.submit()
+    assert robot.get(f"{robot.base_url.copy_with(path='/api/v1/me')}").json()["is_known"] is False, "the page asks this"
     body = {"content": _content(anna, identity)}
     assert kind_of(robot.put(f"/experiments/{identity}/approval", json=body)) == (403, "own-experiment")
     every = anna.ask("POST", "/schedules", {"spec": SPEC, "every": 86400, "starts": LATER}).json()
@@ -250,6 +251,7 @@ def test_a_change_ends_the_approval_and_whoever_changed_it_cannot_give_it(people
     changed = olga.ask("PATCH", f"/experiments/{identity}", {"spec": longer}).json()
     assert (changed["approval"], changed["needs_approval_of"]) == (None, "operator")
     assert changed["content"] != before
+    assert (changed["owner"], changed["changed_by"]) == ("anna", "olga")
     assert kind_of(bert.ask("PUT", path, {"content": before})) == (409, "content-changed")
     assert kind_of(olga.ask("PUT", path, {"content": changed["content"]})) == (403, "own-experiment")
     assert bert.ask("PUT", path, {"content": changed["content"]}).status_code == 200

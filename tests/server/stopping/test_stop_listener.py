@@ -395,6 +395,7 @@ def _begin(folder: Path) -> Begin:
         service_port=8300,
         open_on_loopback=True,
         names=(),
+        cookie="daq-session",
         urls={"ma2000": "mock://"},
         database_url="sqlite://",
         sqlite=folder / "none.sqlite",

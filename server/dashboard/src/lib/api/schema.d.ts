@@ -2683,6 +2683,8 @@ export interface components {
              * @default
              */
             owner?: string;
+            /** Changed By */
+            changed_by?: string | null;
             /**
              * Content
              * @default
@@ -4029,6 +4031,11 @@ export interface components {
              * @default []
              */
             owner_of?: string[];
+            /**
+             * Is Known
+             * @default true
+             */
+            is_known?: boolean;
             /** Session Until */
             session_until?: string | null;
         };

@@ -1,7 +1,12 @@
 import { describe, expect, it } from 'vitest';
-import { mayApprove, reviewText } from './review';
+import type { Me } from '../api/types';
+import { reviewText, whyNotApprove } from './review';
 
 const APPROVAL = { by: 'bert', at: '2026-03-02T12:00:00Z', as_owner: false };
+
+function person(name: string, more: Partial<Me> = {}): Me {
+  return { name, role: 'operator', owner_of: [], is_known: true, session_until: null, ...more };
+}
 
 describe('the review of an experiment', () => {
   it('says what is missing, or who has approved', () => {
@@ -12,10 +17,23 @@ describe('the review of an experiment', () => {
   });
 
   it("is never one's own, and an owner's where it has to be", () => {
-    expect(mayApprove('operator', 'anna', 'bert', false)).toBe(true);
-    expect(mayApprove('operator', 'anna', 'anna', true)).toBe(false);
-    expect(mayApprove('owner', 'anna', 'bert', false)).toBe(false);
-    expect(mayApprove('owner', 'anna', 'olga', true)).toBe(true);
-    expect(mayApprove(null, 'anna', 'bert', true)).toBe(false);
+    expect(whyNotApprove('operator', ['anna'], person('bert'), 'arm')).toBeNull();
+    expect(whyNotApprove('operator', ['olga', 'anna'], person('anna'), 'arm')).toContain('somebody else');
+    expect(whyNotApprove('owner', ['anna'], person('bert', { owner_of: ['other'] }), 'arm')).toContain(
+      'no owner',
+    );
+    expect(
+      whyNotApprove('owner', ['anna'], person('olga', { role: 'owner', owner_of: ['arm'] }), 'arm'),
+    ).toBeNull();
+  });
+
+  it('is not offered to who may only look, or whom nobody knows', () => {
+    expect(whyNotApprove('operator', ['anna'], person('vera', { role: 'viewer' }), 'arm')).toContain(
+      'operator',
+    );
+    expect(whyNotApprove('operator', ['anna'], person('local user', { is_known: false }), 'arm')).toContain(
+      'token',
+    );
+    expect(whyNotApprove('operator', ['anna'], null, 'arm')).not.toBeNull();
   });
 });

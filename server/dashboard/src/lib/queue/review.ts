@@ -1,6 +1,6 @@
 /** What the page says about the review of an experiment before it moves a real arm, and who may approve it. */
 
-import type { Approval, Reviewer } from '../api/types';
+import type { Approval, Me, Reviewer } from '../api/types';
 
 /** One line; empty where no approval is needed and none was given. */
 export function reviewText(needed: Reviewer | null, approval: Approval | null): string {
@@ -9,7 +9,22 @@ export function reviewText(needed: Reviewer | null, approval: Approval | null): 
   return approval === null ? '' : `approved by ${approval.by}`;
 }
 
-/** Whether somebody may approve what belongs to `owner`. The service decides; this only spares a refusal. */
-export function mayApprove(needed: Reviewer | null, owner: string, name: string, isOwner: boolean): boolean {
-  return needed !== null && name !== owner && (needed === 'operator' || isOwner);
+/**
+ * Why somebody cannot approve what `authors` own, submitted or changed; null if they can. The service decides: this
+ * only spares them a refusal, and says beforehand what to do.
+ */
+export function whyNotApprove(
+  needed: Reviewer,
+  authors: readonly string[],
+  me: Me | null,
+  robot: string,
+): string | null {
+  if (me === null || me.role === 'viewer')
+    return 'You may look, and stop the arm; only an operator approves.';
+  if (needed === 'owner' && !me.owner_of.includes(robot)) return 'You are no owner of the arm: ask one.';
+  if (me.is_known === false) {
+    return 'To approve it, sign in or give a token: without one, nobody can tell you from whoever submitted it.';
+  }
+  if (authors.includes(me.name)) return 'You submitted or changed it: somebody else must approve it.';
+  return null;
 }
