@@ -188,7 +188,7 @@ def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
         "load_dependent_friction": falls,
         **dict.fromkeys(
             SENSOR_EFFECTS,
-            joint.sensor is not None and joint.sensor.measures == "position" and joint.sensor.linearity is not None,
+            joint.sensor is not None and joint.sensor.measures == "position",
         ),
     }
     if effect.is_flexible and not model.vector[row + at.ROTOR_INERTIA] > 0:

@@ -44,6 +44,8 @@ SHOWN = 12
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
+MOSTLY = 0.5
+"""Share of an effect's evidence from priors, above which it is taken for one that the tolerances had imitated."""
 ROUNDED = 5.0
 """s to which the time that is still to be recorded is rounded up."""
 SLIGHTLY_LATE = 0.1
@@ -177,7 +179,10 @@ class _Workflow:
 
     def _reference(self, chosen: Fitted) -> BalanceFit:
         """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
-        its prior, a number far off may be fitted as well as without."""
+        its prior, a number far off may be fitted as well as without. An effect that the tolerances can imitate, at the
+        price of numbers far from what is stated, is held against what they are with it."""
+        if not chosen.stated and chosen.relief > MOSTLY:
+            return self._without_effect(chosen)
         if not chosen.stated:
             return self.now
         held = {p.name: p.value for p in chosen.stated}
@@ -185,9 +190,22 @@ class _Workflow:
         balance = TorqueBalance(self.model.with_values({**self.now.model_values, **held}), self.case.records)
         return fit(balance, unknowns, self.now.values, self.case.data, self.now.noise.memory)
 
+    def _without_effect(self, chosen: Fitted) -> BalanceFit:
+        """The model that lacks an effect, with all other numbers as they are with it."""
+        known = {name: v for name, v in chosen.fit.model_values.items() if name in self.model.by_name}
+        balance = TorqueBalance(self.model.with_values(known), self.case.records)
+        begin = {**self.now.values, **chosen.fit.values}
+        return fit(balance, self.now.unknowns, begin, self.case.data, self.now.noise.memory, rounds=0)
+
     def _needed(self, chosen: Fitted) -> float:
-        """Evidence from which a candidate is named."""
-        return self.case.options.least_evidence + self.case.options.echo * self._collected(chosen.joints)
+        """Evidence from which a candidate is named.
+
+        How far numbers are from what a file states does not depend on what a residual is made of, against which the
+        larger least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
+        """
+        least = self.case.options.least_evidence
+        least -= chosen.relief * max(least - SUSPECTED, 0.0)
+        return least + self.case.options.echo * self._collected(chosen.joints)
 
     def _is_beyond_noise(self, reference: BalanceFit, chosen: Fitted) -> bool:
         fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))

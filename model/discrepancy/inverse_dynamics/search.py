@@ -45,6 +45,8 @@ class Fitted:
     """Cost of its parameters and of the places searched, which the evidence has paid."""
     stated: tuple[Parameter, ...] = ()
     """Those of its parameters that the file states, as it states them; their priors are lifted."""
+    relief: float = 0.0
+    """Share of the fall of −2 log posterior that is of priors: numbers that no longer have to be off."""
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -171,6 +173,7 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
             cost=cost_of(now, memory, len(f.parameters), places),
+            relief=_relief(now, f.fit, memory),
         )
         for f in found
     ]
@@ -179,8 +182,19 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
-    fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    return fell + before.prior - after.prior - cost_of(before, memory, parameters, places)
+    return _fell(before, after, memory) + before.prior - after.prior - cost_of(before, memory, parameters, places)
+
+
+def _fell(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
+    """Fall of −2 log likelihood, with the independent samples of both counted by one memory (n,)."""
+    return float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
+
+
+def _relief(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
+    """Share of the fall of −2 log posterior that is of priors, between 0 and 1."""
+    relieved = max(before.prior - after.prior, 0.0)
+    fell = max(_fell(before, after, memory), 0.0)
+    return relieved / (relieved + fell) if relieved > 0.0 else 0.0
 
 
 def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
