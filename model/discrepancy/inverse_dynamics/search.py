@@ -97,7 +97,25 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    return Findings(tuple(_weigh(found, now, places)), tuple(probes))
+    weighed = _weigh(found, now, places)
+    while weighed and len(weighed[0].joints) > 1:
+        stop_if(cancel)
+        best = weighed[0]
+        fewer = _with_fewer_joints(fitted_model, now, slopes, probes, best)
+        known = {(f.effect, f.joints) for f in found}
+        found += [f for f in fewer if (f.effect, f.joints) not in known]
+        weighed = _weigh(found, now, places)
+        if weighed[0] is best or weighed[0].joints == best.joints:
+            break
+    return Findings(tuple(weighed), tuple(probes))
+
+
+def _with_fewer_joints(
+    model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe], best: Fitted
+) -> list[Fitted]:
+    """The effect without each of its joints: an effect of one joint promises something on its neighbours, too."""
+    own = [p for p in probes if p.trial.effect == best.effect and len(p.trial.joints) == 1 and p.trial.joints[0] in best.joints]
+    return [_fit_effect(model, now, slopes, [p for p in own if p.trial.joints != (j,)]) for j in best.joints]
 
 
 def _on(joints: tuple[int, ...]) -> str:
