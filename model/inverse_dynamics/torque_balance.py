@@ -189,7 +189,10 @@ def link_motion(record: RecordedMotion, joints: Floats, model: Model) -> LinkMot
             rate += bend * wave * np.cos(wave * (q - zero))
             bent[:, j] -= bend * wave**2 * np.sin(wave * (q - zero))
         position[:, j] -= error
-        slope[:, j] -= rate
+        if record.own_speed[j]:
+            bent[:, j] = 0.0
+        else:
+            slope[:, j] -= rate
     # by the chain rule: differences on this grid would smooth accelerations as soon as any sensor has an error
     acceleration = record.acceleration * slope - bent * record.speed**2
     return LinkMotion(position, record.speed * slope, acceleration, record.contact)

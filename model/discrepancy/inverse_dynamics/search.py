@@ -114,7 +114,11 @@ def _with_fewer_joints(
     model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe], best: Fitted
 ) -> list[Fitted]:
     """The effect without each of its joints: an effect of one joint promises something on its neighbours, too."""
-    own = [p for p in probes if p.trial.effect == best.effect and len(p.trial.joints) == 1 and p.trial.joints[0] in best.joints]
+    own = [
+        p
+        for p in probes
+        if p.trial.effect == best.effect and len(p.trial.joints) == 1 and p.trial.joints[0] in best.joints
+    ]
     return [_fit_effect(model, now, slopes, [p for p in own if p.trial.joints != (j,)]) for j in best.joints]
 
 
