@@ -21,13 +21,14 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
-from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
+from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.discrepancy.verdict import verdict
+from model.discrepancy.verdict import first_to_withdraw, verdict, withdrawn
+from model.effects.library import effect
 from model.inverse_dynamics.drive_timing import MOST, samples_late, timing_unknowns
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
@@ -44,6 +45,11 @@ SHOWN = 12
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
+FAR_ABOVE_NOISE = 10.0
+"""Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
+friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
+2.6, where friction turns (docs/worlds.md)."""
+VISCOUS = "viscous_friction"
 MOSTLY = 0.5
 """Share of an effect's evidence from priors, above which it is taken for one that the tolerances had imitated."""
 LEAD = 4.0
@@ -137,6 +143,37 @@ class _Workflow:
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(done)
+        self._withdraw_wrong_laws()
+
+    def _withdraw_wrong_laws(self) -> None:
+        """Take back an effect whose own law the residual contradicts, and all effects after it."""
+        shapes = remaining_shapes(self.now, self.case)
+        wrong = tuple(j for j in self._left_over() if bends_with_speed(shapes, j) and self._only_viscous(j))
+        first = first_to_withdraw(self.steps, wrong) if wrong else None
+        if first is None:
+            return
+        for index, step in enumerate(self.steps[first:], start=first):
+            if not step.adopted:
+                continue
+            self.model = self._without(step)
+            self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
+            self.steps[index] = withdrawn(step, wrong)
+        self.now = self._fit(self.model, {}, self.added)
+
+    def _only_viscous(self, joint: int) -> bool:
+        """Whether viscous friction is the only friction that was named on a joint."""
+        named = {s.effect for s in self.steps if s.adopted and joint in s.joints and s.effect is not None}
+        return {name for name in named if effect(name).shared_name.family == "friction"} == {VISCOUS}
+
+    def _left_over(self) -> tuple[int, ...]:
+        """Joints whose residual is far above noise on fitted and on held-out records: it is no tolerance of noise."""
+        fitted = [np.sqrt(holdout.mean_squares(self.case.stretches, self.now.residual))]
+        if self.case.held_out:
+            held = holdout.held_out_squares(self.model, self.now.values, self.case.held_out)
+            fitted.append(np.sqrt(held))
+        least = np.min(np.nan_to_num(fitted), axis=0) / self.case.noise
+        joints = self.model.machine.modelled_joints
+        return tuple(j for j, ratio in zip(joints, least, strict=True) if ratio > FAR_ABOVE_NOISE)
 
     def _search(self) -> Findings:
         """What a step found, without what the records do not resolve."""
@@ -423,6 +460,7 @@ class _Workflow:
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]
+        missing = bool(shapes) or bool(self._left_over())
         own = [u for u in self.now.unknowns if not u.nuisance]
         stated = on_stated_numbers((u for u in own if u.name not in self.added), self.now.values)
         lineage = Lineage(
@@ -433,7 +471,7 @@ class _Workflow:
         )
         fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
         return Diagnosis(
-            verdict=verdict(steps, unexplained=bool(shapes) and not adopted, suspected=self.suspicion is not None),
+            verdict=verdict(steps, unexplained=missing and not adopted, suspected=self.suspicion is not None),
             suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
