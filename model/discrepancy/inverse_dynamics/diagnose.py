@@ -49,6 +49,9 @@ FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
 2.6, where friction turns (docs/worlds.md)."""
+SLOW = 4.0
+"""Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
+the low-pass, that of accelerations to 2.7."""
 VISCOUS = "viscous_friction"
 MOSTLY = 0.5
 """Share of an effect's evidence from priors, above which it is taken for one that the tolerances had imitated."""
@@ -166,14 +169,14 @@ class _Workflow:
         return {name for name in named if effect(name).shared_name.family == "friction"} == {VISCOUS}
 
     def _left_over(self) -> tuple[int, ...]:
-        """Joints whose residual is far above noise on fitted and on held-out records: it is no tolerance of noise."""
+        """Joints whose residual is far above noise on fitted and on held-out records, and slower than noise is."""
         fitted = [np.sqrt(holdout.mean_squares(self.case.stretches, self.now.residual))]
         if self.case.held_out:
             held = holdout.held_out_squares(self.model, self.now.values, self.case.held_out)
             fitted.append(np.sqrt(held))
         least = np.min(np.nan_to_num(fitted), axis=0) / self.case.noise
-        joints = self.model.machine.modelled_joints
-        return tuple(j for j, ratio in zip(joints, least, strict=True) if ratio > FAR_ABOVE_NOISE)
+        beyond = (least > FAR_ABOVE_NOISE) & (self.now.noise.memory > SLOW)
+        return tuple(j for j, left in zip(self.model.machine.modelled_joints, beyond, strict=True) if left)
 
     def _search(self) -> Findings:
         """What a step found, without what the records do not resolve."""
@@ -252,7 +255,11 @@ class _Workflow:
         return least - chosen.relief * max(least - LEAD, 0.0)
 
     def _is_beyond_noise(self, reference: BalanceFit, chosen: Fitted) -> bool:
+        """Whether there was more than noise to explain: of a torque on a joint, on that joint."""
         fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))
+        if chosen.joints and effect(chosen.effect).shared_name.acts_on == "joint torque":
+            elsewhere = np.array([j not in chosen.joints for j in self.model.machine.modelled_joints])
+            fell = np.where(elsewhere, np.nan, fell)
         return holdout.is_beyond_noise(fell, left, self.case.noise)
 
     def _removed(self, reference: BalanceFit, chosen: Fitted, before: Floats, after: Floats) -> float:

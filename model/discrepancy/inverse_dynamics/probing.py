@@ -9,7 +9,7 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, Trial
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, prior_rows, stacked
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, prior_distance, prior_rows, stacked
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
 NONLINEAR = frozenset(
@@ -57,6 +57,8 @@ class Prober:
         balance = TorqueBalance(trial.model, self.now.balance.records)
         null = {p.name: float(p.null) for p in trial.parameters if p.null is not None} | dict(trial.origin)
         best = Probe(trial, 0.0, trial.starts[0])
+        if trial.stated:
+            best = Probe(trial, self._lifted(trial), dict(trial.origin))
         shares_of_start = (1.0,) if trial.effect in NONLINEAR else (1.0, SMALL)
         for start, share in itertools.product(trial.starts, shares_of_start):
             part = {n: null[n] + share * (start[n] - null[n]) for n in trial.amplitudes}
@@ -68,6 +70,11 @@ class Prober:
                 }
                 best = Probe(trial, gain, {**start, **scaled})
         return best
+
+    def _lifted(self, trial: Trial) -> float:
+        """What the trial gains by its priors alone, with its numbers where they are."""
+        own = (u for u in self.now.unknowns if u.name in trial.origin)
+        return sum(prior_distance(u, self.now.values[u.name])[0] ** 2 for u in own)
 
     def _column(self, balance: TorqueBalance, values: Start) -> Floats:
         moved = balance.residual({**self.now.values, **values})
