@@ -12,7 +12,16 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    Candidate,
+    Diagnosis,
+    FoundValue,
+    RemainingShape,
+    SignalError,
+    Step,
+    Suspicion,
+)
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note, Reason, Refusal
@@ -27,7 +36,7 @@ from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.discrepancy.verdict import first_to_withdraw, verdict, withdrawn
+from model.discrepancy.verdict import verdict, withdrawn
 from model.effects.library import effect
 from model.inverse_dynamics.drive_timing import MOST, samples_late, timing_unknowns
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
@@ -126,6 +135,8 @@ class _Workflow:
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
     suspicion: Suspicion | None = None
+    lowered: set[int] = field(default_factory=set)
+    """Steps (indices) that lower what the file states. A law that is missing may do that as well."""
 
     def __post_init__(self) -> None:
         self.begin = self.model
@@ -149,19 +160,32 @@ class _Workflow:
         self._withdraw_wrong_laws()
 
     def _withdraw_wrong_laws(self) -> None:
-        """Take back an effect whose own law the residual contradicts, and all effects after it."""
-        shapes = remaining_shapes(self.now, self.case)
-        wrong = tuple(j for j in self._left_over() if bends_with_speed(shapes, j) and self._only_viscous(j))
-        first = first_to_withdraw(self.steps, wrong) if wrong else None
-        if first is None:
-            return
-        for index, step in enumerate(self.steps[first:], start=first):
-            if not step.adopted:
-                continue
-            self.model = self._without(step)
-            self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
-            self.steps[index] = withdrawn(step, wrong)
-        self.now = self._fit(self.model, {}, self.added)
+        """Take back effects that the residual contradicts, and all effects after them: friction that was lowered far
+        below what the file states where something is still missing, and viscous friction whose own residual bends
+        with speed."""
+        while (first := self._contradicted()) is not None:
+            wrong = self.steps[first].joints
+            for index, step in enumerate(self.steps[first:], start=first):
+                if not step.adopted:
+                    continue
+                self.model = self._without(step)
+                self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
+                self.steps[index] = withdrawn(step, wrong)
+            self.now = self._fit(self.model, {}, self.added)
+            self.suspicion = None  # it was of the model with these effects
+
+    def _contradicted(self) -> int | None:
+        """Index of the first step that the residual contradicts."""
+        shapes, left = remaining_shapes(self.now, self.case), set(self._left_over())
+        for index, step in enumerate(self.steps):
+            joints = left & set(step.joints) if step.adopted else ()
+            if any(index in self.lowered or self._bends(step, j, shapes) for j in joints):
+                return index
+        return None
+
+    def _bends(self, step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
+        """Whether a step is viscous friction, the only friction named on a joint, and another law is left there."""
+        return step.effect == VISCOUS and self._only_viscous(joint) and bends_with_speed(shapes, joint)
 
     def _only_viscous(self, joint: int) -> bool:
         """Whether viscous friction is the only friction that was named on a joint."""
@@ -305,6 +329,8 @@ class _Workflow:
         return holdout.evidence(self.now, chosen.fit, self.case.held_out)
 
     def _take(self, chosen: Fitted) -> None:
+        if chosen.stated and all(chosen.fit.values[p.name] < p.value for p in chosen.stated):
+            self.lowered.add(len(self.steps) - 1)
         self.added |= {p.name: p for p in chosen.parameters}
         self.model = chosen.model.with_values(chosen.fit.model_values)
         self.now = self._fit(self.model, chosen.fit.values, self.added)
