@@ -90,12 +90,26 @@ def _stated_numbers_moved(v: Values) -> str:
         f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.0f} deviations; {n['expected']:.4g} stated)"
         for n in numbers
     )
+    if v.get("named"):
+        named = "; ".join(
+            f"{n['name']} is {_rounded(n['value'], n['unit'])}, {_times(n['value'] / n['expected'])} what the file "
+            f"states ({n['expected']:.4g}), {n['deviations']:.1f} of its deviations away"
+            for n in numbers
+        )
+        return f"named beside what the machine file states: {named}"
     subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
     return (
         f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. File "
         "and records may not be of the same machine (units, signs, the direction of gravity?), or an effect is missing "
         "that was not found"
     )
+
+
+def _times(ratio: float) -> str:
+    """A ratio of two sizes."""
+    if ratio < 0.005:
+        return "next to nothing of"
+    return f"{ratio:.2g} times"
 
 
 def _taken_out_again(v: Values) -> str:

@@ -22,7 +22,7 @@ from model.discrepancy.diagnosis import (
     Step,
     Suspicion,
 )
-from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
@@ -135,6 +135,8 @@ class _Workflow:
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
     suspicion: Suspicion | None = None
+    stated: dict[str, Parameter] = field(default_factory=dict)
+    """Numbers that steps have named although the file states them, as it states them."""
     lowered: set[int] = field(default_factory=set)
     """Steps (indices) that lower what the file states. A law that is missing may do that as well."""
 
@@ -331,6 +333,7 @@ class _Workflow:
     def _take(self, chosen: Fitted) -> None:
         if chosen.stated and all(chosen.fit.values[p.name] < p.value for p in chosen.stated):
             self.lowered.add(len(self.steps) - 1)
+        self.stated |= {p.name: p for p in chosen.stated}
         self.added |= {p.name: p for p in chosen.parameters}
         self.model = chosen.model.with_values(chosen.fit.model_values)
         self.now = self._fit(self.model, chosen.fit.values, self.added)
@@ -496,6 +499,7 @@ class _Workflow:
         missing = bool(shapes) or bool(self._left_over())
         own = [u for u in self.now.unknowns if not u.nuisance]
         stated = on_stated_numbers((u for u in own if u.name not in self.added), self.now.values)
+        named = on_named_numbers((p for n, p in self.stated.items() if n in self.added), self.now.values)
         lineage = Lineage(
             parent=self.begin.identity,
             traces=tuple(traces),
@@ -522,7 +526,7 @@ class _Workflow:
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
+            notes_data=(*stated, *named, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
         )
 
 
