@@ -92,8 +92,8 @@ def _stated_numbers_moved(v: Values) -> str:
     )
     if v.get("named"):
         named = "; ".join(
-            f"{n['name']} is {_rounded(n['value'], n['unit'])}, {_times(n['value'] / n['expected'])} what the file "
-            f"states ({n['expected']:.4g}), {n['deviations']:.1f} of its deviations away"
+            f"{n['name']} is {_rounded(n['value'], n['unit'])}{_times(n['value'], n['expected'])}, where the file "
+            f"states {n['expected']:.4g}: {n['deviations']:.1f} of its deviations"
             for n in numbers
         )
         return f"named beside what the machine file states: {named}"
@@ -105,11 +105,11 @@ def _stated_numbers_moved(v: Values) -> str:
     )
 
 
-def _times(ratio: float) -> str:
-    """A ratio of two sizes."""
-    if ratio < 0.005:
-        return "next to nothing of"
-    return f"{ratio:.2g} times"
+def _times(value: float, stated: float) -> str:
+    """How many times as large a number is as it is stated."""
+    if stated <= 0.0:
+        return ""
+    return ", next to nothing" if value < 0.005 * stated else f", {value / stated:.2g} times as much"
 
 
 def _taken_out_again(v: Values) -> str:
