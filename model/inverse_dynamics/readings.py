@@ -13,7 +13,7 @@ from scipy.signal import welch
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.dynamics.recursive import mass_matrix
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
@@ -24,6 +24,9 @@ NOISE_SHARE = 0.1
 """Largest noise of an acceleration, as a share of its root mean square, at which a cutoff is used."""
 QUIET_BAND = (0.3, 0.45)
 """Band, as a share of the sampling rate, in which a record is taken to hold noise alone."""
+APART = 5.0
+"""Deviations of noise beyond which a reading has left the integral of a speed. The integral of white noise walks; the
+detrended walk's root mean square is half of its end's deviation."""
 FEWEST = 32
 """Samples that a trace needs, for its noise to be estimated."""
 LONGEST_GAP = (10.0, 0.05)
@@ -47,6 +50,26 @@ class Readings:
     def _noise_density(self) -> Floats:
         """Noise density of the speed, or of the position where no speed is measured."""
         return _quiet_density(self.position if self.speed is None else self.speed, self.period)
+
+    @property
+    def has_own_speed(self) -> Mask:
+        """(n,) whether a joint's speed was measured by something else than its position.
+
+        Speeds that are formed of the readings have the sensor's errors of scale and bend, too. A tachometer has not:
+        the readings then leave the integral of its speed by more than its noise. A constant, a drift and a delay of
+        the speed are no such error.
+        """
+        none = np.zeros(self.position.shape[1], dtype=bool)
+        if self.speed is None:
+            return none
+        walk = np.sqrt(0.5 * _quiet_density(self.speed, self.period) * (self.time[-1] - self.time[0]))
+        reading = np.sqrt(0.5 * _quiet_density(self.position, self.period) / self.period)
+        away = self.position - cumulative_trapezoid(self.speed, dx=self.period, axis=0, initial=0)
+        for j in range(len(none)):
+            harmless = np.column_stack([np.ones(len(self.time)), self.time, self.speed[:, j]])
+            left = away[:, j] - harmless @ np.linalg.lstsq(harmless, away[:, j], rcond=None)[0]
+            none[j] = np.sqrt(np.mean(left**2)) > APART * (walk[j] + reading[j])
+        return none
 
     def speed_noise(self, cutoff: float) -> Floats:
         """Standard deviation (n,) of the speed's noise below a cutoff, rad/s (m/s)."""

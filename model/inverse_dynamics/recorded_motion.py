@@ -58,6 +58,7 @@ class RecordedMotion:
         edge, every: samples of the grid left out at both ends, and distance of the compared ones.
         moving: (m, n) False where a joint rests: friction then takes whatever value holds it, so the torque says
             nothing.
+        own_speed: (n,) whether a joint's speed has a sensor of its own, without the errors of the position's.
     """
 
     name: str
@@ -74,6 +75,7 @@ class RecordedMotion:
     edge: int
     every: int
     moving: Mask
+    own_speed: Mask
 
     def compared(self, torque: Floats) -> Floats:
         """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
@@ -201,6 +203,7 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
         edge=edge,
         every=every,
         moving=moving,
+        own_speed=readings.has_own_speed,
     )
 
 

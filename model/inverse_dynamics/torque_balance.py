@@ -177,7 +177,7 @@ def link_motion(record: RecordedMotion, joints: Floats, model: Model) -> LinkMot
     wrong = joints[:, list(SENSOR_COLUMNS)]
     if not wrong.any():
         return LinkMotion(record.position, record.speed, record.acceleration, record.contact)
-    position, slope = record.position.copy(), np.ones_like(record.position)
+    position, slope, bent = record.position.copy(), np.ones_like(record.position), np.zeros_like(record.position)
     for j in range(model.joint_count):
         gain, offset, *bends = wrong[j]
         range_, zero = joints[j, at.RANGE], joints[j, at.AT_ZERO]
@@ -187,10 +187,15 @@ def link_motion(record: RecordedMotion, joints: Floats, model: Model) -> LinkMot
             wave = k * np.pi / range_
             error += bend * np.sin(wave * (q - zero))
             rate += bend * wave * np.cos(wave * (q - zero))
+            bent[:, j] -= bend * wave**2 * np.sin(wave * (q - zero))
         position[:, j] -= error
-        slope[:, j] -= rate
-    speed = record.speed * slope
-    return LinkMotion(position, speed, np.gradient(speed, record.period, axis=0), record.contact)
+        if record.own_speed[j]:
+            bent[:, j] = 0.0
+        else:
+            slope[:, j] -= rate
+    # by the chain rule: differences on this grid would smooth accelerations as soon as any sensor has an error
+    acceleration = record.acceleration * slope - bent * record.speed**2
+    return LinkMotion(position, record.speed * slope, acceleration, record.contact)
 
 
 def levels_along(model: Model, record: RecordedMotion) -> Floats:

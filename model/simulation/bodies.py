@@ -101,6 +101,9 @@ def _fill_link(inertial: NDArray[Any], joint: NDArray[Any]) -> None:
         x = joint[at.SHIFT] - 0.5 * joint[at.A]
         across = mass * joint[at.A] * joint[at.A] / 12.0
         yy, zz = across, across
+    elif joint[at.MASS_ADDED] != 0.0 and joint[at.MASS].real > 0.0:  # a body of the same shape
+        heavier = mass / joint[at.MASS]
+        xx, yy, zz, xy, xz, yz = xx * heavier, yy * heavier, zz * heavier, xy * heavier, xz * heavier, yz * heavier
     inertial[0] = mass
     inertial[1], inertial[2], inertial[3] = mass * x, mass * y, mass * z
     inertial[4], inertial[5], inertial[6] = xx + mass * (y * y + z * z), xy - mass * x * y, xz - mass * x * z

@@ -90,12 +90,26 @@ def _stated_numbers_moved(v: Values) -> str:
         f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.0f} deviations; {n['expected']:.4g} stated)"
         for n in numbers
     )
+    if v.get("named"):
+        named = "; ".join(
+            f"{n['name']} is {_rounded(n['value'], n['unit'])}{_times(n['value'], n['expected'])}, where the file "
+            f"states {n['expected']:.4g}: {n['deviations']:.1f} of its deviations"
+            for n in numbers
+        )
+        return f"named beside what the machine file states: {named}"
     subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
     return (
         f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. File "
         "and records may not be of the same machine (units, signs, the direction of gravity?), or an effect is missing "
         "that was not found"
     )
+
+
+def _times(value: float, stated: float) -> str:
+    """How many times as large a number is as it is stated."""
+    if stated <= 0.0:
+        return ""
+    return ", next to nothing" if value < 0.005 * stated else f", {value / stated:.2g} times as much"
 
 
 def _taken_out_again(v: Values) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Note
+from model.machine_model.parameter import Parameter
 
 FAR = 4.0
 """Distance of an estimate from the stated value, in stated deviations, beyond which there is a warning."""
@@ -61,3 +62,24 @@ def on_stated_numbers(numbers: Iterable[_Expected], values: Mapping[str, float])
         return ()
     moved.sort(key=lambda one: one["deviations"], reverse=True)
     return (Note(kind="stated-numbers-moved", values={"limit": FAR, "numbers": moved}, warning=True),)
+
+
+def on_named_numbers(stated: Iterable[Parameter], values: Mapping[str, float]) -> tuple[Note, ...]:
+    """What the machine file states of numbers that a step has named, which may be larger or smaller than that.
+
+    Args:
+        stated: the numbers, with value and deviation as stated. values: their estimates, by name.
+    """
+    numbers = [
+        {
+            "name": p.name,
+            "unit": p.unit,
+            "value": values[p.name],
+            "expected": p.value,
+            "deviations": abs(values[p.name] - p.value) / (p.deviation or 1.0),
+        }
+        for p in stated
+    ]
+    if not numbers:
+        return ()
+    return (Note(kind="stated-numbers-moved", values={"limit": FAR, "numbers": numbers, "named": True}),)

@@ -28,6 +28,9 @@ Start = dict[str, float]
 UNSEEN = "damping"
 """Part of an effect that torques do not show: a transmission's damping acts in its vibration, above every cutoff."""
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
+BENT = "potentiometer_nonlinearity"
+FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
+"""Terms of a bent sensor that a trial frees; the shorter waves keep the priors of a sound one."""
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
@@ -146,7 +149,7 @@ def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) ->
     place = _Place(wider, joints[0] - 1 if joints else 0, now.balance.records, now.residual)
     sizes = recorded_sizes(wider, now.balance.records)
     added = (sizes.get(p.name, p) for p in wider.parameters if p.name not in model.by_name and p.part != UNSEEN)
-    own = tuple(_narrowed(p, place) for p in added)
+    own = tuple(_narrowed(p, place) for p in added if p.effect != BENT or p.part in FREED_BENDS)
     amplitudes = tuple(p.name for p in own if p.null is not None)
     return Trial(name, joints, wider, own, amplitudes, tuple(_starts(name, own, place)))
 
@@ -188,7 +191,7 @@ def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
         "load_dependent_friction": falls,
         **dict.fromkeys(
             SENSOR_EFFECTS,
-            joint.sensor is not None and joint.sensor.measures == "position" and joint.sensor.linearity is not None,
+            joint.sensor is not None and joint.sensor.measures == "position",
         ),
     }
     if effect.is_flexible and not model.vector[row + at.ROTOR_INERTIA] > 0:

@@ -12,8 +12,17 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion
-from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    Candidate,
+    Diagnosis,
+    FoundValue,
+    RemainingShape,
+    SignalError,
+    Step,
+    Suspicion,
+)
+from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
@@ -21,13 +30,14 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
-from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
+from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.discrepancy.verdict import verdict
+from model.discrepancy.verdict import verdict, withdrawn
+from model.effects.library import effect
 from model.inverse_dynamics.drive_timing import MOST, samples_late, timing_unknowns
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
@@ -44,6 +54,18 @@ SHOWN = 12
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
+FAR_ABOVE_NOISE = 10.0
+"""Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
+friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
+2.6, where friction turns (docs/worlds.md)."""
+SLOW = 4.0
+"""Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
+the low-pass, that of accelerations to 2.7."""
+VISCOUS = "viscous_friction"
+MOSTLY = 0.5
+"""Share of an effect's evidence from priors, above which it is taken for one that the tolerances had imitated."""
+LEAD = 4.0
+"""Lead with which an effect is named alone where all of its evidence comes from priors: that of the other method."""
 ROUNDED = 5.0
 """s to which the time that is still to be recorded is rounded up."""
 SLIGHTLY_LATE = 0.1
@@ -113,6 +135,10 @@ class _Workflow:
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
     suspicion: Suspicion | None = None
+    stated: dict[str, Parameter] = field(default_factory=dict)
+    """Numbers that steps have named although the file states them, as it states them."""
+    lowered: set[int] = field(default_factory=set)
+    """Steps (indices) that lower what the file states. A law that is missing may do that as well."""
 
     def __post_init__(self) -> None:
         self.begin = self.model
@@ -133,6 +159,50 @@ class _Workflow:
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(done)
+        self._withdraw_wrong_laws()
+
+    def _withdraw_wrong_laws(self) -> None:
+        """Take back effects that the residual contradicts, and all effects after them: friction that was lowered far
+        below what the file states where something is still missing, and viscous friction whose own residual bends
+        with speed."""
+        while (first := self._contradicted()) is not None:
+            wrong = self.steps[first].joints
+            for index, step in enumerate(self.steps[first:], start=first):
+                if not step.adopted:
+                    continue
+                self.model = self._without(step)
+                self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
+                self.steps[index] = withdrawn(step, wrong)
+            self.now = self._fit(self.model, {}, self.added)
+            self.suspicion = None  # it was of the model with these effects
+
+    def _contradicted(self) -> int | None:
+        """Index of the first step that the residual contradicts."""
+        shapes, left = remaining_shapes(self.now, self.case), set(self._left_over())
+        for index, step in enumerate(self.steps):
+            joints = left & set(step.joints) if step.adopted else ()
+            if any(index in self.lowered or self._bends(step, j, shapes) for j in joints):
+                return index
+        return None
+
+    def _bends(self, step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
+        """Whether a step is viscous friction, the only friction named on a joint, and another law is left there."""
+        return step.effect == VISCOUS and self._only_viscous(joint) and bends_with_speed(shapes, joint)
+
+    def _only_viscous(self, joint: int) -> bool:
+        """Whether viscous friction is the only friction that was named on a joint."""
+        named = {s.effect for s in self.steps if s.adopted and joint in s.joints and s.effect is not None}
+        return {name for name in named if effect(name).shared_name.family == "friction"} == {VISCOUS}
+
+    def _left_over(self) -> tuple[int, ...]:
+        """Joints whose residual is far above noise on fitted and on held-out records, and slower than noise is."""
+        fitted = [np.sqrt(holdout.mean_squares(self.case.stretches, self.now.residual))]
+        if self.case.held_out:
+            held = holdout.held_out_squares(self.model, self.now.values, self.case.held_out)
+            fitted.append(np.sqrt(held))
+        least = np.min(np.nan_to_num(fitted), axis=0) / self.case.noise
+        beyond = (least > FAR_ABOVE_NOISE) & (self.now.noise.memory > SLOW)
+        return tuple(j for j, left in zip(self.model.machine.modelled_joints, beyond, strict=True) if left)
 
     def _search(self) -> Findings:
         """What a step found, without what the records do not resolve."""
@@ -177,7 +247,10 @@ class _Workflow:
 
     def _reference(self, chosen: Fitted) -> BalanceFit:
         """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
-        its prior, a number far off may be fitted as well as without."""
+        its prior, a number far off may be fitted as well as without. An effect that the tolerances can imitate, at the
+        price of numbers far from what is stated, is held against what they are with it."""
+        if not chosen.stated and chosen.relief > MOSTLY:
+            return self._without_effect(chosen)
         if not chosen.stated:
             return self.now
         held = {p.name: p.value for p in chosen.stated}
@@ -185,12 +258,34 @@ class _Workflow:
         balance = TorqueBalance(self.model.with_values({**self.now.model_values, **held}), self.case.records)
         return fit(balance, unknowns, self.now.values, self.case.data, self.now.noise.memory)
 
+    def _without_effect(self, chosen: Fitted) -> BalanceFit:
+        """The model that lacks an effect, with all other numbers as they are with it."""
+        known = {name: v for name, v in chosen.fit.model_values.items() if name in self.model.by_name}
+        balance = TorqueBalance(self.model.with_values(known), self.case.records)
+        begin = {**self.now.values, **chosen.fit.values}
+        return fit(balance, self.now.unknowns, begin, self.case.data, self.now.noise.memory, rounds=0)
+
     def _needed(self, chosen: Fitted) -> float:
-        """Evidence from which a candidate is named."""
-        return self.case.options.least_evidence + self.case.options.echo * self._collected(chosen.joints)
+        """Evidence from which a candidate is named.
+
+        How far numbers are from what a file states does not depend on what a residual is made of, against which the
+        larger least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
+        """
+        least = self.case.options.least_evidence
+        least -= chosen.relief * max(least - SUSPECTED, 0.0)
+        return least + self.case.options.echo * self._collected(chosen.joints)
+
+    def _margin(self, chosen: Fitted) -> float:
+        """Lead in evidence with which a candidate is named alone: as `_needed`, less where it comes from priors."""
+        least = self.case.options.least_margin
+        return least - chosen.relief * max(least - LEAD, 0.0)
 
     def _is_beyond_noise(self, reference: BalanceFit, chosen: Fitted) -> bool:
+        """Whether there was more than noise to explain: of a torque on a joint, on that joint."""
         fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (reference, chosen.fit))
+        if chosen.joints and effect(chosen.effect).shared_name.acts_on == "joint torque":
+            elsewhere = np.array([j not in chosen.joints for j in self.model.machine.modelled_joints])
+            fell = np.where(elsewhere, np.nan, fell)
         return holdout.is_beyond_noise(fell, left, self.case.noise)
 
     def _removed(self, reference: BalanceFit, chosen: Fitted, before: Floats, after: Floats) -> float:
@@ -236,6 +331,9 @@ class _Workflow:
         return holdout.evidence(self.now, chosen.fit, self.case.held_out)
 
     def _take(self, chosen: Fitted) -> None:
+        if chosen.stated and all(chosen.fit.values[p.name] < p.value for p in chosen.stated):
+            self.lowered.add(len(self.steps) - 1)
+        self.stated |= {p.name: p for p in chosen.stated}
         self.added |= {p.name: p for p in chosen.parameters}
         self.model = chosen.model.with_values(chosen.fit.model_values)
         self.now = self._fit(self.model, chosen.fit.values, self.added)
@@ -278,7 +376,7 @@ class _Workflow:
         holds = removed >= case.options.least_share
         standing = [c for c in found.fitted if not any(c is one for one in refused)]
         rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
-        near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
+        near = [r for r in rivals if chosen.evidence - r.evidence < self._margin(chosen)]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
         values = found_values(chosen.fit, chosen.parameters)
         squares = [holdout.mean_squares(case.stretches, f.residual) for f in (reference, chosen.fit)]
@@ -398,8 +496,10 @@ class _Workflow:
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]
+        missing = bool(shapes) or bool(self._left_over())
         own = [u for u in self.now.unknowns if not u.nuisance]
         stated = on_stated_numbers((u for u in own if u.name not in self.added), self.now.values)
+        named = on_named_numbers((p for n, p in self.stated.items() if n in self.added), self.now.values)
         lineage = Lineage(
             parent=self.begin.identity,
             traces=tuple(traces),
@@ -408,7 +508,7 @@ class _Workflow:
         )
         fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
         return Diagnosis(
-            verdict=verdict(steps, unexplained=bool(shapes) and not adopted, suspected=self.suspicion is not None),
+            verdict=verdict(steps, unexplained=missing and not adopted, suspected=self.suspicion is not None),
             suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
@@ -426,7 +526,7 @@ class _Workflow:
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
+            notes_data=(*stated, *named, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
         )
 
 

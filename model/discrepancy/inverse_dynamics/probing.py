@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, Trial
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, prior_rows, stacked
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, prior_distance, prior_rows, stacked
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
 NONLINEAR = frozenset(
@@ -23,6 +24,9 @@ NONLINEAR = frozenset(
     }
 )
 """Effects whose torque is far from linear in their size."""
+SMALL = 1e-4
+"""Share of its size at which any other effect is probed besides. What the tolerances took over of an effect would be
+there twice at its full size, and friction would hold a different part of it where a joint turns."""
 NONLINEAR_LIMIT = 2.0
 """Largest size of such an effect that a probe may find, in the size at which it was probed."""
 
@@ -40,30 +44,37 @@ class Probe:
 class Prober:
     """A fit, prepared for probing: `basis` (N, p) spans what its unknowns can explain.
 
-    left: (N,) what they leave of the residual. pulled: (N,) the same with what the priors ask for, which a trial that
-    lifts a prior gains from.
+    left: (N,) what they leave of the residual and of what the priors ask for: an effect also gains what the tolerances
+    no longer have to be moved for.
     """
 
     now: BalanceFit
     basis: Floats
     left: Floats
-    pulled: Floats
 
     def probe(self, trial: Trial) -> Probe:
         """The best of a trial's starts."""
         balance = TorqueBalance(trial.model, self.now.balance.records)
         null = {p.name: float(p.null) for p in trial.parameters if p.null is not None} | dict(trial.origin)
         best = Probe(trial, 0.0, trial.starts[0])
-        for start in trial.starts:
-            columns = [self._column(balance, {**start, **null, name: start[name]}) for name in trial.amplitudes]
-            left = self.pulled if trial.stated else self.left
-            gain, shares = self._explained(np.stack(columns, axis=1), left, trial, start, null)
+        if trial.stated:
+            best = Probe(trial, self._lifted(trial), dict(trial.origin))
+        shares_of_start = (1.0,) if trial.effect in NONLINEAR else (1.0, SMALL)
+        for start, share in itertools.product(trial.starts, shares_of_start):
+            part = {n: null[n] + share * (start[n] - null[n]) for n in trial.amplitudes}
+            columns = [self._column(balance, {**start, **null, name: part[name]}) / share for name in trial.amplitudes]
+            gain, sizes = self._explained(np.stack(columns, axis=1), self.left, trial, start, null)
             if gain > best.gain:
                 scaled = {
-                    n: null[n] + float(a) * (start[n] - null[n]) for n, a in zip(trial.amplitudes, shares, strict=True)
+                    n: null[n] + float(a) * (start[n] - null[n]) for n, a in zip(trial.amplitudes, sizes, strict=True)
                 }
                 best = Probe(trial, gain, {**start, **scaled})
         return best
+
+    def _lifted(self, trial: Trial) -> float:
+        """What the trial gains by its priors alone, with its numbers where they are."""
+        own = (u for u in self.now.unknowns if u.name in trial.origin)
+        return sum(prior_distance(u, self.now.values[u.name])[0] ** 2 for u in own)
 
     def _column(self, balance: TorqueBalance, values: Start) -> Floats:
         moved = balance.residual({**self.now.values, **values})
@@ -112,5 +123,5 @@ def prepare_probes(now: BalanceFit, slopes: Slopes) -> Prober:
     u, s, _ = np.linalg.svd(whole, full_matrices=False)
     basis = u[:, s > 1e-10 * s[0]] if s.size else np.zeros((whole.shape[0], 0))
     weighted = now.noise.weighted(now.data.stretches, now.residual)
-    left, pulled = (np.concatenate([*weighted, prior]) for prior in (np.zeros(len(rows)), -aims))
-    return Prober(now, basis, left - basis @ (basis.T @ left), pulled - basis @ (basis.T @ pulled))
+    left = np.concatenate([*weighted, -aims])
+    return Prober(now, basis, left - basis @ (basis.T @ left))

@@ -16,9 +16,9 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_b
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.parameter import Parameter
 
-OF_CHANGES = frozenset({"joint_compliance", "backlash"})
-"""Effects whose torque follows how a torque changes in time: they cut short what is fast, and noise of accelerations is
-fast."""
+OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_inductance"})
+"""Effects whose torque follows how a torque changes in time: they cut short or shift what is fast, and noise of
+accelerations, or a gear that rattles, is fast."""
 SLOWER = 0.5
 """Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
 the fifth power of the cutoff, so 3 % of it is left there."""

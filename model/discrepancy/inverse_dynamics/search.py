@@ -45,6 +45,8 @@ class Fitted:
     """Cost of its parameters and of the places searched, which the evidence has paid."""
     stated: tuple[Parameter, ...] = ()
     """Those of its parameters that the file states, as it states them; their priors are lifted."""
+    relief: float = 0.0
+    """Share of the fall of −2 log posterior that is of priors: numbers that no longer have to be off."""
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -95,7 +97,29 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    return Findings(tuple(_weigh(found, now, places)), tuple(probes))
+    weighed = _weigh(found, now, places)
+    while weighed and len(weighed[0].joints) > 1:
+        stop_if(cancel)
+        best = weighed[0]
+        fewer = _with_fewer_joints(fitted_model, now, slopes, probes, best)
+        known = {(f.effect, f.joints) for f in found}
+        found += [f for f in fewer if (f.effect, f.joints) not in known]
+        weighed = _weigh(found, now, places)
+        if weighed[0] is best or weighed[0].joints == best.joints:
+            break
+    return Findings(tuple(weighed), tuple(probes))
+
+
+def _with_fewer_joints(
+    model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe], best: Fitted
+) -> list[Fitted]:
+    """The effect without each of its joints: an effect of one joint promises something on its neighbours, too."""
+    own = [
+        p
+        for p in probes
+        if p.trial.effect == best.effect and len(p.trial.joints) == 1 and p.trial.joints[0] in best.joints
+    ]
+    return [_fit_effect(model, now, slopes, [p for p in own if p.trial.joints != (j,)]) for j in best.joints]
 
 
 def _on(joints: tuple[int, ...]) -> str:
@@ -171,6 +195,7 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
             cost=cost_of(now, memory, len(f.parameters), places),
+            relief=_relief(now, f.fit, memory),
         )
         for f in found
     ]
@@ -179,8 +204,19 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
-    fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    return fell + before.prior - after.prior - cost_of(before, memory, parameters, places)
+    return _fell(before, after, memory) + before.prior - after.prior - cost_of(before, memory, parameters, places)
+
+
+def _fell(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
+    """Fall of −2 log likelihood, with the independent samples of both counted by one memory (n,)."""
+    return float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
+
+
+def _relief(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
+    """Share of the fall of −2 log posterior that is of priors, between 0 and 1."""
+    relieved = max(before.prior - after.prior, 0.0)
+    fell = max(_fell(before, after, memory), 0.0)
+    return relieved / (relieved + fell) if relieved > 0.0 else 0.0
 
 
 def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
+from daq.contracts.trace import Trace
+from model import layout as at
 from model.fitting.choice import chosen_unknowns
 from model.fitting.options import FitOptions
 from model.inverse_dynamics.recorded_motion import low_pass, recorded_motion
-from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.inverse_dynamics.torque_balance import TorqueBalance, link_motion
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
@@ -66,3 +68,60 @@ def test_records_that_cannot_be_compared_are_refused() -> None:
         recorded_motion(short, model.machine, 12.0)
     with pytest.raises(SpecError, match=r"cutoff 200 Hz: trace swing1 is sampled every 0\.004 s"):
         recorded_motion(trace, model.machine, 200.0)
+
+
+BENT = {
+    "joint1.potentiometer_gain.relative": 0.05,
+    "joint1.potentiometer_offset.offset": 0.03,
+    "joint1.potentiometer_nonlinearity.bend_2": 0.02,
+}
+
+
+def seen_through_a_bent_sensor(*, tachometer: bool) -> tuple[Trace, NDArray[np.float64]]:
+    """A swing as a sensor with the errors of `BENT` reads it, and its true position, speed and acceleration (k, 3)."""
+    sensor = rod().machine.joint(1).sensor
+    assert sensor is not None
+    span, zero = sensor.range.value, sensor.at_zero.value
+    time = 0.004 * np.arange(3000)
+    q = 0.6 * np.sin(2.0 * time) + 0.2 * np.sin(5.0 * time)
+    v = 1.2 * np.cos(2.0 * time) + 1.0 * np.cos(5.0 * time)
+    a = -2.4 * np.sin(2.0 * time) - 5.0 * np.sin(5.0 * time)
+    x = (q - zero) / span
+    read = q + 0.05 * (x - 0.5) * span + 0.03 + 0.02 * np.sin(2 * np.pi * x)
+    derived = v * (1.05 + 0.02 * 2 * np.pi / span * np.cos(2 * np.pi * x))
+    noise = 1e-5 * np.random.default_rng(1).standard_normal((2, len(time)))
+    speed = (v if tachometer else derived) + noise[0]
+    columns = (read + noise[1], speed, np.ones(len(time)))
+    position, velocity, drive = (column[:, None] for column in columns)
+    trace = trace_of(position, 0.004, position=position, velocity=velocity, drive=drive)
+    return trace, np.column_stack([q, v, a])
+
+
+@pytest.mark.parametrize("tachometer", [True, False])
+def test_errors_of_a_position_sensor_bend_only_the_speeds_that_are_formed_of_it(tachometer: bool) -> None:
+    trace, truth = seen_through_a_bent_sensor(tachometer=tachometer)
+    model = rod()
+    for name in ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity"):
+        model = model.with_effect(name, (1,))
+    model = model.with_values(BENT)
+    record = recorded_motion(trace, model.machine, 12.0)
+    assert record.own_speed.tolist() == [tachometer]
+    joints = model.vector[at.SHARED :].reshape(1, at.PER_JOINT)
+    links = link_motion(record, joints, model)
+    inside = slice(record.edge, -record.edge)
+    every = round(record.period / 0.004)
+    found = np.column_stack([links.position, links.speed, links.acceleration])[inside]
+    # the errors are read off the reading, which differs from the angle by a few hundredths
+    for column, tolerance in zip(range(3), (4e-3, 8e-3, 0.04), strict=True):
+        np.testing.assert_allclose(found[:, column], truth[::every, column][: len(record.time)][inside], atol=tolerance)
+
+
+def test_a_vanishing_error_of_a_sensor_changes_nothing() -> None:
+    """A residual that jumps where an error begins would be evidence for errors of any size."""
+    trace, _ = seen_through_a_bent_sensor(tachometer=False)
+    model = rod().with_effect("potentiometer_offset", (1,))
+    balance = TorqueBalance(model, (recorded_motion(trace, model.machine, 12.0),))
+    without, next_to_none = (
+        balance.residual({"joint1.potentiometer_offset.offset": value})[0] for value in (0.0, 1e-12)
+    )
+    np.testing.assert_allclose(next_to_none, without, atol=1e-8 * float(np.abs(without).max()))

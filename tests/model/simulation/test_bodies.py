@@ -59,8 +59,19 @@ def test_a_general_body_is_moved_from_its_centre_to_the_origin_of_its_frame() ->
     names = ("INERTIA_XX", "INERTIA_XY", "INERTIA_XZ", "INERTIA_YY", "INERTIA_YZ", "INERTIA_ZZ")
     own = dict(zip(names, tensor[np.triu_indices(3)], strict=True))
     centre = {"CENTRE_X": -0.3, "CENTRE_Y": 0.1, "CENTRE_Z": 0.2, "SHIFT": 0.05}
-    found = body_of(joint(at.BODY, MASS=2.0, MASS_ADDED=0.5, **own, **centre)).inertial[0]
-    np.testing.assert_allclose(found, inertial(2.5, np.array([-0.25, 0.1, 0.2]), tensor))
+    found = body_of(joint(at.BODY, MASS=2.0, **own, **centre)).inertial[0]
+    np.testing.assert_allclose(found, inertial(2.0, np.array([-0.25, 0.1, 0.2]), tensor))
+
+
+def test_a_mass_that_is_added_to_a_body_keeps_its_shape() -> None:
+    """A body of the same shape that is a quarter heavier has a quarter more inertia; one without mass has no shape."""
+    tensor = np.array([[0.4, 0.03, -0.05], [0.03, 0.5, 0.07], [-0.05, 0.07, 0.6]])
+    names = ("INERTIA_XX", "INERTIA_XY", "INERTIA_XZ", "INERTIA_YY", "INERTIA_YZ", "INERTIA_ZZ")
+    own = dict(zip(names, tensor[np.triu_indices(3)], strict=True))
+    heavier = body_of(joint(at.BODY, MASS=2.0, MASS_ADDED=0.5, CENTRE_X=-0.3, **own)).inertial[0]
+    np.testing.assert_allclose(heavier, inertial(2.5, np.array([-0.3, 0.0, 0.0]), 1.25 * tensor))
+    point = body_of(joint(at.BODY, MASS_ADDED=0.5, CENTRE_X=-0.3, **own)).inertial[0]
+    np.testing.assert_allclose(point, inertial(0.5, np.array([-0.3, 0.0, 0.0]), tensor))
 
 
 def test_a_rod_is_a_row_of_point_masses_that_ends_at_the_origin_of_its_frame() -> None:

@@ -72,6 +72,24 @@ def test_friction_far_beyond_what_the_file_states_is_named() -> None:
     assert found.model_after.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(60.0, rel=0.02)
 
 
+@pytest.mark.parametrize(("share", "true"), [(0.1, 3.0), (0.3, 3.0), (0.3, 0.0)])
+def test_friction_far_below_what_the_file_states_is_named(share: float, true: float) -> None:
+    """In plain distances no friction at all is 3.3 deviations from what is stated to 30 %."""
+    machine = stating_friction(coulomb=rigs.quantity(30.0, "N", low=0.0, deviation=30.0 * share))
+    found = slide({"coulomb": true}, machine=machine)
+    assert named(found) == ["coulomb_friction"], found.summary
+    assert found.steps[0].parameters["joint1.coulomb_friction.torque"].value == pytest.approx(true, abs=0.3)
+
+
+def test_another_law_that_takes_a_stated_friction_away_is_named_and_not_that_friction() -> None:
+    """The force of a loss grows with the drive: without it in the model, what is left of it is fitted as friction."""
+    machine = stating_friction(coulomb=rigs.quantity(6.0, "N", low=0.0, deviation=1.8))
+    found = slide({"coulomb": 6.0, "spring": 400.0}, machine=machine)
+    assert named(found) == ["spring_torque"], found.summary
+    coulomb = found.model_after.parameter("joint1.coulomb_friction.torque").value
+    assert coulomb == pytest.approx(6.0, rel=0.1)
+
+
 @pytest.mark.parametrize("true", [8.0, 15.0])
 def test_friction_within_what_the_file_states_is_no_effect(true: float) -> None:
     """15 is 5 of the stated deviations above 6, and 2.5 times as much: with 30 % stated, 3 deviations of a ratio."""

@@ -53,7 +53,7 @@ def test_an_effect_that_lacks_evidence_alone_is_suspected() -> None:
     assert found.verdict == "suspected", found.summary
     assert found.suspicion is not None
     assert found.suspicion.effect == "coulomb_friction"
-    assert found.suspicion.evidence < found.suspicion.needed == 2000.0
+    assert found.suspicion.evidence < found.suspicion.needed == pytest.approx(2000.0, rel=1e-3)
     assert found.suspicion.seconds >= 5.0
     assert found.summary.startswith("Suspected: Coulomb friction on joint 1, evidence ")
     assert Diagnosis.model_validate_json(found.model_dump_json()) == found
