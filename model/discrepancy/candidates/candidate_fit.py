@@ -57,11 +57,13 @@ class Fit:
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """A fitted candidate: the probe from which its fit began, the fit, and its evidence."""
+    """A fitted candidate: the probe from which its fit began, the fit, its evidence, and what of that its free
+    parameters have cost."""
 
     probe: Probe
     fit: Fit
     evidence: float
+    price: float = 0.0
 
     @property
     def hypothesis(self) -> Hypothesis:
@@ -86,6 +88,17 @@ def says_no_more(
     more, which then brought nothing."""
     own, others = set(joints), set(joints_of_better)
     return effect == of_better and (own <= others or own > others)
+
+
+def cannot_be_told(rival: CandidateFit, best: CandidateFit, margin: float) -> bool:
+    """Whether records leave open which of two fits it is: evidence, or −2 ln posterior alone, differs by less than
+    `margin`.
+
+    What a parameter costs is no statement of the records. A rival that explains as much with one parameter more is less
+    likely before anything was recorded, and not refuted.
+    """
+    lead = best.evidence - rival.evidence
+    return min(lead, lead + best.price - rival.price) < margin
 
 
 def judge(point: Point) -> Fit:
@@ -270,7 +283,8 @@ def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:
     fall = before.description - after.description
     if point.cost > before.point.cost:  # not converged: with more freedom, the cost cannot rise
         fall = min(fall, before.point.cost - point.cost)
-    return CandidateFit(probe, after, fall - price_of(point.observation, probe.hypothesis))
+    price = price_of(point.observation, probe.hypothesis)
+    return CandidateFit(probe, after, fall - price, price)
 
 
 def price_of(observation: Observation, hypothesis: Hypothesis) -> float:
