@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates.candidate_fit import (
-    STRAINED,
     STRANGE,
     CandidateFit,
     Fit,
@@ -22,7 +21,6 @@ from model.discrepancy.candidates.candidate_fit import (
     refit_from_expected,
     restart,
     same_answer,
-    strain,
 )
 from model.discrepancy.candidates.library import Hypothesis, hypotheses
 from model.discrepancy.candidates.limits import without_limits
@@ -33,7 +31,7 @@ from model.discrepancy.candidates.stated_numbers import as_effect
 from model.discrepancy.candidates.tones import propose_tones
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.output_error.search import STRAINED, Point
 from model.discrepancy.thresholds import Thresholds
 from model.effects.library import effect
 from model.effects.names import effect_on
@@ -68,7 +66,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     probes = _probe_all(case, current, cancel, earlier)
     chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
     fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
-    if strain(current.point) >= STRAINED:
+    if current.point.strain >= STRAINED:
         fits += _fits_from_expected(current, probes, case.options.polished)
         fits += _fits_of_strained_numbers(current, case)
     progress(0.9, "fitting effects of several joints")
@@ -178,8 +176,14 @@ def _fits_of_strained_numbers(current: Fit, case: Case) -> list[CandidateFit]:
     that number's distance, and the number is as expected: the same simulation, without the cost of the prior."""
     point = current.point
     begun = [start for h in _tried(case, point) if (start := as_effect(point, h)) is not None]
-    fits = side_by_side(partial(refit, current), begun)
-    return [fit for fit in fits if fit is not None]
+
+    def fit(start: Probe) -> CandidateFit | None:
+        trials = (*start.hypothesis.trials, start.start)
+        widened = replace(start, hypothesis=replace(start.hypothesis, trials=trials))
+        found = [f for f in (refit(current, start), refit_from_expected(current, widened)) if f is not None]
+        return min(found, key=lambda f: f.fit.point.cost, default=None)
+
+    return [f for f in side_by_side(fit, begun) if f is not None]
 
 
 def _same_place(one: Probe, other: Probe) -> bool:

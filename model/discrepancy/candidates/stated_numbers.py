@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.discrepancy.candidates.candidate_fit import STRAINED
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.output_error.search import STRAINED, Point
 
 _NUMBERS = {
     "link_mass": ("mass",),

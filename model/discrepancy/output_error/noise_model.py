@@ -5,8 +5,8 @@ differ near zero speed. A wrong model leaves a coloured residual. An autoregress
 joint, and the likelihood of its prediction errors is compared, so that no model is rejected for noise that the colour
 of another model's residual would make unlikely.
 
-An autoregression describes what is smooth in any case, of whatever size: sampled at 200 Hz, a residual of seventy counts
-that an arm's inertia has smoothed leaves prediction errors of one. No sensor's noise is like that. So a residual counts
+An autoregression describes what is smooth in any case, of whatever size: sampled at 200 Hz, a residual of seventy
+counts that inertia has smoothed leaves prediction errors of one. No sensor's noise is like that. So a residual counts
 as noise no more predictable than `structure.PREDICTABLE`; the rest is taken for what it is, an error of the model.
 """
 

@@ -28,7 +28,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     best = with_evidence(current, chosen.probe, converge(chosen.fit.point, LAST_STEPS))
     effect, joints = best.hypothesis.name, best.hypothesis.joints
     before, after = current.point, best.fit.point
-    held = case.held_residuals(before, after)
+    held = case.held_residuals(case.credited_against(before, after), after)
     held_errors = case.held_errors(*held)
     refused = case.refused(best.fit.point, best.evidence, before, held, _on(joints, held_errors))
     values = found_values(best.fit, best.hypothesis.free)
