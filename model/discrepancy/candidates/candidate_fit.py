@@ -20,7 +20,7 @@ from model.discrepancy.candidates.tones import tones_tried
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import Point, converge, descend, point_at
+from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
 from model.fitting.unknowns import Unknown
 
 STEPS = 8
@@ -35,8 +35,6 @@ BETTER = 3.0
 """Least fall of the cost with which a fit counts as better; a smaller one is a move along a flat valley."""
 STRANGE = 1.15
 """Misfit from which a fit is restarted: it has not explained the record, and may have ended in a wrong minimum."""
-STRAINED = 4.0
-"""Deviation from a prior's mean, in its standard deviations, from which a fit is restarted as well."""
 SHAPE_PRIOR = 3.0
 """Prior width of a parameter that only shapes an effect, in its expected deviations: it keeps the parameter from
 running away where the effect is too small to show its shape."""
@@ -57,11 +55,13 @@ class Fit:
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """A fitted candidate: the probe from which its fit began, the fit, and its evidence."""
+    """A fitted candidate: the probe from which its fit began, the fit, its evidence, and what of that its free
+    parameters have cost."""
 
     probe: Probe
     fit: Fit
     evidence: float
+    price: float = 0.0
 
     @property
     def hypothesis(self) -> Hypothesis:
@@ -86,6 +86,17 @@ def says_no_more(
     more, which then brought nothing."""
     own, others = set(joints), set(joints_of_better)
     return effect == of_better and (own <= others or own > others)
+
+
+def cannot_be_told(rival: CandidateFit, best: CandidateFit, margin: float) -> bool:
+    """Whether records leave open which of two fits it is: evidence, or −2 ln posterior alone, differs by less than
+    `margin`.
+
+    What a parameter costs is no statement of the records. A rival that explains as much with one parameter more is less
+    likely before anything was recorded, and not refuted.
+    """
+    lead = best.evidence - rival.evidence
+    return min(lead, lead + best.price - rival.price) < margin
 
 
 def judge(point: Point) -> Fit:
@@ -187,7 +198,7 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
     The new fit is given up once a cost of `goal` is out of reach.
     """
-    if found.misfit < STRANGE and strain(found.fit.point) < STRAINED:
+    if found.misfit < STRANGE and found.fit.point.strain < STRAINED:
         return found
     try:
         point = _from_expected(before.point, found.probe, min(goal, found.fit.point.cost))
@@ -200,12 +211,7 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
 def diverged_from_prior(point: Point) -> bool:
     """Whether the tolerance parameters have unlikely values, and the record is unexplained all the same."""
-    return point.misfit >= STRANGE and strain(point) >= STRAINED
-
-
-def strain(point: Point) -> float:
-    """The largest deviation from a prior's mean, in its standard deviations."""
-    return float(np.max(np.abs(point.values - point.expected) * np.sqrt(point.precision), initial=0.0))
+    return point.misfit >= STRANGE and point.strain >= STRAINED
 
 
 def finish(before: Fit, found: CandidateFit) -> CandidateFit:
@@ -270,7 +276,22 @@ def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:
     fall = before.description - after.description
     if point.cost > before.point.cost:  # not converged: with more freedom, the cost cannot rise
         fall = min(fall, before.point.cost - point.cost)
-    return CandidateFit(probe, after, fall - price_of(point.observation, probe.hypothesis))
+    fall = min(fall, _most_of_lifted_priors(before.point, probe.hypothesis, point))
+    price = price_of(point.observation, probe.hypothesis)
+    return CandidateFit(probe, after, fall - price, price)
+
+
+def _most_of_lifted_priors(before: Point, hypothesis: Hypothesis, point: Point) -> float:
+    """What a hypothesis that only lifts priors can bring at most: the priors' cost of the values that it has found.
+
+    With these values and that cost, the model without it describes the records as well; where its own fit does not, it
+    has ended in another valley, and that is no merit of the hypothesis. Infinite for other hypotheses.
+    """
+    held = {u.name: u for u in before.unknowns if u.deviation is not None}
+    if not all(p.name in held for p in hypothesis.free):
+        return math.inf
+    own = [(held[p.name], point.value(p.name)) for p in hypothesis.free]
+    return sum(((value - u.expected) / (u.deviation or 1.0)) ** 2 for u, value in own)
 
 
 def price_of(observation: Observation, hypothesis: Hypothesis) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from model.discrepancy.candidates.candidate_fit import CandidateFit, same_answer
+from model.discrepancy.candidates.candidate_fit import CandidateFit, cannot_be_told, same_answer
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.thresholds import Thresholds
 
@@ -45,8 +45,15 @@ def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()
     best = fits[place]
     rivals = [f for f in fits[place + 1 :] if not same_answer(f, best)]
     margin = best.evidence - max([0.0, *(r.evidence for r in rivals)])
-    group = (best, *(r for r in rivals if best.evidence - r.evidence < thresholds.margin))
+    group = (best, *(r for r in rivals if _is_member(r, best, thresholds, added)))
     return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())
+
+
+def _is_member(rival: CandidateFit, best: CandidateFit, thresholds: Thresholds, added: Sequence[Added]) -> bool:
+    """Whether a rival belongs to the group of the best. One that costs more has to be significant by itself."""
+    if best.evidence - rival.evidence < thresholds.margin:
+        return True
+    return cannot_be_told(rival, best, thresholds.margin) and rival.evidence >= _needed(rival, thresholds, added)
 
 
 def _needed(found: CandidateFit, thresholds: Thresholds, added: Sequence[Added]) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from daq.contracts.errors import SpecError
@@ -22,13 +22,16 @@ from model.discrepancy.candidates.candidate_fit import (
     restart,
     same_answer,
 )
-from model.discrepancy.candidates.library import hypotheses
+from model.discrepancy.candidates.library import Hypothesis, hypotheses
 from model.discrepancy.candidates.limits import without_limits
 from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, keep_promising, probe
+from model.discrepancy.candidates.recorded_trials import with_recorded_trials
+from model.discrepancy.candidates.stated_numbers import as_effect
 from model.discrepancy.candidates.tones import propose_tones
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
+from model.discrepancy.output_error.search import STRAINED, Point
 from model.discrepancy.thresholds import Thresholds
 from model.effects.library import effect
 from model.effects.names import effect_on
@@ -63,8 +66,9 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     probes = _probe_all(case, current, cancel, earlier)
     chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
     fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
-    if diverged_from_prior(current.point):
+    if current.point.strain >= STRAINED:
         fits += _fits_from_expected(current, probes, case.options.polished)
+        fits += _fits_of_strained_numbers(current, case)
     progress(0.9, "fitting effects of several joints")
     fits += fit_several_joints(current, fits, probes, case.thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
@@ -82,12 +86,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
 def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe]) -> list[Probe]:
     """Probes of every hypothesis, the most promising first; flexible gears only on joints where something is wrong."""
     point, options, thresholds = current.point, case.options, case.thresholds
-    free = {u.name for u in point.unknowns if u.deviation is None}
-    every = [
-        h
-        for h in hypotheses(point.model, options.effects, options.joints, point.observation.scales)
-        if h.name not in case.excluded and not {p.name for p in h.main} <= free  # what has been added is free already
-    ]
+    every = _tried(case, point)
     every = keep_promising(point, every, earlier, REMEMBERED * thresholds.interesting)
     flexible = [h for h in every if effect(h.name).is_flexible]  # five times as long to simulate
     probes = probe(point, [h for h in every if not effect(h.name).is_flexible])
@@ -100,6 +99,17 @@ def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe
     probes += probe(point, [h for h in flexible if h.joints[0] in flagged])
     probes.sort(key=lambda p: -p.gain)
     return probes
+
+
+def _tried(case: Case, point: Point) -> list[Hypothesis]:
+    """Every hypothesis that may be tried at a point; what has been added is free already."""
+    options, observation = case.options, point.observation
+    free = {u.name for u in point.unknowns if u.deviation is None}
+    return [
+        with_recorded_trials(h, observation)
+        for h in hypotheses(point.model, options.effects, options.joints, observation.scales)
+        if h.name not in case.excluded and not {p.name for p in h.main} <= free
+    ]
 
 
 def _flagged_joints(probes: Sequence[Probe], joints: Sequence[int], interesting: float) -> set[int]:
@@ -159,6 +169,21 @@ def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> lis
             found.append(one)
     fits = side_by_side(partial(refit_from_expected, current), found)
     return [fit for fit in fits if fit is not None]
+
+
+def _fits_of_strained_numbers(current: Fit, case: Case) -> list[CandidateFit]:
+    """Fits of the effects that do what a number far from its expectation does. They begin where the effect has all of
+    that number's distance, and the number is as expected: the same simulation, without the cost of the prior."""
+    point = current.point
+    begun = [start for h in _tried(case, point) if (start := as_effect(point, h)) is not None]
+
+    def fit(start: Probe) -> CandidateFit | None:
+        trials = (*start.hypothesis.trials, start.start)
+        widened = replace(start, hypothesis=replace(start.hypothesis, trials=trials))
+        found = [f for f in (refit(current, start), refit_from_expected(current, widened)) if f is not None]
+        return min(found, key=lambda f: f.fit.point.cost, default=None)
+
+    return [f for f in side_by_side(fit, begun) if f is not None]
 
 
 def _same_place(one: Probe, other: Probe) -> bool:

@@ -18,7 +18,7 @@ from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.output_error.search import STRAINED, Point
 from model.discrepancy.output_error.shown_noise import residuals_of, with_noise
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
@@ -69,6 +69,14 @@ class Case:
         """Errors of every joint on the fitted traces."""
         old, new = (self.scoring.residuals(p) for p in (before, after))
         return self.scoring.errors(old, new, self.floor)
+
+    def credited_against(self, before: Point, after: Point) -> Point:
+        """The point with which held-out errors of another, `after`, are compared.
+
+        That is the point before, unless it has explained records by an unlikely number of the machine, which the effect
+        added since has made likely again: then that number was the effect, and the model as given is without it.
+        """
+        return self.given if before.strain >= STRAINED > after.strain else before
 
     def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
         """Residuals of the held-out traces; empty where there are none."""

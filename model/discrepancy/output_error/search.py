@@ -24,6 +24,8 @@ ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3
 """Steps that are tried, as a share of the whole one and a damping in shares of the information's diagonal (Marquardt
 1963), each from derivatives that the attempts before have corrected. A short step helps where the cost is strongly
 curved, a damped one where the record says little."""
+STRAINED = 4.0
+"""Deviation from a prior's mean, in its standard deviations, from which a number is no likely one."""
 CONVERGED = 1.0
 """Fall of the cost below which a search ends: one unit is one standard deviation of one parameter."""
 MOST_SEARCHES = 8
@@ -52,6 +54,11 @@ class Point(Calibration):
     def misfit(self) -> float:
         """Mean square of the weighted residual: 1 for white noise of the stated size."""
         return float(np.mean(self.weighted**2))
+
+    @property
+    def strain(self) -> float:
+        """The largest deviation from a prior's mean, in its standard deviations."""
+        return float(np.max(np.abs(self.values - self.expected) * np.sqrt(self.precision), initial=0.0))
 
     @property
     def information(self) -> Floats:

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import SampledPid
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
-from model.discrepancy.candidates.candidate_fit import STRAINED, CandidateFit, Fit, improved_baseline, judge, strain
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
 from model.discrepancy.candidates.decision import Added, decide
 from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
@@ -37,8 +37,9 @@ from model.discrepancy.output_error.controller_evidence import (
 from model.discrepancy.output_error.gap import closed_loop_gap
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
+from model.discrepancy.output_error.recorded_power import with_power
 from model.discrepancy.output_error.sampled_controller import with_errors
-from model.discrepancy.output_error.search import Point, converge, descend, point_at
+from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
 from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
@@ -75,7 +76,7 @@ def diagnose_by_simulation(
     begun = time.perf_counter()
     progress(0.0, "checking the controller's own numbers")
     traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
-    findings = check_controller(traces, model.machine, model)
+    findings = check_controller(with_power(traces, model.machine), model.machine, model)
     excluded = settled_by_records(traces, model.machine)
     if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
         # The set points that were used are known to the count.
@@ -196,7 +197,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
         observation = with_noise(fitted.observation, noise, fitted.residuals)
         try:
             fitted = converge(fitted.on(observation), LAST_STEPS)
-            if strain(fitted) >= STRAINED:
+            if fitted.strain >= STRAINED:
                 again = _fit_tolerances(fitted.at_expected())
                 fitted = again if again.cost < fitted.cost else fitted
         except SpecError:
@@ -257,6 +258,11 @@ def _answer(
     answered = verdict((*proved, *found.steps), unexplained=bool(joints))
     if answered == "unknown-effect":
         found = _withdraw(found, joints)
+        if looked is None and not found.added and not proved:
+            # What is left without the withdrawn steps is judged as where none was ever found.
+            looked = case.where(found.current.point)
+            joints, noisy = _joints_left(case, found, looked)
+            answered = verdict(found.steps, unexplained=bool(joints))
     current, steps = update_to_last_fit(found.current, found.steps)
     steps = with_slight_joints(steps, case.model, current.point.fitted_model)
     found, end = replace(found, current=current, steps=steps), current.point
@@ -311,7 +317,7 @@ def _joints_left(case: Case, found: _Search, where: Where | None) -> tuple[tuple
     before, after, effect_added = found.first.point, found.current.point, where is None
     if effect_added:
         case = case.with_floors_of(after)
-    held_errors = case.held_errors(*case.held_residuals(before, after))
+    held_errors = case.held_errors(*case.held_residuals(case.credited_against(before, after), after))
     joints = len(case.floor)
     judged = 0 if case.held is None else case.held.observation.samples
     counts = case.scoring.samples // joints, judged // joints

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, same_answer, with_evidence
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, cannot_be_told, same_answer, with_evidence
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.candidates.ranking import Ranking
@@ -28,7 +28,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     best = with_evidence(current, chosen.probe, converge(chosen.fit.point, LAST_STEPS))
     effect, joints = best.hypothesis.name, best.hypothesis.joints
     before, after = current.point, best.fit.point
-    held = case.held_residuals(before, after)
+    held = case.held_residuals(case.credited_against(before, after), after)
     held_errors = case.held_errors(*held)
     refused = case.refused(best.fit.point, best.evidence, before, held, _on(joints, held_errors))
     values = found_values(best.fit, best.hypothesis.free)
@@ -53,7 +53,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
         evidence=best.evidence,
         margin=margin,
         candidates=candidates,
-        group=_still_close(best, chosen, ranking, case.thresholds.margin),
+        group=_still_close(best, decision, ranking, case.thresholds.margin),
         rmse_fit=case.fitted_errors(before, after),
         rmse_holdout=held_errors,
         excess_removed_holdout=excess_removed(held_errors),
@@ -68,10 +68,20 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     return step, current if refused is not None else best.fit
 
 
-def _still_close(best: CandidateFit, chosen: CandidateFit, ranking: Ranking, margin: float) -> tuple[Candidate, ...]:
+def _still_close(best: CandidateFit, decision: Decision, ranking: Ranking, margin: float) -> tuple[Candidate, ...]:
     """The group that the data cannot tell apart, now that the fit of the best is at its end; empty for one name."""
+    chosen = decision.best
+    assert chosen is not None
     after = ranking.fitted[ranking.fitted.index(chosen) + 1 :]
-    rivals = [r for r in after if not same_answer(r, chosen) and best.evidence - r.evidence < margin]
+    rivals = [
+        r
+        for r in after
+        if not same_answer(r, chosen)
+        and (
+            best.evidence - r.evidence < margin
+            or (any(r is g for g in decision.group) and cannot_be_told(r, best, margin))
+        )
+    ]
     return tuple(listed(r) for r in (best, *rivals)) if rivals else ()
 
 

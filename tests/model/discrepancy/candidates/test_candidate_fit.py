@@ -135,3 +135,25 @@ def test_a_polished_fit_gets_new_derivatives_by_all_numbers_that_act_on_its_join
     assert polish(judge(point), found) is found, "its simulations fail"
     assert {"joints1+2.dead_zone.width", "load.mass", "joint2.motor.resistance"} <= set(asked.names)
     assert not any(name.startswith(("joint1.", "joint3.")) for name in asked.names)
+
+
+def test_lifting_a_prior_brings_no_more_than_the_prior_costs() -> None:
+    """Where a fit without it has not found its minimum, that is no evidence for a little more friction."""
+    arm = imagined.arm()
+    stated = arm.parameter("joint2.viscous_friction.coefficient")
+    sound = point_at(*observe(arm, [imagined.trace(arm, seconds=4.0)]))
+    k = [u.name for u in sound.unknowns].index("joint2.motor.resistance")
+    astray = sound.values.copy()
+    astray[k] *= 1.2
+    before = judge(sound.moved_to(astray))
+    (found,) = probe(before.point, hypotheses(arm, ("viscous_friction",), (2,)))
+    j = [u.name for u in sound.unknowns].index(stated.name)
+    values = sound.values.copy()
+    values[j] += 0.2 * (stated.deviation or 0.0)
+    started = point_at(sound.observation, sound.at(values), sound.tangents)
+    lifted = replace(
+        started, unknowns=tuple(replace(u, deviation=None) if u.name == stated.name else u for u in started.unknowns)
+    )
+    assert lifted.cost < before.point.cost - 50, "the other fit is astray"
+    counted = with_evidence(before, found, lifted)
+    assert counted.evidence + counted.price == pytest.approx(0.04)

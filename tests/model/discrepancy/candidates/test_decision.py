@@ -75,3 +75,24 @@ def test_the_same_effect_on_fewer_joints_is_no_rival() -> None:
     assert [f.hypothesis.name for f in said.group] == ["gear_loss", "stiction"]
     said = decide(Ranking((both, one), ()), LINES)
     assert said.kind == "named"
+
+
+def test_a_rival_that_explains_as_much_with_one_parameter_more_is_of_the_group() -> None:
+    """Records say nothing about what a parameter costs; they do about a rival that explains less."""
+    best = candidate_fit("coulomb_friction", (1,), 60.0, price=7.8)
+    equal = candidate_fit("base_tilt", (), 52.2, price=15.6)
+    less = candidate_fit("spring_torque", (1,), 46.0, price=15.6)
+    said = decide(Ranking((best, equal, less), ()), LINES)
+    assert [f.hypothesis.name for f in said.group] == ["coulomb_friction", "base_tilt"]
+
+
+def test_a_rival_with_more_parameters_that_would_not_be_named_alone_is_of_no_group() -> None:
+    best = candidate_fit("coulomb_friction", (1,), 18.0, price=7.8)
+    weak = candidate_fit("base_tilt", (), 10.2, price=15.6)
+    assert decide(Ranking((best, weak), ()), LINES).kind == "named"
+
+
+def test_a_rival_with_fewer_parameters_counts_by_its_evidence() -> None:
+    best = candidate_fit("base_tilt", (), 60.0, price=15.6)
+    simpler = candidate_fit("coulomb_friction", (1,), 57.0, price=7.8)
+    assert decide(Ranking((best, simpler), ()), LINES).kind == "group"

@@ -59,3 +59,11 @@ def test_a_rounding_offset_at_rest_is_no_evidence() -> None:
     """A joint at rest whose readings have no noise: half a count to one side, or none."""
     still = np.zeros(2750)
     assert fit_noise_model([[still + 0.5]]).description == fit_noise_model([[still]]).description
+
+
+def test_what_inertia_has_smoothed_is_no_noise_however_well_its_past_predicts_it() -> None:
+    """Seventy deviations at 0.4 Hz, sampled at 200 Hz, beside four deviations that are nearly white."""
+    time = np.arange(2400) / 200.0
+    smooth = 70.0 * np.sqrt(2.0) * np.sin(2 * np.pi * 0.4 * time) + 0.3 * coloured(2400, 0.0, 7)
+    rough = 4.0 * coloured(2400, 0.0, 8)
+    assert fit_noise_model([[smooth]]).description > fit_noise_model([[rough]]).description + 1000.0
