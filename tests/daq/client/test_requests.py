@@ -163,7 +163,7 @@ def test_who_waits_in_a_queue_that_a_person_must_resume_hears_it_soon_and_once()
         EXPERIMENT | {"state": "done"},
     ]
     network = StandIn([httpx.Response(200, json=answer) for answer in answers])
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning, match="waits") as told:
         Experiments(network.connection(), "robots/ma2000").wait("0123456789ab")
     assert [str(one.message) for one in told] == [
         f"experiment 0123456789ab waits: the queue is paused: {paused['reason']}",

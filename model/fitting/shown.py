@@ -1,0 +1,78 @@
+"""Fitted parameters as tables, for terminals and notebooks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from model.fitting.identifiability import IdentifiabilityReport
+    from model.fitting.result import FittedParameter
+
+COLUMNS = ("parameter", "value", "95 % interval", "unit", "before", "")
+NUMBERS = (False, True, True, False, True, False)
+"""Which columns hold numbers, which are set flush right."""
+
+
+def row_of(p: FittedParameter) -> tuple[str, ...]:
+    """The cells of COLUMNS for one parameter; no number where the data do not determine one."""
+    bound = "" if p.at_bound is None else f"at its {'lower' if p.at_bound == 'low' else 'upper'} bound"
+    if p.value is None or p.low is None or p.high is None or p.deviation is None:
+        what = {"combination": "only in combination", "unknown": "not determined"}.get(p.verdict, p.verdict)
+        return p.name, "–", "–", p.unit, f"{p.before:.5g}", what
+    digits = significant(p.value, p.deviation)
+    return (
+        p.name,
+        f"{p.value:.{digits}g}",
+        f"{p.low:.{digits}g} to {p.high:.{digits}g}",
+        p.unit,
+        f"{p.before:.5g}",
+        bound,
+    )
+
+
+def significant(value: float, deviation: float) -> int:
+    """Number of digits of a value that shows its deviation with two digits, at most seven."""
+    if value == 0 or deviation <= 0:
+        return 3
+    return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))
+
+
+def known_of(parameters: Sequence[FittedParameter]) -> str:
+    """How many of them the data determine, in words."""
+    return f"{sum(p.value is not None for p in parameters)} of {len(parameters)} parameters known"
+
+
+def text_of(parameters: Sequence[FittedParameter], report: IdentifiabilityReport) -> str:
+    """The table in columns of spaces, and a line for each combination that is not determined."""
+    rows = [COLUMNS, *map(row_of, parameters)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = zip(row, widths, NUMBERS, strict=True)
+        lines.append("  ".join(cell.rjust(width) if number else cell.ljust(width) for cell, width, number in cells))
+    return "\n".join(line.rstrip() for line in [*lines, *_undetermined(report)])
+
+
+def html_of(title: str, parameters: Sequence[FittedParameter], report: IdentifiabilityReport) -> str:
+    """The same for a notebook, under a title. Every text is escaped."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in COLUMNS)
+    body = "".join(f"<tr>{_cells(row_of(p))}</tr>" for p in parameters)
+    below = "".join(f"<br>{escape(line)}" for line in _undetermined(report))
+    return (
+        f"<div><b>{escape(title)}</b><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        f"{below.removeprefix('<br>')}</div>"
+    )
+
+
+def _cells(row: Sequence[str]) -> str:
+    flush = {True: "right", False: "left"}
+    return "".join(
+        f'<td style="text-align:{flush[number]}">{escape(cell)}</td>' for cell, number in zip(row, NUMBERS, strict=True)
+    )
+
+
+def _undetermined(report: IdentifiabilityReport) -> list[str]:
+    return [f"not determined: {one.text}" for one in report.undetermined]
