@@ -15,7 +15,7 @@ from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
-from model.fitting.shown import html_of, known_of, text_of
+from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
 
 RESULT_FORMAT = 1
@@ -86,12 +86,18 @@ class FitResult(FrozenRecord):
         )
 
     def __str__(self) -> str:
-        """The line of `repr`, the parameters as a table, and what is not determined."""
-        return f"{self!r}\n{text_of(self.parameters, self.identifiability)}"
+        """The line of `repr`, the parameters as a table, what is not determined, and a doubt about the whole."""
+        doubt = f"\nWARNING {self.doubt}" if self.doubt else ""
+        return f"{self!r}\n{text_of(self.parameters, self.identifiability)}{doubt}"
 
     def _repr_html_(self) -> str:
         """The same, for a notebook."""
-        return html_of(repr(self)[1:-1], self.parameters, self.identifiability)
+        return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self.doubt)
+
+    @property
+    def doubt(self) -> str:
+        """One line where the model ends much farther from the records than it began; empty where it does not."""
+        return doubt_of(self.errors)
 
     def parameter(self, name: str) -> FittedParameter:
         """The parameter of that name. Raises SpecError when it was not fitted."""

@@ -9,8 +9,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from model.fitting.identifiability import IdentifiabilityReport
-    from model.fitting.result import FittedParameter
+    from model.fitting.result import FittedParameter, JointError
 
+WORSE = 1.5
+"""By which factor a joint's error must have grown to be doubted: a little is given away for other joints."""
+ABOVE_NOISE = 30.0
+"""How many times the noise it must be, too."""
 COLUMNS = ("parameter", "value", "95 % interval", "unit", "before", "")
 NUMBERS = (False, True, True, False, True, False)
 """Which columns hold numbers, which are set flush right."""
@@ -45,6 +49,19 @@ def known_of(parameters: Sequence[FittedParameter]) -> str:
     return f"{sum(p.value is not None for p in parameters)} of {len(parameters)} parameters known"
 
 
+def doubt_of(errors: Sequence[JointError]) -> str:
+    """One line where a fit ends much farther from its records than it began, so that neither values nor intervals mean
+    anything; empty where it does not. The sum of squares that a fit makes small is robust: it may fall all the same."""
+    worse = [one for one in errors if one.after > WORSE * one.before and one.after > ABOVE_NOISE * one.floor]
+    if not worse:
+        return ""
+    joints = f"joint{'s' if len(worse) > 1 else ''} {', '.join(str(one.joint) for one in worse)}"
+    return (
+        f"the fitted model is farther from the records than before ({joints}): its values mean nothing. An arm that no "
+        "controller holds runs away from any record: shorten the records, or compare torques"
+    )
+
+
 def text_of(parameters: Sequence[FittedParameter], report: IdentifiabilityReport) -> str:
     """The table in columns of spaces, and a line for each combination that is not determined."""
     rows = [COLUMNS, *map(row_of, parameters)]
@@ -56,21 +73,23 @@ def text_of(parameters: Sequence[FittedParameter], report: IdentifiabilityReport
     return "\n".join(line.rstrip() for line in [*lines, *_undetermined(report)])
 
 
-def html_of(title: str, parameters: Sequence[FittedParameter], report: IdentifiabilityReport) -> str:
-    """The same for a notebook, under a title. Every text is escaped."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in COLUMNS)
-    body = "".join(f"<tr>{_cells(row_of(p))}</tr>" for p in parameters)
-    below = "".join(f"<br>{escape(line)}" for line in _undetermined(report))
+def html_of(title: str, parameters: Sequence[FittedParameter], report: IdentifiabilityReport, doubt: str = "") -> str:
+    """The same for a notebook, under a title, with a doubt below. Every text is escaped."""
+    head = _cells(COLUMNS, "th")
+    body = "".join(f"<tr>{_cells(row_of(p), 'td')}</tr>" for p in parameters)
+    warning = [f"WARNING {doubt}"] if doubt else []
+    below = "".join(f"<br/>{escape(line)}" for line in [*_undetermined(report), *warning])
     return (
         f"<div><b>{escape(title)}</b><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        f"{below.removeprefix('<br>')}</div>"
+        f"{below.removeprefix("<br/>")}</div>"
     )
 
 
-def _cells(row: Sequence[str]) -> str:
+def _cells(row: Sequence[str], tag: str) -> str:
     flush = {True: "right", False: "left"}
     return "".join(
-        f'<td style="text-align:{flush[number]}">{escape(cell)}</td>' for cell, number in zip(row, NUMBERS, strict=True)
+        f'<{tag} style="text-align:{flush[number]}">{escape(cell)}</{tag}>'
+        for cell, number in zip(row, NUMBERS, strict=True)
     )
 
 

@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ET
 from typing import Any
 
 from model.fitting.identifiability import Combination, IdentifiabilityReport
-from model.fitting.result import FittedParameter
-from model.fitting.shown import html_of, known_of, text_of
+from model.fitting.result import FittedParameter, JointError
+from model.fitting.shown import doubt_of, html_of, known_of, text_of
 
 NAMES = ("value", "deviation", "low", "high", "expected", "expected_deviation", "at_bound")
 NONE: dict[str, Any] = dict.fromkeys(NAMES)
@@ -33,7 +33,7 @@ def test_the_table_in_a_terminal_has_numbers_where_the_data_determine_one() -> N
         ["<b>.back_emf", "–", "–", "V·s/rad", "0.0334", "only", "in", "combination"],
         ["arm", "0", "0", "to", "0.0196", "m", "0.1", "at", "its", "lower", "bound"],
     ]
-    assert len({row.index(unit) for row, unit in zip(rows, ("kg ", "V·s", "m  "), strict=True)}) == 1
+    assert len({row.rindex(f" {unit} ") for row, unit in zip(rows, ("kg", "V·s/rad", "m"), strict=True)}) == 1
     assert below == "not determined: together a +1 %, <b> −1 %"
     assert known_of((LOAD, EMF, ARM)) == "2 of 3 parameters known"
 
@@ -47,3 +47,17 @@ def test_the_table_of_a_notebook_has_the_same_and_names_are_no_html() -> None:
     text = "".join(page.itertext())
     assert text.startswith("FitResult <of it>")
     assert text.endswith("not determined: together a +1 %, <b> −1 %")
+
+
+def error(joint: int, before: float, after: float) -> JointError:
+    return JointError(joint=joint, unit="rad", before=before, after=after, floor=1e-4)
+
+
+def test_a_fit_that_ends_farther_from_its_records_than_it_began_is_doubted() -> None:
+    assert doubt_of((error(1, 0.1, 0.01), error(2, 0.010, 0.012), error(3, 0.0001, 0.002))) == ""
+    line = doubt_of((error(1, 0.1, 0.01), error(2, 0.1, 0.7)))
+    assert line.startswith(
+        "the fitted model is farther from the records than before (joint 2): its values mean nothing"
+    )
+    page = ET.fromstring(html_of("fit", (LOAD,), REPORT, line))
+    assert "".join(page.itertext()).endswith(f"WARNING {line}")
