@@ -78,11 +78,8 @@ def html_of(title: str, parameters: Sequence[FittedParameter], report: Identifia
     head = _cells(COLUMNS, "th")
     body = "".join(f"<tr>{_cells(row_of(p), 'td')}</tr>" for p in parameters)
     warning = [f"WARNING {doubt}"] if doubt else []
-    below = "".join(f"<br/>{escape(line)}" for line in [*_undetermined(report), *warning])
-    return (
-        f"<div><b>{escape(title)}</b><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        f"{below.removeprefix("<br/>")}</div>"
-    )
+    below = "<br/>".join(map(escape, [*_undetermined(report), *warning]))
+    return f"<div><b>{escape(title)}</b><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{below}</div>"
 
 
 def _cells(row: Sequence[str], tag: str) -> str:
