@@ -22,7 +22,7 @@ def main() -> None:
         from importlib.metadata import version
 
         print(f"daq {version('ma2000-daq')}")
-        return
+        raise SystemExit(0)
     # Matrices here are thin: a second thread in each product costs a fifth of a diagnosis. Simulations share the cores.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq.contracts.errors import DaqError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from daq.contracts.extras import require_extra
 from daq.contracts.trace import Trace
 
 if TYPE_CHECKING:
@@ -15,4 +16,5 @@ def plot(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
 
     Raises TraceError for a joint that the trace does not have, and for a trace without samples; MissingExtraError.
     """
+    require_extra("robot", "ma2000.plot", "matplotlib")
     return trace.plot(joints)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from daq.contracts.trace import EventKind, Floats, Trace, TraceEvent
+    from daq.contracts.recorded import Floats, Recorded, RecordedEvent
 
 INK = "#222222"
 QUIET = "#8a8a8a"
@@ -27,10 +27,10 @@ GAP = "#f3d9a4"
 JOINTS_ABREAST = 3
 """Joints side by side; further ones go into another band of panels, so that the figure fits a page."""
 
-_ALARMS: frozenset[EventKind] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
-_UNMARKED: frozenset[EventKind] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
+_ALARMS: frozenset[str] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
+_UNMARKED: frozenset[str] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
 """Kinds of event that are not marked: there may be hundreds, or they repeat what the axes show."""
-_MOTIONS: frozenset[EventKind] = frozenset({"ramp_start", "ramp_end"})
+_MOTIONS: frozenset[str] = frozenset({"ramp_start", "ramp_end"})
 """The ends of a motion, whose messages say which motion it is: "sine ends"."""
 
 STYLE: dict[Any, Any] = {
@@ -63,7 +63,7 @@ class _Row:
     wanted: Floats | None = None
 
 
-def figure_of(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
+def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None) -> Figure:
     """The figure: one row per signal, one column per joint, marks at events."""
     from daq.contracts.notebook_figure import NotebookFigure
 
@@ -94,7 +94,7 @@ def figure_of(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
     return figure
 
 
-def _only(trace: Trace, joints: tuple[int, ...] | None) -> Trace:
+def _only(trace: Recorded, joints: tuple[int, ...] | None) -> Recorded:
     """The trace with the joints to draw."""
     if joints is None:
         moved = trace.record.spec.joints if trace.record.spec else trace.joints
@@ -102,10 +102,10 @@ def _only(trace: Trace, joints: tuple[int, ...] | None) -> Trace:
     columns = [trace.column(joint) for joint in joints]
     names = ("position", "set_point", "error", "drive", "velocity", "power_raw")
     signals = {name: getattr(trace, name)[:, columns] for name in names if getattr(trace, name) is not None}
-    return replace(trace, joints=joints, **signals)
+    return replace(cast("Any", trace), joints=joints, **signals)  # type: ignore[no-any-return]
 
 
-def _rows(trace: Trace) -> list[_Row]:
+def _rows(trace: Recorded) -> list[_Row]:
     metres = _prismatic(trace)
     scale, unit = (1000.0, "mm") if metres else (math.degrees(1.0), "°")
     wanted = None if trace.set_point is None else trace.set_point * scale
@@ -119,7 +119,7 @@ def _rows(trace: Trace) -> list[_Row]:
     return rows
 
 
-def _prismatic(trace: Trace) -> bool:
+def _prismatic(trace: Recorded) -> bool:
     """Whether all joints of the trace slide; where both kinds are mixed, the unit is left to the machine."""
     machine = trace.record.machine
     if machine is None or max(trace.joints) > len(machine.joints):
@@ -127,7 +127,7 @@ def _prismatic(trace: Trace) -> bool:
     return all(machine.joint(joint).kind == "prismatic" for joint in trace.joints)
 
 
-def _draw(axes: Axes, trace: Trace, row: _Row, column: int) -> None:
+def _draw(axes: Axes, trace: Recorded, row: _Row, column: int) -> None:
     for before, after in _gaps(trace):
         axes.axvspan(before, after, color=GAP, lw=0, zorder=0)
     for event in trace.events:
@@ -159,7 +159,7 @@ def _limits(row: _Row, column: int) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def _legend(axes: Axes, trace: Trace) -> None:
+def _legend(axes: Axes, trace: Recorded) -> None:
     from matplotlib.patches import Patch
 
     handles, _ = axes.get_legend_handles_labels()
@@ -168,7 +168,7 @@ def _legend(axes: Axes, trace: Trace) -> None:
     axes.legend(handles=handles, loc="best", frameon=False, handlelength=2.2, fontsize=8)
 
 
-def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
+def _head(axes: Axes, trace: Recorded, joint: int, column: int) -> None:
     machine = trace.record.machine
     name = machine.joint(joint).name if machine and joint <= len(machine.joints) else ""
     gains = trace.record.gains.get(joint) if trace.record.gains else None
@@ -192,31 +192,31 @@ def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
         )
 
 
-def _mark(event: TraceEvent) -> str:
+def _mark(event: RecordedEvent) -> str:
     if event.kind in _MOTIONS and event.message:
         return event.message
     return event.kind.replace("_", " ")
 
 
-def _labelled(trace: Trace, column: int) -> list[TraceEvent]:
+def _labelled(trace: Recorded, column: int) -> list[RecordedEvent]:
     """Marked events whose labels do not overlap those before; alarms take precedence."""
     apart = (trace.time[-1] - trace.time[0]) * 0.19
     marked = [e for e in trace.events if e.kind not in _UNMARKED and e.joint in (None, trace.joints[column])]
-    labelled: list[TraceEvent] = []
+    labelled: list[RecordedEvent] = []
     for event in sorted(marked, key=lambda event: event.kind not in _ALARMS):
         if all(abs(event.time - other.time) >= apart for other in labelled):
             labelled.append(event)
     return labelled
 
 
-def _gaps(trace: Trace) -> list[tuple[float, float]]:
+def _gaps(trace: Recorded) -> list[tuple[float, float]]:
     if trace.tick is None:
         return []
     rows = np.flatnonzero(np.diff(trace.tick) > trace.record.every)
     return [(float(trace.time[row]), float(trace.time[row + 1])) for row in rows]
 
 
-def _broken_at_gaps(trace: Trace, signal: Floats) -> tuple[Floats, Floats]:
+def _broken_at_gaps(trace: Recorded, signal: Floats) -> tuple[Floats, Floats]:
     """Time and signal with a NaN in every gap, so that no line is drawn where nothing was measured."""
     if trace.tick is None:
         return trace.time, signal
@@ -224,7 +224,7 @@ def _broken_at_gaps(trace: Trace, signal: Floats) -> tuple[Floats, Floats]:
     return np.insert(trace.time, after, trace.time[after - 1]), np.insert(signal, after, math.nan)
 
 
-def title_of(trace: Trace) -> str:
+def title_of(trace: Recorded) -> str:
     """What was run, where, on what, and how it ended if not as it should."""
     record = trace.record
     what = (record.spec.name or record.spec.trajectory.kind) if record.spec else "trace"
@@ -233,7 +233,7 @@ def title_of(trace: Trace) -> str:
     return title if record.outcome in ("complete", None) else f"{title}: {record.outcome}"
 
 
-def _foot(trace: Trace, recorded: tuple[int, ...]) -> str:
+def _foot(trace: Recorded, recorded: tuple[int, ...]) -> str:
     record = trace.record
     created = record.created.strftime("%Y-%m-%d %H:%M:%S UTC")
     foot = f"{created}   trace {record.trace_id}   {len(trace)} samples, {trace.missing} missing   {record.software}"

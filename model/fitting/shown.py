@@ -5,11 +5,71 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from model.fitting.identifiability import IdentifiabilityReport
-    from model.fitting.result import FittedParameter, JointError
+
+
+class ShownParameter(Protocol):
+    """A parameter after a fit, as `model.fitting.result.FittedParameter` has it: that file shows itself by this one."""
+
+    @property
+    def name(self) -> str:
+        """Name."""
+
+    @property
+    def unit(self) -> str:
+        """Unit."""
+
+    @property
+    def verdict(self) -> str:
+        """What the data tell of it."""
+
+    @property
+    def value(self) -> float | None:
+        """Value; None where the data do not determine it, as the next three."""
+
+    @property
+    def deviation(self) -> float | None:
+        """Standard deviation."""
+
+    @property
+    def low(self) -> float | None:
+        """Lower end of the 95 % interval."""
+
+    @property
+    def high(self) -> float | None:
+        """Upper end."""
+
+    @property
+    def before(self) -> float:
+        """Value before the fit."""
+
+    @property
+    def at_bound(self) -> str | None:
+        """`low` or `high`."""
+
+
+class ShownError(Protocol):
+    """The error of one joint, as `model.fitting.result.JointError` has it."""
+
+    @property
+    def joint(self) -> int:
+        """Number, from 1."""
+
+    @property
+    def before(self) -> float:
+        """Root mean square before the fit, rad or m, as the next two."""
+
+    @property
+    def after(self) -> float:
+        """After it."""
+
+    @property
+    def floor(self) -> float:
+        """Noise of the measurement."""
+
 
 WORSE = 1.5
 """By which factor a joint's error must have grown to be doubted: a little is given away for other joints."""
@@ -20,7 +80,7 @@ NUMBERS = (False, True, True, False, True, False)
 """Which columns hold numbers, which are set flush right."""
 
 
-def row_of(p: FittedParameter) -> tuple[str, ...]:
+def row_of(p: ShownParameter) -> tuple[str, ...]:
     """The cells of COLUMNS for one parameter; no number where the data do not determine one."""
     bound = "" if p.at_bound is None else f"at its {'lower' if p.at_bound == 'low' else 'upper'} bound"
     if p.value is None or p.low is None or p.high is None or p.deviation is None:
@@ -44,12 +104,12 @@ def significant(value: float, deviation: float) -> int:
     return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))
 
 
-def known_of(parameters: Sequence[FittedParameter]) -> str:
+def known_of(parameters: Sequence[ShownParameter]) -> str:
     """How many of them the data determine, in words."""
     return f"{sum(p.value is not None for p in parameters)} of {len(parameters)} parameters known"
 
 
-def doubt_of(errors: Sequence[JointError]) -> str:
+def doubt_of(errors: Sequence[ShownError]) -> str:
     """One line where a fit ends much farther from its records than it began, so that neither values nor intervals mean
     anything; empty where it does not. The sum of squares that a fit makes small is robust: it may fall all the same."""
     worse = [one for one in errors if one.after > WORSE * one.before and one.after > ABOVE_NOISE * one.floor]
@@ -62,7 +122,7 @@ def doubt_of(errors: Sequence[JointError]) -> str:
     )
 
 
-def text_of(parameters: Sequence[FittedParameter], report: IdentifiabilityReport) -> str:
+def text_of(parameters: Sequence[ShownParameter], report: IdentifiabilityReport) -> str:
     """The table in columns of spaces, and a line for each combination that is not determined."""
     rows = [COLUMNS, *map(row_of, parameters)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -73,7 +133,7 @@ def text_of(parameters: Sequence[FittedParameter], report: IdentifiabilityReport
     return "\n".join(line.rstrip() for line in [*lines, *_undetermined(report)])
 
 
-def html_of(title: str, parameters: Sequence[FittedParameter], report: IdentifiabilityReport, doubt: str = "") -> str:
+def html_of(title: str, parameters: Sequence[ShownParameter], report: IdentifiabilityReport, doubt: str = "") -> str:
     """The same for a notebook, under a title, with a doubt below. Every text is escaped."""
     head = _cells(COLUMNS, "th")
     body = "".join(f"<tr>{_cells(row_of(p), 'td')}</tr>" for p in parameters)
