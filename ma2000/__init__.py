@@ -21,6 +21,8 @@ from ma2000.own_packages import require_own_packages
 
 if TYPE_CHECKING:
     from daq.client import Client as Client
+    from daq.client import ServiceError as ServiceError
+    from daq.client import ServiceNotReachedError as ServiceNotReachedError
     from daq.contracts.errors import DaqError as DaqError
     from daq.contracts.experiment import ExperimentSpec as ExperimentSpec
     from daq.contracts.extras import Extra
@@ -109,6 +111,8 @@ _HOME = {
     "Reproduction": "model.thesis.reproduction",
     "Run": "ma2000.running",
     "RunError": "ma2000.running",
+    "ServiceError": "daq.client",
+    "ServiceNotReachedError": "daq.client",
     "Simulation": "model.simulation.simulate",
     "TorqueFit": "model.inverse_dynamics.fit",
     "Trace": "daq.contracts.trace",

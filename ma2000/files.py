@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
-from daq.contracts.errors import SpecError
+from pydantic import TypeAdapter, ValidationError
+
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.trace import Trace
-from daq.traces import catalogue, reader, store
+from daq.traces import catalogue, disk, reader, store
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.csv_table import import_csv
 from daq.traces.tables import export_table
+from firmware_protocol.invalid import first_invalid
 
 
 def read_trace(path: Path | str) -> Trace:
@@ -25,13 +29,17 @@ def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) ->
     A query selects by what files say of themselves, before samples are read: `outcome="complete"`, `robot="bench 2"`,
     and so on, one or more of the fields of `daq.traces.catalogue.TraceSummary`.
 
-    Raises TraceError for a file that cannot be read, SpecError for a query of a field that there is not.
+    Raises TraceError for a folder or file that cannot be read, SpecError for a query of a field that there is not, or
+    for a value that the field cannot have.
     """
-    paths = _sorted(Path(folder).glob(pattern))
-    known = TraceSummary.model_fields
-    for name in query:
-        if name not in known:
-            raise SpecError(f"read_traces: {name}: traces are selected by {', '.join(known)}")
+    for name, value in query.items():
+        _check_query(name, value)
+    folder = Path(folder)
+    try:
+        folder.stat()  # a pattern finds nothing in a folder that is not there, and a name is soon misspelled
+    except OSError as error:
+        raise TraceError(f"{folder}: cannot be read: {disk.reason(error)}") from error
+    paths = _sorted(folder.glob(pattern))
     if query:
         paths = [path for path in paths if all(getattr(summary_of(path), key) == query[key] for key in query)]
     return tuple(map(read_trace, paths))
@@ -56,6 +64,17 @@ def write_table(trace: Trace, path: Path | str) -> Path:
 def write_trace(trace: Trace, path: Path | str) -> Path:
     """Writes a trace as MCAP; nothing is written over. Returns the path. Raises TraceError."""
     return store.write_trace(trace, Path(path))
+
+
+def _check_query(name: str, value: object) -> None:
+    """Raises SpecError where no file of a folder can ever answer."""
+    field = TraceSummary.model_fields.get(name)
+    if field is None:
+        raise SpecError(f"read_traces: {name}: traces are selected by {', '.join(TraceSummary.model_fields)}")
+    try:
+        TypeAdapter[Any](field.annotation).validate_python(value)
+    except ValidationError as error:
+        raise SpecError(f"read_traces: {name}: {first_invalid(error).message}") from None
 
 
 def _sorted(paths: Iterable[Path]) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from uuid import uuid4
@@ -26,6 +27,8 @@ from daq.contracts.service.queue import QueueResume, QueueStatus
 
 WAIT = 30.0
 """Time (s) that one request for the end of an experiment waits at the service."""
+FIRST_WAIT = 2.0
+"""The same of the first request: whoever waits for a paused queue hears of it soon."""
 
 
 def new_key() -> str:
@@ -37,7 +40,7 @@ class Experiments:
     """Past, running and waiting experiments."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
-        self._connection = connection
+        self._connection, self._robot = connection, robot
         self._path = f"{robot}/experiments"
 
     def submit(
@@ -65,15 +68,30 @@ class Experiments:
     def wait(
         self, experiment: str, seconds: float | None = None, clock: Callable[[], float] = time.monotonic
     ) -> Experiment:
-        """Waits until it has ended. Raises TimeoutError after `seconds`; it goes on then."""
+        """Waits until it has ended. Raises TimeoutError after `seconds`; it goes on then.
+
+        While it waits in a queue that does not move on before somebody acts, a UserWarning says so, once for each
+        reason: the queue is paused, or consent, presence or an approval is missing.
+        """
         until = None if seconds is None else clock() + seconds
+        longest, told, before = FIRST_WAIT, set[str](), ""
         while True:
-            left = WAIT if until is None else max(0.0, min(WAIT, until - clock()))
+            left = longest if until is None else max(0.0, min(longest, until - clock()))
             found = self.get(experiment, left)
             if found.state in ENDS:
                 return found
             if until is not None and clock() >= until:
                 raise TimeoutError(f"experiment {experiment} is {found.state} after {seconds:g} s")
+            line, stays = self._held_up() if found.state == "queued" else ("", False)
+            if line and line not in told and (stays or line == before):  # what only passes is not worth a word
+                told.add(line)
+                warnings.warn(f"experiment {experiment} waits: {line}", stacklevel=2)
+            longest, before = WAIT, line
+
+    def _held_up(self) -> tuple[str, bool]:
+        """Why the queue lets nothing begin, empty if it does; and whether only a person changes that."""
+        queue = self._connection.get(QueueStatus, f"{self._robot}/queue")
+        return (f"the queue is paused: {queue.reason}", True) if queue.paused else (queue.waiting_for, False)
 
     def cancel(self, experiment: str, *, within: float | None = None) -> Experiment:
         """Withdraws a waiting experiment; for a running one it stops the arm, which then needs a reset. `within`: s for

@@ -2,10 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class RecordedEvent(Protocol):
+    """An event of a trace, as `daq.contracts.trace.TraceEvent` has it."""
+
+    @property
+    def time(self) -> float:
+        """Time (s) from the record's start."""
+
+    @property
+    def kind(self) -> str:
+        """What happened."""
+
+    @property
+    def message(self) -> str:
+        """One line."""
+
+    @property
+    def joint(self) -> int | None:
+        """The joint that it belongs to, if to one."""
 
 
 class Recorded(Protocol):
@@ -26,6 +49,33 @@ class Recorded(Protocol):
     @property
     def position(self) -> NDArray[np.float64]:
         """Position (rad or m) of each sample and joint."""
+
+    @property
+    def set_point(self) -> NDArray[np.float64] | None:
+        """Set point (rad or m), where it was recorded, as the next three."""
+
+    @property
+    def error(self) -> NDArray[np.float64] | None:
+        """Set point − position (rad or m)."""
+
+    @property
+    def drive(self) -> NDArray[np.float64] | None:
+        """Drive, in the record's unit."""
+
+    @property
+    def velocity(self) -> NDArray[np.float64] | None:
+        """Speed (rad/s or m/s)."""
+
+    @property
+    def tick(self) -> NDArray[np.int64] | None:
+        """Number of each sample's control period."""
+
+    @property
+    def events(self) -> Sequence[RecordedEvent]:
+        """What happened."""
+
+    def column(self, joint: int) -> int:
+        """Column of a joint. Raises TraceError."""
 
     @property
     def missing(self) -> int:

@@ -19,10 +19,15 @@ JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B
 paper."""
 
 
+def name_of(trace: Recorded) -> str:
+    """What people call it: its experiment's name, or else kind of motion; the robot, where it is of no experiment."""
+    spec = trace.record.spec
+    return str(trace.record.robot if spec is None else spec.name or spec.trajectory.kind)
+
+
 def html_of(trace: Recorded) -> str:
     """Facts, how far each joint moved from its first position over time, and its range. Every text is escaped."""
-    record = trace.record
-    name = record.spec.name if record.spec is not None and record.spec.name else record.robot
+    record, name = trace.record, name_of(trace)
     facts = f"{len(trace)} samples, {trace.missing} missing, {record.outcome or 'no outcome'}"
     head = f"<b>{escape(name)}</b> <code>{escape(record.trace_id)}</code> · {escape(facts)}"
     return f"<div>{head}<br>{_picture(trace)}<br>{_key(trace)}</div>"

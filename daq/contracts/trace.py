@@ -13,14 +13,16 @@ from pydantic import AfterValidator, Field
 from daq.contracts import tables
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, ReportedGain
+from daq.contracts.extras import require_extra
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine
-from daq.contracts.sketch import html_of
+from daq.contracts.sketch import html_of, name_of
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -160,14 +162,25 @@ class Trace:
     def __repr__(self) -> str:
         """One line: a notebook shows it, and an array of every signal would fill the page."""
         record = self.record
-        name = record.spec.name if record.spec is not None and record.spec.name else record.robot
         span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
         joints = ", ".join(map(str, self.joints))
-        return f"<Trace {record.trace_id}: {name}, {len(self.time)} samples in {span}, joints {joints}>"
+        return f"<Trace {record.trace_id}: {name_of(self)}, {len(self.time)} samples in {span}, joints {joints}>"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: facts and a small picture."""
         return html_of(self)
+
+    def plot(self, joints: tuple[int, ...] | None = None) -> Figure:
+        """The figure, one column a joint: those that the experiment moves, unless `joints` names others.
+
+        Raises TraceError for a joint that the trace does not have, and for a trace without samples; MissingExtraError.
+        """
+        from daq.contracts.figure import figure_of
+
+        require_extra("robot", "plot()", "matplotlib")
+        if len(self) == 0:
+            raise TraceError(f"trace {self.record.trace_id}: has no samples to plot")
+        return figure_of(self, joints)
 
     def to_pandas(self) -> pd.DataFrame:
         """A table with one row a sample, indexed by time (s); units in `attrs`. Raises MissingExtraError."""

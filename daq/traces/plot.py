@@ -1,4 +1,4 @@
-"""Draws a trace for print: position and set point, error, drive; also as one HTML page.
+"""Draws a trace for print: its figure as a file; also as one HTML page.
 
 matplotlib and Jinja2 are imported when a plot is made, so that nothing else waits for them.
 """
@@ -6,65 +6,14 @@ matplotlib and Jinja2 are imported when a plot is made, so that nothing else wai
 from __future__ import annotations
 
 import io
-import math
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from daq.contracts.errors import TraceError
-from daq.contracts.sketch import JOINT_COLOURS
-from daq.contracts.trace import EventKind, Floats, Trace, TraceEvent
+from daq.contracts.figure import STYLE, figure_of, title_of
+from daq.contracts.trace import Trace
 from daq.traces import disk
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
-
-INK = "#222222"
-QUIET = "#8a8a8a"
-SET_POINT = "#555555"
-ALARM = "#B00020"
-GAP = "#f3d9a4"
-JOINTS_ABREAST = 3
-"""Joints side by side; further ones go into another band of panels, so that the figure fits a page."""
-
-_ALARMS: frozenset[EventKind] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
-_UNMARKED: frozenset[EventKind] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
-"""Kinds of event that are not marked: there may be hundreds, or they repeat what the axes show."""
-_MOTIONS: frozenset[EventKind] = frozenset({"ramp_start", "ramp_end"})
-"""The ends of a motion, whose messages say which motion it is: "sine ends"."""
-
-_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 8.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": QUIET,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.grid": True,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "svg.hashsalt": "ma2000-daq",
-}
-
-
-@dataclass(frozen=True)
-class _Row:
-    """One row of panels: what it shows and in which unit."""
-
-    title: str
-    unit: str
-    measured: Floats
-    wanted: Floats | None = None
 
 
 def plot_trace(trace: Trace, path: Path, joints: tuple[int, ...] | None = None) -> Path:
@@ -91,7 +40,7 @@ def picture(trace: Trace, kind: str, joints: tuple[int, ...] | None = None) -> b
     """The figure as `png`, `svg` or `pdf`."""
     import matplotlib as mpl
 
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         stream = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else None
         figure_of(trace, joints).savefig(stream, format=kind, dpi=200, facecolor="white", metadata=metadata)
@@ -105,185 +54,8 @@ def html_page(trace: Trace, joints: tuple[int, ...] | None = None) -> bytes:
     svg = picture(trace, "svg", joints).decode()
     page = Environment(loader=PackageLoader("daq.traces"), autoescape=True).get_template("trace.html.j2")
     return page.render(
-        title=_title(trace), svg=svg[svg.index("<svg") :], facts=_facts(trace), events=trace.events
+        title=title_of(trace), svg=svg[svg.index("<svg") :], facts=_facts(trace), events=trace.events
     ).encode()
-
-
-def figure_of(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
-    """The figure: one row per signal, one column per joint, marks at events."""
-    from daq.traces.notebook_figure import NotebookFigure
-
-    recorded = trace.joints
-    trace = _only(trace, joints)
-    rows = _rows(trace)
-    columns = min(len(trace.joints), JOINTS_ABREAST)
-    bands = math.ceil(len(trace.joints) / columns)
-    figure = NotebookFigure(figsize=(max(6.3, 3.1 * columns + 0.6), bands * (1.9 * len(rows) + 0.6) + 0.8))
-    figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.05, hspace=0.03)
-    axes = figure.subplots(len(rows) * bands, columns, sharex=True, squeeze=False)
-    for column, joint in enumerate(trace.joints):
-        band, place = divmod(column, columns)
-        panels = axes[band * len(rows) : (band + 1) * len(rows), place]
-        _head(panels[0], trace, joint, column)
-        for panel, row in zip(panels, rows, strict=True):
-            _draw(panel, trace, row, column)
-            if place == 0:
-                panel.set_ylabel(f"{row.title} / {row.unit}")
-        panels[-1].set_xlabel("time / s")
-        panels[-1].tick_params(labelbottom=True)
-    for empty in axes[-len(rows) :, len(trace.joints) - (bands - 1) * columns :].flat:
-        empty.set_visible(False)
-    _legend(axes[0][0], trace)
-    figure.align_ylabels()
-    figure.suptitle(_title(trace), x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
-    figure.supxlabel(_foot(trace, recorded), x=0.01, ha="left", fontsize=7.5, color=QUIET)
-    return figure
-
-
-def _only(trace: Trace, joints: tuple[int, ...] | None) -> Trace:
-    """The trace with the joints to draw."""
-    if joints is None:
-        moved = trace.record.spec.joints if trace.record.spec else trace.joints
-        joints = tuple(joint for joint in trace.joints if joint in moved) or trace.joints
-    columns = [trace.column(joint) for joint in joints]
-    names = ("position", "set_point", "error", "drive", "velocity", "power_raw")
-    signals = {name: getattr(trace, name)[:, columns] for name in names if getattr(trace, name) is not None}
-    return replace(trace, joints=joints, **signals)
-
-
-def _rows(trace: Trace) -> list[_Row]:
-    metres = _prismatic(trace)
-    scale, unit = (1000.0, "mm") if metres else (math.degrees(1.0), "°")
-    wanted = None if trace.set_point is None else trace.set_point * scale
-    rows = [_Row("position", unit, trace.position * scale, wanted)]
-    if trace.error is not None:
-        rows.append(_Row("error", unit, trace.error * scale))
-    if trace.drive is not None:
-        rows.append(_Row("drive", trace.record.drive_unit or "V", trace.drive))
-    if trace.velocity is not None:
-        rows.append(_Row("velocity", f"{unit}/s", trace.velocity * scale))
-    return rows
-
-
-def _prismatic(trace: Trace) -> bool:
-    """Whether all joints of the trace slide; where both kinds are mixed, the unit is left to the machine."""
-    machine = trace.record.machine
-    if machine is None or max(trace.joints) > len(machine.joints):
-        return False
-    return all(machine.joint(joint).kind == "prismatic" for joint in trace.joints)
-
-
-def _draw(axes: Axes, trace: Trace, row: _Row, column: int) -> None:
-    for before, after in _gaps(trace):
-        axes.axvspan(before, after, color=GAP, lw=0, zorder=0)
-    for event in trace.events:
-        if event.kind not in _UNMARKED and event.joint in (None, trace.joints[column]):
-            alarm = event.kind in _ALARMS
-            axes.axvline(event.time, color=ALARM if alarm else QUIET, lw=0.8, ls="-" if alarm else ":", zorder=1)
-    if row.wanted is None:
-        axes.axhline(0.0, color=QUIET, lw=0.7, zorder=1)
-    else:
-        time, wanted = _broken_at_gaps(trace, row.wanted[:, column])
-        axes.plot(time, wanted, color=SET_POINT, lw=1.0, ls=(0, (4, 2)), drawstyle="steps-post", label="set point")
-    time, measured = _broken_at_gaps(trace, row.measured[:, column])
-    colour = JOINT_COLOURS[(trace.joints[column] - 1) % len(JOINT_COLOURS)]
-    axes.plot(time, measured, color=colour, lw=1.3, label=row.title, solid_joinstyle="round")
-    axes.margins(x=0.01)
-    axes.set_ylim(*_limits(row, column))
-    axes.tick_params(length=2.5)
-
-
-def _limits(row: _Row, column: int) -> tuple[float, float]:
-    """Axis limits with the same span for every joint, so that joints can be compared; positions about their own
-    middle."""
-    both = [row.measured] if row.wanted is None else [row.measured, row.wanted]
-    low, high = np.min([s.min(axis=0) for s in both], axis=0), np.max([s.max(axis=0) for s in both], axis=0)
-    if row.title != "position":
-        low, high = np.full_like(low, min(low.min(), 0.0)), np.full_like(high, max(high.max(), 0.0))
-    half = max(float((high - low).max()) * 0.56, 1e-6)
-    middle = float(low[column] + high[column]) / 2
-    return middle - half, middle + half
-
-
-def _legend(axes: Axes, trace: Trace) -> None:
-    from matplotlib.patches import Patch
-
-    handles, _ = axes.get_legend_handles_labels()
-    if _gaps(trace):
-        handles.append(Patch(color=GAP, label="samples missing"))
-    axes.legend(handles=handles, loc="best", frameon=False, handlelength=2.2, fontsize=8)
-
-
-def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
-    machine = trace.record.machine
-    name = machine.joint(joint).name if machine and joint <= len(machine.joints) else ""
-    gains = trace.record.gains.get(joint) if trace.record.gains else None
-    title = f"joint {joint}" + (f", {name}" if name else "")
-    colour = JOINT_COLOURS[(joint - 1) % len(JOINT_COLOURS)]
-    axes.set_title(title, loc="left", fontsize=9.5, fontweight="bold", color=colour, pad=14)
-    if gains is not None:
-        axes.set_title("P {} · I {} · D {}".format(*gains), loc="right", fontsize=8, color=QUIET, pad=14)
-    for event in _labelled(trace, column):
-        axes.annotate(
-            _mark(event),
-            (event.time, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=6.5,
-            color=ALARM if event.kind in _ALARMS else QUIET,
-            annotation_clip=False,
-        )
-
-
-def _mark(event: TraceEvent) -> str:
-    if event.kind in _MOTIONS and event.message:
-        return event.message
-    return event.kind.replace("_", " ")
-
-
-def _labelled(trace: Trace, column: int) -> list[TraceEvent]:
-    """Marked events whose labels do not overlap those before; alarms take precedence."""
-    apart = (trace.time[-1] - trace.time[0]) * 0.19
-    marked = [e for e in trace.events if e.kind not in _UNMARKED and e.joint in (None, trace.joints[column])]
-    labelled: list[TraceEvent] = []
-    for event in sorted(marked, key=lambda event: event.kind not in _ALARMS):
-        if all(abs(event.time - other.time) >= apart for other in labelled):
-            labelled.append(event)
-    return labelled
-
-
-def _gaps(trace: Trace) -> list[tuple[float, float]]:
-    if trace.tick is None:
-        return []
-    rows = np.flatnonzero(np.diff(trace.tick) > trace.record.every)
-    return [(float(trace.time[row]), float(trace.time[row + 1])) for row in rows]
-
-
-def _broken_at_gaps(trace: Trace, signal: Floats) -> tuple[Floats, Floats]:
-    """Time and signal with a NaN in every gap, so that no line is drawn where nothing was measured."""
-    if trace.tick is None:
-        return trace.time, signal
-    after = np.flatnonzero(np.diff(trace.tick) > trace.record.every) + 1
-    return np.insert(trace.time, after, trace.time[after - 1]), np.insert(signal, after, math.nan)
-
-
-def _title(trace: Trace) -> str:
-    record = trace.record
-    what = (record.spec.name or record.spec.trajectory.kind) if record.spec else "trace"
-    source = {"mock": "mock controller", "real": "real arm", "imported": "imported"}[record.source]
-    title = f"{what}, {record.robot}, {source}"
-    return title if record.outcome in ("complete", None) else f"{title}: {record.outcome}"
-
-
-def _foot(trace: Trace, recorded: tuple[int, ...]) -> str:
-    record = trace.record
-    created = record.created.strftime("%Y-%m-%d %H:%M:%S UTC")
-    foot = f"{created}   trace {record.trace_id}   {len(trace)} samples, {trace.missing} missing   {record.software}"
-    held = [str(joint) for joint in recorded if joint not in trace.joints]
-    return f"{foot}   recorded too: joint {', '.join(held)}" if held else foot
 
 
 def _facts(trace: Trace) -> list[tuple[str, str]]:

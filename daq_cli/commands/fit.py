@@ -251,3 +251,5 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     print_agreement(agreement)
     if not found.converged:
         print(f"the search did not converge: {found.message}")
+    if found.doubt:
+        print(f"WARNING {found.doubt}")

@@ -43,6 +43,7 @@ class DesignedExperiments(FrozenRecord):
     outside the limits.
     """
 
+    shown = ("nats", "considered", "refused")
     specs: tuple[ExperimentSpec, ...]
     gain: InformationGain
     nats: tuple[float, ...]

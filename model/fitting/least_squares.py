@@ -20,6 +20,8 @@ DIVERGED = 1e3
 """Whitened residual given to every sample where the model has no finite answer, so that the search turns back."""
 FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-9
 """Damping of the first step and the least damping, as shares of the information's diagonal (Marquardt 1963)."""
+MOST_DAMPING = 1e15
+"""Steps are shorter by so much than Gauss and Newton's: an unstable arm multiplies a change beyond all use."""
 TINY = 1e-12
 """Amount added to the diagonal of the damped information, which keeps it positive definite where nothing is known."""
 LEAST_GAIN, FAIR_GAIN, GOOD_GAIN = 1e-3, 0.25, 0.6
@@ -122,14 +124,18 @@ def solve(
     x = _inside((begin - objective.origin) / objective.scale, low, high)
     residual = objective.residual(x)
     cost, weights = _cost_and_weights(residual, objective.samples, search.robust)
-    damping, fresh, message = FIRST_DAMPING, False, ""
+    damping, fresh, message, reason = FIRST_DAMPING, False, "", "as many evaluations as allowed"
     jacobian = information = np.zeros((0, 0))
     while objective.evaluations < search.most_evaluations and not message:
         if jacobian.size == 0:
             jacobian, fresh = objective.jacobian(x), True
-            information = (jacobian * weights[:, None]).T @ jacobian
+            information = _information(jacobian, weights)
         gradient = jacobian.T @ (weights * residual)
-        damped = information + damping * np.diag(np.diag(information)) + TINY * np.eye(len(gradient))
+        with np.errstate(over="ignore", invalid="ignore"):
+            damped = information + damping * np.diag(np.diag(information)) + TINY * np.eye(len(gradient))
+        if damping > MOST_DAMPING or not np.isfinite(damped).all():
+            reason = "no step helps, however short: do the records begin as the model does, and does it stay stable?"
+            break
         step = bounded_step(damped, -gradient, low - x, high - x)
         promised = -float(gradient @ step + 0.5 * step @ information @ step)
         if promised <= search.tolerance * cost:
@@ -149,10 +155,15 @@ def solve(
         fresh = fresh and gain <= LEAST_GAIN
     if jacobian.size == 0:
         jacobian = objective.jacobian(x)
-        information = (jacobian * weights[:, None]).T @ jacobian
+        information = _information(jacobian, weights)
     information = information / np.outer(objective.scale, objective.scale)
-    converged, reason = bool(message), message or "as many evaluations as allowed"
-    return Solution(objective.values(x), cost, objective.evaluations, converged, reason, information)
+    return Solution(objective.values(x), cost, objective.evaluations, bool(message), message or reason, information)
+
+
+def _information(jacobian: Floats, weights: Floats) -> Floats:
+    """(p, p); infinite where derivatives are too large for their square."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray((jacobian * weights[:, None]).T @ jacobian)
 
 
 def _cost_and_weights(residual: Floats, samples: int, robust: bool) -> tuple[float, Floats]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
+from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
 
 RESULT_FORMAT = 1
@@ -57,7 +58,6 @@ class JointError(FrozenRecord):
 class FitResult(FrozenRecord):
     """What a fit found. `names` and `covariance` are of everything that was free, nuisances included."""
 
-    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "samples", "whitened_mean_square", "converged")
     format: Annotated[int, Field(ge=1)] = RESULT_FORMAT
     model: Model
     """The fitted model, its lineage naming parent and traces. Nuisances are not part of it."""
@@ -76,6 +76,28 @@ class FitResult(FrozenRecord):
     seconds: float
     converged: bool
     message: str
+
+    def __repr__(self) -> str:
+        """One line; `print` shows the parameters, too."""
+        traces = f"{len(self.traces)} trace{'s' if len(self.traces) > 1 else ''}"
+        ended = "" if self.converged else ", not converged"
+        return (
+            f"<FitResult {self.model.identity}: {known_of(self.parameters)}, {self.samples} samples of {traces}{ended}>"
+        )
+
+    def __str__(self) -> str:
+        """The line of `repr`, the parameters as a table, what is not determined, and a doubt about the whole."""
+        doubt = f"\nWARNING {self.doubt}" if self.doubt else ""
+        return f"{self!r}\n{text_of(self.parameters, self.identifiability)}{doubt}"
+
+    def _repr_html_(self) -> str:
+        """The same, for a notebook."""
+        return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self.doubt)
+
+    @property
+    def doubt(self) -> str:
+        """One line where the model ends much farther from the records than it began; empty where it does not."""
+        return doubt_of(self.errors)
 
     def parameter(self, name: str) -> FittedParameter:
         """The parameter of that name. Raises SpecError when it was not fitted."""

@@ -22,6 +22,7 @@ from model.fitting.problem import whitened
 from model.fitting.records import records_of
 from model.fitting.result import FittedParameter
 from model.fitting.robust import influence
+from model.fitting.shown import html_of, known_of, text_of
 from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.problem import TorqueProblem
@@ -62,6 +63,20 @@ class TorqueFit(FrozenRecord):
     cutoff: float
     evaluations: int
     converged: bool
+
+    def __repr__(self) -> str:
+        """One line; `print` shows the parameters, too."""
+        held_out = "" if self.held_out is None else f", held out {self.held_out:.1%}"
+        left = f"left of the torque {self.in_sample:.1%}{held_out}"
+        return f"<TorqueFit {self.model.identity}: {known_of(self.parameters)}, {left}>"
+
+    def __str__(self) -> str:
+        """The line of `repr`, the parameters as a table, and what is not determined."""
+        return f"{self!r}\n{text_of(self.parameters, self.identifiability)}"
+
+    def _repr_html_(self) -> str:
+        """The same, for a notebook."""
+        return html_of(repr(self)[1:-1], self.parameters, self.identifiability)
 
 
 @dataclass(frozen=True)

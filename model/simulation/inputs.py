@@ -13,6 +13,7 @@ from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, o
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.drives import controller as pid
+from model.simulation.start_speed import speed_at_start
 
 REST_COUNTS = 2.0
 """Largest difference, in counts of the sensor, of readings that count as one posture before the first new set point."""
@@ -72,7 +73,8 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     """Inputs of a run that repeats a trace.
 
     The arm starts at rest at the posture measured before the first new set point (at the first reading, and with
-    the measured speed, where the trace has one), with the drive of the first sample.
+    the measured speed, where the trace has one), with the drive of the first sample. Where the recorded drive moves the
+    model and no speed was measured, a motion that the record begins in is taken from its first readings.
 
     Raises:
         TraceError: for fewer than three samples, a joint that is missing, angles that look like degrees, or neither
@@ -101,6 +103,8 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     initial[:, 0] = _rest_posture(trace, measured, set_points[0], machine)
     if trace.velocity is not None:
         initial[:, 0], initial[:, 1] = measured[0], trace.velocity[0, columns]
+    elif not controlled or trace.set_point is None:  # nothing brings it back to the motion that it began in
+        initial[:, 1] = speed_at_start(trace, machine)
     return RunInputs(
         joints,
         period,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 NOT_FOR_HELP = {"rich", "pydantic", "pydantic_settings", "numpy", "serial", "mcap", "platformdirs", "zstandard", "yaml"}
 
+ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import json, sys
 sys.argv = ["daq", *{words!r}]
@@ -45,3 +47,36 @@ early.ask()
 print('typer' in sys.modules, 'pydantic' in sys.modules)"""
     run = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True, timeout=60)
     assert run.stdout.split() == ["False", "False"]
+
+
+def ended(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """The command line, begun by Python in a folder, whose files come first on its path."""
+    program = f"import sys; sys.argv = ['daq', *{words!r}]; from daq_cli import main; main()"
+    environment = {"PYTHONPATH": str(ROOT), "DAQ_RUNTIME_FOLDER": str(folder / "run")}
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=folder, env=environment, check=False, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["model.py", "server.py", "daq.py"])
+def test_a_file_that_hides_a_package_is_one_line_to_the_command_line_too(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine = 1\n")
+    done = ended(tmp_path, "fit", "last", "-o", "fitted.json")
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"daq: {tmp_path / name}: has the name of the package")
+
+
+@pytest.mark.parametrize(("name", "said"), [("model.py", "no program here moves"), ("daq.py", "cannot be loaded")])
+def test_a_stop_is_sent_or_said_not_to_be_whatever_hides_a_package(tmp_path: Path, name: str, said: str) -> None:
+    (tmp_path / name).write_text("mine = 1\n")
+    done = ended(tmp_path, "stop")
+    assert done.returncode == 2
+    assert done.stdout.startswith("NOTHING WAS STOPPED: ")
+    assert said in done.stdout
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_version_is_told_without_the_packages_of_the_command_line() -> None:
+    assert loaded("--version") & {"typer", "click", "pydantic", "numpy"} == set()

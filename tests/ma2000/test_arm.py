@@ -33,6 +33,7 @@ def test_an_arm_is_asked_run_stopped_and_released(tmp_path: Path) -> None:
         assert not arm.state().stopped
     assert [trace.record.trace_id for trace in ma2000.read_traces(tmp_path)] == [done.trace.record.trace_id]
     assert len(repr(done.trace)) < 120
+    assert done.trace.plot((2,)).axes
 
 
 def test_a_motion_outside_the_limits_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import ma2000
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SpecError, TraceError
 from tests.daq.traces.samples import write
 
 
@@ -16,5 +16,9 @@ def test_traces_of_a_folder_are_selected_by_what_they_say_of_themselves(tmp_path
     assert [trace.record.notes for trace in ma2000.read_traces(tmp_path, notes="b")] == ["b"]
     assert [trace.record.notes for trace in ma2000.read_traces(tmp_path, outcome="complete", samples=5)] == list("abc")
     assert ma2000.read_traces(tmp_path, outcome="fault") == ()
+    with pytest.raises(SpecError, match="read_traces: outcome: Input should be 'complete', 'stopped'"):
+        ma2000.read_traces(tmp_path, outcome="completed")
+    with pytest.raises(TraceError, match="elsewhere: cannot be read: No such file or directory"):
+        ma2000.read_traces(tmp_path / "elsewhere", kind="ramp")
     with pytest.raises(SpecError, match="read_traces: robo: traces are selected by path, state, size, trace_id"):
         ma2000.read_traces(tmp_path, robo="left")

@@ -121,8 +121,9 @@ def test_each_command_says_to_a_client_which_extra_it_needs(tmp_path: Path) -> N
         line = f"daq: daq {name} needs the package typer: pip install 'ma2000-daq[{extra_of(name)}]'\n"
         nothing = "NOTHING WAS STOPPED: no program here moves a robot\n" if name == "stop" else ""
         assert said[name] == [2, line, nothing]
-    for words in ("", "--help", "--version"):
+    for words in ("", "--help"):
         assert said[words] == [2, "daq: daq needs the package typer: pip install 'ma2000-daq[robot]'\n", ""]
+    assert said["--version"] == [0, "", f"daq {ma2000.__version__}\n"]
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,11 @@ EXPERIMENT = {
 }
 
 
+def queue_status(**changes: object) -> dict[str, object]:
+    """As the service says it of its queue."""
+    return {"paused": False, "reason": "", "since": "2026-01-01T00:00:00Z", "queued": 1} | changes
+
+
 def test_what_changes_nothing_is_asked_again_after_growing_pauses() -> None:
     network = StandIn([BROKEN, httpx.ReadTimeout("slow"), httpx.Response(200, json=ME)])
     assert network.connection().get(Me, "me").name == "anna"
@@ -133,13 +138,38 @@ def test_a_list_comes_part_by_part() -> None:
 
 def test_a_wait_ends_with_the_experiment_or_with_its_time() -> None:
     done = EXPERIMENT | {"state": "done"}
-    network = StandIn([httpx.Response(200, json=EXPERIMENT), httpx.Response(200, json=done)])
+    answers = [EXPERIMENT, queue_status(), done]
+    network = StandIn([httpx.Response(200, json=answer) for answer in answers])
     assert Experiments(network.connection(), "robots/ma2000").wait("0123456789ab").state == "done"
     now = iter([0.0, 1.0, 100.0])
     network = StandIn([httpx.Response(200, json=EXPERIMENT)])
     with pytest.raises(TimeoutError, match="is queued after 10 s"):
         Experiments(network.connection(), "robots/ma2000").wait("0123456789ab", 10, lambda: next(now))
-    assert network.asked[0].url.params["wait"] == "9.0"
+    assert network.asked[0].url.params["wait"] == "2.0"
+
+
+def test_who_waits_in_a_queue_that_a_person_must_resume_hears_it_soon_and_once() -> None:
+    paused = queue_status(paused=True, reason="the robot was connected while 1 experiment waited: look at the arm")
+    away = queue_status(waiting_for="nobody has confirmed presence")
+    answers = [
+        EXPERIMENT,
+        paused,
+        EXPERIMENT,
+        paused,
+        EXPERIMENT,
+        away,
+        EXPERIMENT,
+        away,
+        EXPERIMENT | {"state": "done"},
+    ]
+    network = StandIn([httpx.Response(200, json=answer) for answer in answers])
+    with pytest.warns(UserWarning, match="waits") as told:
+        Experiments(network.connection(), "robots/ma2000").wait("0123456789ab")
+    assert [str(one.message) for one in told] == [
+        f"experiment 0123456789ab waits: the queue is paused: {paused['reason']}",
+        "experiment 0123456789ab waits: nobody has confirmed presence",
+    ]
+    assert [request.url.params.get("wait") for request in network.asked[::2]] == ["2.0", *["30.0"] * 4]
 
 
 def test_a_file_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:

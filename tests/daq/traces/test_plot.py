@@ -11,9 +11,10 @@ from matplotlib.patches import Rectangle
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.figure import ALARM, QUIET, figure_of
 from daq.contracts.sketch import JOINT_COLOURS
 from daq.contracts.trace import Trace, TraceEvent
-from daq.traces.plot import ALARM, QUIET, figure_of, plot_trace
+from daq.traces.plot import plot_trace
 from daq.traces.reader import read_trace
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import JOINTS, record, row, write

@@ -11,8 +11,9 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from daq.contracts.figure import figure_of
 from daq.contracts.trace import Trace, TraceEvent
-from daq.traces.plot import figure_of, html_page
+from daq.traces.plot import html_page
 from daq.traces.reader import read_trace
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import JOINTS, record, row

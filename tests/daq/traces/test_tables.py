@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from daq.contracts.errors import TraceError
+from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.extras import MissingExtraError, require_extra
 from daq.traces.reader import read_trace
 from daq.traces.tables import export_table
@@ -79,3 +80,9 @@ def test_a_joint_at_rest_is_a_straight_line_beside_one_that_moves(tmp_path: Path
     assert spans[0] < 1
     assert spans[1] > 50
     assert "2 shoulder: 57.3°" in page
+
+
+def test_a_trace_without_a_name_is_called_by_its_motion(tmp_path: Path) -> None:
+    trace = read_trace(write(tmp_path / "a.mcap", 3, spec=ExperimentSpec(trajectory=Sine(amplitude=0.1, period=2))))
+    assert ": sine, 3 samples" in repr(trace)
+    assert trace._repr_html_().startswith("<div><b>sine</b>")

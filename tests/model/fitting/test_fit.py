@@ -56,6 +56,12 @@ def test_the_fitted_model_says_where_it_comes_from(result: FitResult) -> None:
     assert {use.name for use in result.model.effects} == {use.name for use in arm().effects}  # no nuisance stays in it
 
 
+def test_what_a_notebook_shows_of_a_fit_is_one_line_and_its_parameters(result: FitResult) -> None:
+    assert repr(result) == f"<FitResult {result.model.identity}: 5 of 5 parameters known, 560 samples of 2 traces>"
+    assert str(result).splitlines()[0] == repr(result)
+    assert all(name in text for name in TRUTH for text in (str(result), result._repr_html_()))
+
+
 def test_a_result_survives_its_file(result: FitResult, tmp_path: Path) -> None:
     result.save(tmp_path / "fit.json")
     assert load_result(tmp_path / "fit.json") == result

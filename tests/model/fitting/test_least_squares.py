@@ -200,3 +200,24 @@ def test_the_way_of_the_search_is_marquardt_s(begin: tuple[float, float, float])
     assert solution.evaluations == len(tried)
     np.testing.assert_allclose(watched.tried, tried, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(watched.differentiated, differentiated, rtol=1e-4, atol=1e-6)
+
+
+@dataclass
+class Unstable(Curve):
+    """Derivatives of an arm that runs away: larger than any step can use, and with the wrong sign."""
+
+    factor: float = -1e9
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        (found,) = super().evaluate(values, derivatives)
+        return [Evaluation(found.residual, None if found.jacobian is None else self.factor * found.jacobian)]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("factor", [-1e9, 1e160])
+def test_a_search_in_which_no_step_helps_ends_soon_and_says_so(factor: float) -> None:
+    problem = Unstable(curve().measured, factor=factor)
+    found = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-300, 1000))
+    assert not found.converged
+    assert found.message.startswith("no step helps, however short")
+    assert found.evaluations < 50

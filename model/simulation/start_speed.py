@@ -1,0 +1,62 @@
+"""The speed at which a record begins, from its first readings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Trace
+from model.arrays import Floats
+
+LEAST_TIME = 0.05
+"""Least length (s) of the record's beginning whose readings tell the speed."""
+LEAST_READINGS = 12
+"""Least number of readings there: a parabola through six of them is still told from noise."""
+SURE = 6.0
+"""By how many of its standard errors a speed must differ from zero."""
+SHARE = 0.1
+"""Least share of a joint's largest speed in the record that counts as motion at its beginning."""
+AGREEMENT = 0.3
+"""Largest relative difference of the speeds that the beginning and its first half tell. From rest, the first half
+tells a much smaller one, whatever the force that sets the arm in motion."""
+COUNTS = 4.0
+"""Least travel of the beginning, in counts of the sensor."""
+
+
+def speed_at_start(trace: Trace, machine: Machine) -> Floats:
+    """Speeds (n,) rad/s of the modelled joints at the first sample, 0 for those that begin at rest as far as readings
+    tell.
+
+    A parabola is fitted by least squares to the first readings; its slope at the first sample counts where it is
+    significant, a good part of the joint's largest speed, and the same from the first half of the readings.
+    """
+    return np.array([_speed(trace, machine, joint) for joint in machine.modelled_joints])
+
+
+def _speed(trace: Trace, machine: Machine, joint: int) -> float:
+    sensor = machine.joint(joint).sensor
+    if sensor is not None and sensor.measures != "position":
+        return 0.0
+    time, reading = trace.time - trace.time[0], trace.position[:, trace.column(joint)]
+    count = max(LEAST_READINGS, int(np.searchsorted(time, LEAST_TIME, side="right")))
+    if len(time) < 2 * count:
+        return 0.0
+    count_size = 0.0 if sensor is None else sensor.range.value / 2**sensor.bits
+    speed, error = _slope(time[:count], reading[:count])
+    early, _ = _slope(time[: count // 2], reading[: count // 2])
+    travels = np.abs(reading[count - 1 :] - reading[: 1 - count]) / (time[count - 1 :] - time[: 1 - count])
+    moves = abs(speed) > max(SURE * error, SHARE * float(travels.max()))
+    seen = abs(speed) * time[count - 1] > COUNTS * count_size
+    agrees = abs(early - speed) <= AGREEMENT * abs(speed)
+    return speed if moves and seen and agrees else 0.0
+
+
+def _slope(time: Floats, reading: Floats) -> tuple[float, float]:
+    """Slope at the first time of a least-squares parabola, and its standard error from the residual."""
+    span = time[-1]
+    design = np.vander(time / span, 3, increasing=True)
+    found, *_ = np.linalg.lstsq(design, reading - reading[0], rcond=None)
+    residual = reading - reading[0] - design @ found
+    variance = float(residual @ residual) / (len(time) - 3)
+    spread = float(np.sqrt(variance * np.linalg.inv(design.T @ design)[1, 1]))
+    return float(found[1]) / span, spread / span
