@@ -210,17 +210,12 @@ def _labelled(trace: Recorded, column: int) -> list[RecordedEvent]:
 
 
 def _gaps(trace: Recorded) -> list[tuple[float, float]]:
-    if trace.tick is None:
-        return []
-    rows = np.flatnonzero(np.diff(trace.tick) > trace.record.every)
-    return [(float(trace.time[row]), float(trace.time[row + 1])) for row in rows]
+    return [(float(trace.time[row]), float(trace.time[row + 1])) for row, _ in trace.gaps]
 
 
 def _broken_at_gaps(trace: Recorded, signal: Floats) -> tuple[Floats, Floats]:
     """Time and signal with a NaN in every gap, so that no line is drawn where nothing was measured."""
-    if trace.tick is None:
-        return trace.time, signal
-    after = np.flatnonzero(np.diff(trace.tick) > trace.record.every) + 1
+    after = np.array([row + 1 for row, _ in trace.gaps], dtype=np.intp)
     return np.insert(trace.time, after, trace.time[after - 1]), np.insert(signal, after, math.nan)
 
 

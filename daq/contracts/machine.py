@@ -183,7 +183,7 @@ class Joint(FrozenRecord):
     name: str
     """For people."""
     kind: Literal["revolute", "prismatic"]
-    """Turns about its z axis, or slides along it."""
+    """Turns about its z axis, or slides along it; both are the z axis of the frame before its own geometry."""
     geometry: Geometry
     """See Geometry."""
     link: Annotated[Cylinder | Rod | Body, Field(discriminator="shape")]

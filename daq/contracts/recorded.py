@@ -67,10 +67,6 @@ class Recorded(Protocol):
         """Speed (rad/s or m/s)."""
 
     @property
-    def tick(self) -> NDArray[np.int64] | None:
-        """Number of each sample's control period."""
-
-    @property
     def events(self) -> Sequence[RecordedEvent]:
         """What happened."""
 
@@ -80,6 +76,10 @@ class Recorded(Protocol):
     @property
     def missing(self) -> int:
         """Number of samples that are not there."""
+
+    @property
+    def gaps(self) -> list[tuple[int, int]]:
+        """Row before each gap, and how many samples are missing in it."""
 
     def __len__(self) -> int:
         """Number of samples."""

@@ -27,3 +27,10 @@ class SampleRow:
     status: int = 0
     velocity: tuple[float, ...] = ()
     taken: int = 0
+
+
+def samples_missing(step: int, every: int) -> int:
+    """How many samples would have had their place between two that are `step` periods apart, when one is asked for in
+    every `every` periods: step / every, rounded, less one. A sample that is less than half its distance late is late,
+    and not missing: its tick says when it was taken. 0 where `step` is not positive."""
+    return max(0, (2 * step + every) // (2 * every) - 1)

@@ -1,7 +1,9 @@
 """Samples of a bus that answers with what is measured when it is asked: nothing keeps earlier samples.
 
-The host's clock says when to ask, the controller's when the sample was taken. Set points are written as soon as they
-are given, right after the sample before, so that they are in force from there to the next sample.
+The host's clock says when to ask, the controller's when the sample was taken: a sample keeps its own tick, also where
+it is a little beside the one that was wanted. A tick of 1 ms beside the truth is a speed of 1 rad/s times 1 ms beside
+the true position: more than half a count of a servo, and a diagnosis sees it. Set points are written as soon as
+they are given, right after the sample before, so that they are in force from there to the next sample.
 """
 
 from __future__ import annotations
@@ -14,10 +16,6 @@ from daq.driver.snapshot import BoardSnapshot
 from daq.driver.tick_time import TickTime
 from firmware_protocol.commands import AFTER_NEWEST, Sample, SetPointsTaken, Snapshot, StatusFlag, mask_of
 
-NEARLY = 1
-"""Ticks by which a sample may come beside the one that was wanted and still be called that one. At 1 ms a tick and the
-speeds of an arm this is less than a count of its sensors, while a grid without holes lets a gap mean something."""
-
 MOST_TRIES = 5
 """Questions, a tick or more apart, after which a clock that has not moved counts as one that stands still."""
 
@@ -29,7 +27,8 @@ class PolledSampling:
         self._deliveries = deliveries
         self._time = TickTime(deliveries.period_s)
         self._newest: int | None = None
-        self._measured: int | None = None
+        self._late = 0
+        """Ticks by which the newest sample came after the one that was wanted; negative: before it."""
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
         """Set points; the confirmation has read them back."""
@@ -42,22 +41,19 @@ class PolledSampling:
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
         """Writes the set points, waits until tick `after` is over, and asks; None is a usual pause after the sample
-        before."""
+        before. The next one is wanted as much earlier as this one is late: samples that come beside their ticks do not
+        move those after them."""
         deliveries = self._deliveries
         if postures:
             self.write(postures)
         wanted = self._due(after)
         if wanted is not None:
-            deliveries.clock.sleep_until(self._time.time_of(wanted - 1) + ASKED_AFTER * deliveries.period_s)
-        reply, now = self._newer(Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints))))
-        tick_time = self._time.arrived(reply.tick, now)
-        tick = reply.tick
-        if wanted is not None and abs(tick - wanted) <= NEARLY:
-            tick = wanted
-        if self._newest is not None and tick <= self._newest:
-            tick = self._newest + 1
+            deliveries.clock.sleep_until(self._time.time_of(wanted) + ASKED_AFTER * deliveries.period_s)
         every = 1 if after is None or self._newest is None else max(1, after - self._newest + 1)
-        self._newest = tick
+        reply, now = self._newer(Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints))))
+        tick, tick_time = reply.tick, self._time.arrived(reply.tick, now)
+        late = 0 if wanted is None else tick - wanted
+        self._late = late if 2 * abs(late) < every else 0
         flags = StatusFlag(reply.status)
         return deliveries.deliver(tick, after, (now, tick_time), reply.joints, flags, "sample", every)
 
@@ -68,8 +64,8 @@ class PolledSampling:
             reply, now = deliveries.link.request(question, Snapshot), deliveries.clock.now()
             deliveries.check_restart(reply.status)
             self._check(reply.status)
-            if self._measured is None or reply.tick > self._measured:
-                self._measured = reply.tick
+            if self._newest is None or reply.tick > self._newest:
+                self._newest = reply.tick
                 return reply, now
             deliveries.clock.sleep_until(now + deliveries.period_s)
         raise NoSampleError(
@@ -80,7 +76,8 @@ class PolledSampling:
         """The tick to ask for; None where it may be any."""
         if self._newest is None:
             return None
-        return self._newest + self._deliveries.link.scale.every if after is None else max(after, self._newest) + 1
+        usual = self._newest + self._deliveries.link.scale.every - 1
+        return max((usual if after is None else after) - self._late, self._newest) + 1
 
     def _check(self, status: int) -> None:
         """Raises HardwareFaultError for a drive that is damaged."""

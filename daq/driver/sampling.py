@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
+from daq.contracts.sample import samples_missing
 from daq.driver.clock import Clock, LockStepClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import ControllerRestartedError, NoSampleError
@@ -106,9 +107,8 @@ class Deliveries:
         every: int = 1,
     ) -> BoardSnapshot:
         """A snapshot, with everything counted that it shows. `times` are host time and tick time (s). It counts as late
-        after the time between two samples, `every` periods. What is missing is counted in samples, too: one for every
-        `every` periods, or part of them, by which the snapshot is too new."""
-        missing = 0 if after is None else max(0, -(-(tick - after - 1) // every))
+        after the time between two samples, `every` periods. What is missing is counted in samples, too."""
+        missing = 0 if after is None else samples_missing(tick - after + every - 1, every)
         used = self.watch.seen(tick, joints)
         missed = used.missed or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
         snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed, used.since)

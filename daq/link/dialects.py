@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
 
 from daq.transport.url import FRAMED, SERVOS, PortUrl, PortUrlError, parse_port_url
 from firmware_protocol.dialect import FramedDialect, LinkDialect
@@ -14,17 +15,26 @@ GROUP = "ma2000_daq.dialects"
 
 
 def dialect_of(url: str) -> LinkDialect:
-    """A new dialect for a connection to this URL. Raises PortUrlError for a name that nobody has."""
+    """A new dialect for a connection to this URL. Raises PortUrlError for a name that nobody has,
+    for a dialect that cannot be loaded, and for numbers that it does not take."""
     port: PortUrl = parse_port_url(url)
     if port.dialect == FRAMED:
         return FramedDialect()
-    if port.dialect == SERVOS:
-        try:
+    try:
+        if port.dialect == SERVOS:
             return DynamixelDialect(port.ids)
-        except ProtocolError as error:
-            raise PortUrlError(f"port {url!r}: {error}") from error
-    for entry in entry_points(group=GROUP, name=port.dialect):
-        made: LinkDialect = entry.load()(port.ids)
-        return made
+        for entry in entry_points(group=GROUP, name=port.dialect):
+            return _loaded(entry)(port.ids)
+    except ProtocolError as error:
+        raise PortUrlError(f"port {url!r}: {error}") from error
     known = sorted({FRAMED, SERVOS} | set(entry_points(group=GROUP).names))
     raise PortUrlError(f"port {url!r}: dialect {port.dialect!r} is unknown: {', '.join(known)}")
+
+
+def _loaded(entry: EntryPoint) -> Callable[[tuple[int, ...]], LinkDialect]:
+    """What makes a dialect of another package. Raises ProtocolError where it cannot be imported."""
+    try:
+        made: Callable[[tuple[int, ...]], LinkDialect] = entry.load()
+    except Exception as error:  # another package's own code runs when it is imported
+        raise ProtocolError(f"dialect {entry.name!r} ({entry.value}): {type(error).__name__}: {error}") from error
+    return made

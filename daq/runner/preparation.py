@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 from daq.contracts.consent import lacks_consent, require_word
 from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.joint_text import position_text
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
@@ -166,7 +166,8 @@ def require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
         if allowed is not None and abs(counts) > allowed:
             raise SafetyError(
                 f"joint {index + 1} is {counts:.0f} ADC counts from its set point, allowed are ±{allowed}: "
-                f"it stands at {math.degrees(row.position[index]):.1f}°; is it blocked, or without power?"
+                f"it stands at {position_text(machine, index + 1, row.position[index], 1)}; is it blocked, or without "
+                "power?"
             )
 
 

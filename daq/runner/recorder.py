@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from daq.contracts.sample import SampleRow
+from daq.contracts.sample import SampleRow, samples_missing
 from daq.contracts.trace import EventKind, TraceEvent
 from daq.traces.writer import TraceWriter
 
@@ -43,7 +43,7 @@ class Recorder:
     def row(self, row: SampleRow) -> None:
         """A control period. Raises TraceError."""
         if self.last is not None:
-            self.missing += max(0, row.tick - self.last - 1) // self.every
+            self.missing += samples_missing(row.tick - self.last, self.every)
         self.last = row.tick
         self.samples += 1
         self.writer.sample(row)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from daq.contracts.sample import SampleRow
+from daq.contracts.sample import SampleRow, samples_missing
 from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
@@ -33,10 +33,12 @@ class Freshness:
         if row.status & StatusFlag.RESTARTED.value or (last is not None and row.tick < last):
             line = f"the board has restarted: tick {row.tick}" + ("" if last is None else f" after {last}")
             return Verdict(trips=(line,), findings=(Finding("restart", line),))
-        if last is None or last < row.tick <= last + self.every:
+        if last is None:
             return NOTHING
         if row.tick == last:
             return Verdict(trips=(f"stale sample: tick {row.tick} came twice",))
+        if not samples_missing(row.tick - last, self.every):
+            return NOTHING
         lost = row.tick - last - self.every
         line = f"{lost} control periods between ticks {last} and {row.tick} have no sample"
         if self.every > 1:

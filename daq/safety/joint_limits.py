@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from daq.contracts.joint_text import position_text, speed_text
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.safety.violation import TOLERANCE, Violation
@@ -22,7 +21,7 @@ def joint_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Viola
     for joint in range(1, plan.angles.shape[1] + 1):
         found += _posture_violations(plan, machine, joint)
         found += _range_violations(plan, machine, limits, joint)
-        found += _speed_violations(plan, limits, joint)
+        found += _speed_violations(plan, machine, limits, joint)
         found += _step_violations(plan, machine, limits, joint)
     return found
 
@@ -61,17 +60,17 @@ def _range_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) 
     for limit, sign, worst in ((own.low, -1, int(angles.argmin())), (own.high, 1, int(angles.argmax()))):
         value, time = float(angles[worst]), worst * plan.period
         if limit is not None and sign * (value - limit) > slack:
-            allowed = f"{_degrees(own.low)} to {_degrees(own.high)}"
-            line = f"joint {joint}: {_degrees(value)} at {time:.2f} s: allowed are {allowed}"
+            low, high = (_shown(machine, joint, one) for one in (own.low, own.high))
+            line = f"joint {joint}: {_shown(machine, joint, value)} at {time:.2f} s: allowed are {low} to {high}"
             found.append(Violation("range", joint, time, value, limit, line))
     return found
 
 
-def _degrees(angle: float | None) -> str:
-    return "any" if angle is None else f"{math.degrees(angle):.2f}°"
+def _shown(machine: Machine, joint: int, position: float | None) -> str:
+    return "any" if position is None else position_text(machine, joint, position)
 
 
-def _speed_violations(plan: Plan, limits: Limits, joint: int) -> list[Violation]:
+def _speed_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) -> list[Violation]:
     speed = limits.joint(joint).speed
     if speed is None or len(plan) < 2:
         return []
@@ -80,9 +79,8 @@ def _speed_violations(plan: Plan, limits: Limits, joint: int) -> list[Violation]
     if change[worst] <= speed * plan.period + TOLERANCE:
         return []
     value, time = float(change[worst]) / plan.period, worst * plan.period
-    line = (
-        f"joint {joint}: {math.degrees(value):.1f} °/s at {time:.2f} s: allowed are up to {math.degrees(speed):.1f} °/s"
-    )
+    moves, allowed = speed_text(machine, joint, value), speed_text(machine, joint, speed)
+    line = f"joint {joint}: {moves} at {time:.2f} s: allowed are up to {allowed}"
     return [Violation("speed", joint, time, value, speed, line)]
 
 
@@ -96,7 +94,8 @@ def _step_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) -
     if value <= largest + TOLERANCE:
         return []
     line = (
-        f"joint {joint}: step of {_degrees(value)} at {time:.2f} s: allowed are up to {_degrees(largest)} "
+        f"joint {joint}: step of {_shown(machine, joint, value)} at {time:.2f} s: allowed are up to "
+        f"{_shown(machine, joint, largest)} "
         f"(following-error limit less {STATIC_ERROR_MARGIN} counts)"
     )
     return [Violation("step", joint, time, value, largest, line)]

@@ -35,6 +35,7 @@ def import_bag_apart(
     topic: str | None = None,
     joints: tuple[str, ...] | None = None,
     times: Times | None = None,
+    numbering: tuple[str, ...] = (),
 ) -> Trace:
     """What `import_bag` returns, made in another process, which may use no more memory than `memory_of` says.
 
@@ -43,6 +44,7 @@ def import_bag_apart(
     """
     require_extra("ros", f"{path}: reading a bag", "rosbags")
     order = {"path": str(path), "limits": limits.model_dump(), "topic": topic, "joints": joints, "times": times}
+    order["numbering"] = numbering
     with TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-P", "-m", "daq.traces.bag_process"],
@@ -76,7 +78,8 @@ def main() -> int:
     joints = None if order["joints"] is None else tuple(order["joints"])
     code = REFUSED
     try:
-        trace = import_bag(Path(order["path"]), limits, topic=order["topic"], joints=joints, times=order["times"])
+        choice = {name: order[name] for name in ("topic", "times")}
+        trace = import_bag(Path(order["path"]), limits, joints=joints, numbering=tuple(order["numbering"]), **choice)
         answer, code = _packed(trace), 0
     except DaqError as error:
         answer = str(error).encode("utf-8", "surrogateescape")

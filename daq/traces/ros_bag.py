@@ -18,7 +18,6 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.extras import require_extra
-from daq.contracts.machine import Machine
 from daq.contracts.trace import EARLIEST, LATEST, Floats, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds
@@ -73,6 +72,7 @@ def import_bag(
     topic: str | None = None,
     joints: tuple[str, ...] | None = None,
     times: Times | None = None,
+    numbering: tuple[str, ...] = (),
 ) -> Trace:
     """The joint states in a bag as a trace: a folder with metadata.yaml, or an .mcap, .db3 or .bag file.
 
@@ -82,6 +82,7 @@ def import_bag(
         topic: of the joint states; needed where a bag has several.
         joints: names of the joints to take, in the order of the trace's joints; messages without them are left out.
         times: `received` takes the times at which messages were received, in place of those in the messages.
+        numbering: names of a machine's joints 1, 2 …, for a bag whose TOML names no machine.
 
     Nothing here limits the memory that rosbags takes: `daq.traces.bag_process` does, for the bags of strangers.
     Raises TraceError with one line for anything that is no bag, holds no joint states, or contradicts itself, and
@@ -99,11 +100,13 @@ def import_bag(
     trace = _Table(f"{path}: topic {found_topic}", names, states).trace(
         description.record(path, machine, ""), times or description.times
     )
-    numbers, record = _numbers(names, machine), trace.record
+    known = numbering if machine is None else tuple(joint.name for joint in machine.joints)
+    numbers, record = _numbers(names, known), trace.record
     spoken = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
     signals = (trace.time, trace.position, trace.velocity, trace.drive)
     identity = trace_id_of(
         *(text.encode() for text in (found_topic, " ".join(names), record.created.isoformat())),
+        b"" if machine is not None or numbers == _in_order(names) else " ".join(map(str, numbers)).encode(),
         *(b"" if signal is None else signal.tobytes() for signal in signals),
         *described,
     )
@@ -209,7 +212,7 @@ def _names(origin: str, states: list[_State], wanted: tuple[str, ...] | None, li
     known = {name: None for state in states for name in state.names}
     if wanted is None:
         if len(sets) > 1:
-            kinds = "; ".join(f"{_listed(sorted(names))} in {count} messages" for names, count in sets.most_common(3))
+            kinds = "; ".join(f"{_listed(sorted(names))} in {_messages(count)}" for names, count in sets.most_common(3))
             raise TraceError(f"{origin}: has messages of different joints: {kinds}; choose joints with --joints")
         wanted = tuple(known)
     for name in wanted:
@@ -235,7 +238,7 @@ class _Table:
 
     def trace(self, record: TraceRecord, times: Times | None) -> Trace:
         """The trace with joints numbered from 1, and notes on what was left out. Raises TraceError."""
-        said = [f"{self._left_out} messages without these joints were left out."] if self._left_out else []
+        said = [f"Messages without all of these joints, left out: {self._left_out}."] if self._left_out else []
         moments = self._moments(times, said)
         created, time = _since_start(moments)
         if not EARLIEST <= created < LATEST:
@@ -303,12 +306,17 @@ def _since_start(moments: list[int]) -> tuple[datetime, Floats]:
     return created, np.array([moment - start for moment in moments], np.float64) / 1e9
 
 
-def _numbers(names: tuple[str, ...], machine: Machine | None) -> tuple[int, ...]:
+def _numbers(names: tuple[str, ...], known: tuple[str, ...]) -> tuple[int, ...]:
     """Number of each joint: the machine's where it has joints of these names, else from 1 in their order."""
-    known = {} if machine is None else {joint.name: number for number, joint in enumerate(machine.joints, start=1)}
-    if all(name in known for name in names):
-        return tuple(known[name] for name in names)
+    return tuple(known.index(name) + 1 for name in names) if set(names) <= set(known) else _in_order(names)
+
+
+def _in_order(names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(range(1, len(names) + 1))
+
+
+def _messages(count: int) -> str:
+    return f"{count} message" if count == 1 else f"{count} messages"
 
 
 def _listed(names: list[str] | tuple[str, ...]) -> str:

@@ -112,10 +112,9 @@ def _ticks(trace: Trace) -> Iterator[Finding]:
         row = int(np.argmax(steps <= 0)) + 1
         yield Finding(level="error", check="ticks", message=f"tick {trace.tick[row]} follows {trace.tick[row - 1]}")
         return
-    gaps = int((steps > trace.record.every).sum())
-    if gaps:
-        first = float(trace.time[int(np.argmax(steps > trace.record.every))])
-        message = f"{trace.missing} samples are missing in {gaps} gaps, the first after {first:.3f} s"
+    if gaps := trace.gaps:
+        first = float(trace.time[gaps[0][0]])
+        message = f"{trace.missing} samples are missing in {len(gaps)} gaps, the first after {first:.3f} s"
         yield Finding(level="warning", check="gaps", message=message)
     if trace.taken is not None and (trace.taken > trace.tick).any():
         row = int(np.argmax(trace.taken > trace.tick))

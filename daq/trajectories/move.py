@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from daq.contracts.joint_text import slides
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
 from daq.trajectories.cubic import PEAK_SPEED, rest_to_rest
@@ -14,31 +15,45 @@ from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, r
 
 MOVE_SPEED = 0.25
 """Highest speed of a slow move in rad/s: an assumption, under half that of the source's ramp."""
+SLIDE_SPEED = 0.05
+"""The same of a joint that slides, in m/s: an assumption, what a joint that turns at MOVE_SPEED moves at 0.2 m."""
 
 NO_WAY = 1e-9
 """Distance (rad, or m) below which nothing moves: a millionth of an ADC count."""
 
 
-def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float], speed: float = MOVE_SPEED) -> Plan:
-    """From `start` to `target` (rad, all joints of the machine), cubic in time, all joints arriving together.
+def slow_speeds(machine: Machine, joints: Sequence[int]) -> Floats:
+    """Highest speeds (rad/s, m/s) of joints in a slow move: the assumed ones, or their own limits where these are
+    lower."""
+    speeds = []
+    for joint in joints:
+        usual, limit = SLIDE_SPEED if slides(machine, joint) else MOVE_SPEED, machine.limits.joint(joint).speed
+        speeds.append(usual if limit is None else min(usual, limit))
+    return np.array(speeds)
 
-    The joint with the longest way reaches `speed` (rad/s) half-way. Where both are the same posture the plan is that
-    one set point. Raises SpecError for angles outside the sensors' ranges.
+
+def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float], speed: float | None = None) -> Plan:
+    """From `start` to `target` (rad, m; all joints of the machine), cubic in time, all joints arriving together.
+
+    The joint that takes longest reaches `speed` (rad/s, m/s; None: its `slow_speeds`) half-way. Where both are the same
+    posture the plan is that one set point. Raises SpecError for angles outside the sensors' ranges.
     """
     begin, end = representable_angles(machine, start), representable_angles(machine, target)
-    way = move_piece(end - begin, control_period(machine), speed)
+    every = range(1, len(begin) + 1)
+    speeds = slow_speeds(machine, every) if speed is None else np.full(len(begin), speed)
+    way = move_piece(end - begin, control_period(machine), speeds)
     moving = [joint + 1 for joint in np.flatnonzero(end != begin).tolist()]
     jumps = np.concatenate([[False], way.jumps])
     angles = np.concatenate([begin[None, :], begin + way.offsets])
     return make_plan(machine, moving, angles, jumps, way.marks)
 
 
-def move_piece(way: Floats, period: float, speed: float = MOVE_SPEED) -> Piece:
-    """Through `way` (k,) rad at no more than `speed` rad/s; nothing when there is no way to go."""
+def move_piece(way: Floats, period: float, speeds: Floats) -> Piece:
+    """Through `way` (k,) rad or m at no more than `speeds` (k,) rad/s or m/s; nothing when there is no way to go."""
     longest = float(np.abs(way).max(initial=0.0))
     if longest < NO_WAY:
         return smooth_piece(np.zeros((0, len(way))))
-    duration = PEAK_SPEED * longest / speed
+    duration = PEAK_SPEED * float((np.abs(way) / speeds).max())
     fraction = rest_to_rest(sample_times(duration, period) / duration)
     marks = (Mark(0, "note", "slow move starts"), Mark(len(fraction), "note", "slow move ends"))
     return smooth_piece(fraction[:, None] * way, marks)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence as Several
 from dataclasses import replace
 
@@ -26,10 +25,11 @@ from daq.contracts.experiment import (
     Step,
     Via,
 )
+from daq.contracts.joint_text import position_text
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
 from daq.trajectories.cubic import cubic
-from daq.trajectories.move import move_piece
+from daq.trajectories.move import move_piece, slow_speeds
 from daq.trajectories.multisine import multisine
 from daq.trajectories.path import path
 from daq.trajectories.pause import pause
@@ -80,8 +80,8 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
         motion = pick_and_place(spec.trajectory, machine, spec.joints, begin, reached, period)
     else:
         motion = _piece(spec.trajectory, spec.joints, begin[columns], unit, period)
-    _require_motion(spec, motion, unit)
-    whole = _with_repeats(spec, motion, period)
+    _require_motion(spec, machine, motion, unit)
+    whole = _with_repeats(spec, machine, motion, period)
     whole = spread(whole, columns, len(begin))
     angles = np.concatenate([begin[None, :], begin + whole.offsets])
     jumps = np.concatenate([[False], whole.jumps])
@@ -89,22 +89,23 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     return make_plan(machine, spec.joints, angles, jumps, (ends[0], *whole.marks, ends[1]))
 
 
-def _require_motion(spec: ExperimentSpec, motion: Piece, unit: Floats) -> None:
+def _require_motion(spec: ExperimentSpec, machine: Machine, motion: Piece, unit: Floats) -> None:
     """Raises SpecError for amplitudes that no set point can show. A recorded path may be of an arm at rest."""
     moved = np.abs(motion.offsets).max(axis=0, initial=0.0)
     if isinstance(spec.trajectory, Path) or not moved.any() or (moved >= unit / 2).any():
         return
+    half = position_text(machine, spec.joints[int(unit.argmax())], float(unit.max()) / 2, 3)
     raise SpecError(
-        f"amplitude: no joint would move by as much as half a set point ({math.degrees(unit.max() / 2):.3g}°): give a "
-        "larger one, or 0 to record the arm at rest"
+        f"amplitude: no joint would move by as much as half a set point ({half}): give a larger one, or 0 to record "
+        "the arm at rest"
     )
 
 
-def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
+def _with_repeats(spec: ExperimentSpec, machine: Machine, motion: Piece, period: float) -> Piece:
     count = len(spec.joints)
     settle, hold = pause(spec.settle, count, period, "settle"), pause(spec.hold, count, period, "hold")
     end = motion.offsets[-1] if len(motion.offsets) else np.zeros(count)
-    back = move_piece(-end, period)
+    back = move_piece(-end, period, slow_speeds(machine, spec.joints))
     pieces: list[Piece] = []
     for repeat in range(1, spec.repeats + 1):
         if repeat > 1:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from daq.contracts.joint_text import position_text
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Floats, Integers
 
@@ -170,9 +171,7 @@ def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
         if not 0 <= posture < calibration.posture_units:
             highest = calibration.posture_units - 1
             low, high = sorted((calibration.posture_to_rad(0), calibration.posture_to_rad(highest)))
-            raise SpecError(
-                f"joint {column + 1}: start of {math.degrees(angle):.2f}° is outside its range of "
-                f"{math.degrees(low):.2f}° to {math.degrees(high):.2f}°"
-            )
+            first, last, asked = (position_text(machine, column + 1, one) for one in (low, high, angle))
+            raise SpecError(f"joint {column + 1}: start of {asked} is outside its range of {first} to {last}")
         result[column] = calibration.posture_to_rad(posture)
     return result

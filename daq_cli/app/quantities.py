@@ -1,22 +1,51 @@
-"""Angles, gains and start postures as people type them."""
+"""Angles, lengths, gains and start postures as people type them."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from daq.contracts.errors import SpecError
+
+if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
 
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 
 
+_UNITS = {"rad": 1.0, "m": 1.0, "mm": 1e-3, "deg": math.radians(1.0), "°": math.radians(1.0), None: math.radians(1.0)}
+
+
+class Length(float):
+    """Metres that were typed as `0.03m` or `30mm`: for joints that slide, and no others."""
+
+
 def parse_angle(text: str, what: str) -> float:
-    """Radians from `21.6`, `21.6deg` or `0.377rad`; degrees when no unit is written. Raises SpecError."""
-    match = re.fullmatch(rf"\s*({_NUMBER})\s*(deg|°|rad)?\s*", text)
+    """Radians from `21.6`, `21.6deg` or `0.377rad`; degrees when no unit is written. Of `0.03m` or `30mm`, a `Length`.
+    Raises SpecError."""
+    match = re.fullmatch(rf"\s*({_NUMBER})\s*(deg|°|rad|mm|m)?\s*", text)
     if match is None:
-        raise SpecError(f"{what} {text!r}: write an angle like 21.6, 21.6deg or 0.377rad")
-    value = float(match[1])
-    return value if match[2] == "rad" else math.radians(value)
+        raise SpecError(
+            f"{what} {text!r}: write an angle like 21.6, 21.6deg or 0.377rad, or of a joint that slides 30mm or 0.03m"
+        )
+    value = float(match[1]) * _UNITS[match[2]]
+    return Length(value) if match[2] in ("m", "mm") else value
+
+
+def require_units(what: str, typed: float | Mapping[int, float], machine: Machine, joints: Sequence[int]) -> None:
+    """Raises SpecError where a length was typed for a joint that turns, or an angle for one that slides: read as the
+    other, 21.6 degrees would be 377 mm. One value is of all `joints`; 0 is both."""
+    from daq.contracts.joint_text import slides
+
+    for joint, value in typed.items() if isinstance(typed, Mapping) else [(joint, typed) for joint in joints]:
+        if value == 0 or not 1 <= joint <= len(machine.joints):
+            continue
+        if slides(machine, joint) and not isinstance(value, Length):
+            raise SpecError(f"{what}: joint {joint} slides: write a length with its unit, like 30mm or 0.03m")
+        if not slides(machine, joint) and isinstance(value, Length):
+            raise SpecError(f"{what}: joint {joint} turns: write an angle like 21.6, 21.6deg or 0.377rad")
 
 
 def parse_per_joint_angles(text: str, what: str) -> float | dict[int, float]:

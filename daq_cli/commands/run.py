@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 from pydantic import BaseModel
@@ -18,10 +18,13 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
-from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles
+from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles, require_units
 from daq_cli.models.model_input import MODEL_HELP
 from daq_cli.robot.access import robot_of
 from daq_cli.robot.experiment import Computation, RunOptions, carry_out
+
+if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
 
 app = typer.Typer(add_completion=False, help="Run an experiment and record its trace.", no_args_is_help=True)
 
@@ -67,7 +70,7 @@ _HELP = {
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
 JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.", autocompletion=completion.joints)]
-StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees).")]
+StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees), or 1=30mm.")]
 GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
 SettleOption = Annotated[float, typer.Option(help="Time at rest before the motion in s, recorded.")]
 HoldOption = Annotated[float, typer.Option(help="Time at rest after the motion in s, recorded.")]
@@ -126,7 +129,8 @@ def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
     default = field.get_default()
     if name == "amplitude":
         return Annotated[
-            str, typer.Option(help="Amplitude in degrees, or one for each joint: 1=21.6,2=-10.")
+            str,
+            typer.Option(help="Amplitude in degrees (a sliding joint: 30mm), or one for each joint: 1=21.6,2=-10."),
         ], f"{_degrees(default)}"
     if name == "points":
         text = "Points in degrees from the start, one after the other: 10;20 or, for each joint, 1=10,2=5;1=20,2=0."
@@ -181,6 +185,17 @@ def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operat
     return parse_spec(data)
 
 
+def _require_units(trajectory: dict[str, Any], start: str | None, machine: Machine, joints: tuple[int, ...]) -> None:
+    """Raises SpecError where what was typed has the unit of another kind of joint."""
+    for name in ("amplitude", "speed"):
+        if name in trajectory:
+            require_units(name, trajectory[name], machine, joints)
+    for point in trajectory.get("points", ()):
+        require_units("points", point, machine, joints)
+    if start is not None:
+        require_units("start", parse_per_joint_angles(start, "start"), machine, joints)
+
+
 def _carry_out(context: typer.Context, spec: ExperimentSpec, options: RunOptions, computation: Computation) -> None:
     robot = robot_of(context)
     if computation.learn_from is None and computation.share != 1.0:
@@ -197,7 +212,9 @@ def _command(kind: type[BaseModel]) -> Callable[..., None]:
 
     def command(context: typer.Context, **values: Any) -> None:
         operator = invocation(context).configuration.operator
-        spec = spec_from_options(_trajectory(kind, values), values, operator)
+        trajectory = _trajectory(kind, values)
+        spec = spec_from_options(trajectory, values, operator)
+        _require_units(trajectory, values["start"], robot_of(context).machine, spec.joints)
         options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
         computation = Computation(values["feedforward"], values["learn_from"], values["learn_share"])
         _carry_out(context, spec, options, computation)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import typer
 
 from daq.contracts.limp import limp_line
@@ -16,9 +14,11 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def status(context: typer.Context, json: JsonOption = False) -> None:
     """Posture, state and link of the robot, read once; --json has the same fields here and at a server."""
+    from daq.contracts.joint_text import position_text
     from daq.runner.line_status import rates_line
 
-    found = robot_of(context).state()
+    robot = robot_of(context)
+    found = robot.state()
     report = found.report
     if json:
         print_json(report.model_dump(mode="json"))
@@ -26,8 +26,8 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
     print(printable(found.headline))
     if (one := report.sample) is not None:
         for joint, *angles in zip(one.joints, one.position, one.set_point, one.error, strict=True):
-            position, set_point, error = map(math.degrees, angles)
-            print(f"  joint {joint}: {position:8.2f}°   set point {set_point:8.2f}°   error {error:6.2f}°")
+            position, set_point, error = (position_text(robot.machine, joint, one) for one in angles)
+            print(f"  joint {joint}: {position:>9s}   set point {set_point:>9s}   error {error:>7s}")
     if line := rates_line(report.link):
         print(line)
     if (queue := report.queue) is not None:

@@ -224,6 +224,8 @@ def import_(
         print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:
         print(made.text)
+        if made.notes:
+            typer.echo(printable(made.notes), err=True)
 
 
 @app.command("verify")

@@ -42,11 +42,12 @@ class BagChoice:
 
 @dataclass(frozen=True)
 class ImportedTrace:
-    """An imported trace: its number, its file, and one line on where it is."""
+    """An imported trace: its number, its file, one line on where it is, and what was noted in making it."""
 
     trace: str
     file: str
     text: str
+    notes: str = ""
 
 
 class AcquisitionFailedError(SafetyError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,6 +84,7 @@ def acquire_complete(
 
 def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
     """Prints the planned motion and the limits that it violates. Raises SafetyError when it violates any."""
+    from daq.contracts.joint_text import position_text, speed_text
     from daq.safety import check_plan, unchecked
     from daq.trajectories import plan, start_angles
 
@@ -100,11 +100,10 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
         print(f"{spec.trajectory.kind}: {shown.duration:.2f} s, {shown.set_points} set points {every}")
         for joint in shown.joints:
             if joint.moves:
-                angles = [math.degrees(a) for a in (joint.start, joint.end, joint.lowest, joint.highest)]
-                print(
-                    f"  joint {joint.joint}: {angles[0]:.2f}° → {angles[1]:.2f}°, between {angles[2]:.2f}° and "
-                    f"{angles[3]:.2f}°, at most {math.degrees(joint.top_speed):.1f}°/s"
-                )
+                ends = joint.start, joint.end, joint.lowest, joint.highest
+                start, end, low, high = (position_text(machine, joint.joint, one) for one in ends)
+                top = speed_text(machine, joint.joint, joint.top_speed)
+                print(f"  joint {joint.joint}: {start} → {end}, between {low} and {high}, at most {top}")
         for line in unchecked(machine, machine.limits):
             print(f"  {line}")
     if violations:

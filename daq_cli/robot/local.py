@@ -212,13 +212,15 @@ class LocalRobot:
         from daq_cli.robot.imports import foreign_trace
 
         place = folder or self.call.trace_folder
-        found = foreign_trace(file, self.call.trace_limits, choice)
+        configured = "machine" in self.call.settings.robot.model_fields_set
+        numbering = tuple(joint.name for joint in self.machine.joints) if configured else ()
+        found = foreign_trace(file, self.call.trace_limits, choice, numbering)
         try:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
         made = write_trace(found, trace_path(place, found.record))
-        return ImportedTrace(found.record.trace_id, str(made), str(made))
+        return ImportedTrace(found.record.trace_id, str(made), str(made), found.record.notes)
 
     def program(self, name: Path) -> Program:
         """A program in a file. Raises SpecError."""

@@ -20,9 +20,7 @@ from firmware_protocol.dynamixel.readings import (
     STOP_MARK,
     WHOLE,
     Servo,
-    ServoGains,
     ServoSettings,
-    ServosStopped,
     faults,
 )
 from firmware_protocol.errors import ProtocolError
@@ -39,6 +37,7 @@ from firmware_protocol.replies import (
 )
 from firmware_protocol.requests import Hello, ReadStatus, Release, ReportGains, Sample, Stop, WriteSetPoints
 from firmware_protocol.scale import LineScale
+from firmware_protocol.wide import WideGains, WideStopped
 
 PERIOD_US = 1000
 """Period of the servos' position control: an assumption, that of their clock. The manual gives none."""
@@ -213,7 +212,7 @@ class DynamixelDialect:
         if isinstance(request, Hello):
             return self._greeted(request, blocks)
         if isinstance(request, ReportGains):
-            return ServoGains(tuple(map(_gains, blocks.values())))
+            return WideGains(tuple(map(_gains, blocks.values())))
         servos = {device: Servo.of(block) for device, block in blocks.items()}
         return self._known(job, servos)
 
@@ -289,7 +288,7 @@ class DynamixelDialect:
         if job.goals is not None and len(servos) == len(self._ids):
             held = (one.goal == job.goals.get(device) for device, one in servos.items())
             if all(one.stopped for one in servos.values()) and all(held):
-                return ServosStopped(tick, tuple(one.goal for one in servos.values()))
+                return WideStopped(tick, tuple(one.goal for one in servos.values()))
         if self._may_write(job):
             locked = {device: one.goal for device, one in servos.items() if one.watchdog < 0}
             job.goals = self._here(servos) | locked

@@ -1,16 +1,11 @@
-"""What a bench of servos says: a servo's registers, and replies with the range that servos need.
-
-The replies have no frame: they go from the dialect to the driver, and the driver's own are their base classes.
-"""
+"""What a bench of servos says: a servo's registers, its settings, and what is wrong with it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from firmware_protocol.dynamixel.control_table import POSITION_MODE, TORQUE_ON_BY_GOAL, WATCHDOG_ERROR, Table, in_words
-from firmware_protocol.joints import JointReading
-from firmware_protocol.message import check_range
-from firmware_protocol.replies import Gains, Stopped
+from firmware_protocol.wide import WideReading
 
 FIRST, LAST = Table.TORQUE_ENABLE, Table.PRESENT_POSITION
 BLOCK = (FIRST.address, LAST.address + LAST.size - FIRST.address)
@@ -22,34 +17,6 @@ GAINS = (Table.POSITION_D_GAIN.address, 6)
 STOP_MARK = 1
 """Bus Watchdog (20 ms) that a stop writes: the servos refuse goals as soon as the bus is silent for so long, until
 somebody writes 0. No run uses this value, so it tells every host that the bench has been stopped."""
-
-
-@dataclass(frozen=True)
-class ServoReading(JointReading):
-    """Goal, position and error in counts of 1/4096 turn (a set point's unit is the same), power in steps of the PWM."""
-
-    def __post_init__(self) -> None:
-        for name in ("set_point", "position", "error"):
-            check_range(name, getattr(self, name), -0x80000000, 0x7FFFFFFF)
-        check_range("power", self.power, -0x8000, 0x7FFF)
-
-
-@dataclass(frozen=True)
-class ServosStopped(Stopped):
-    """Goals of the servos, in counts; a servo that was moved by hand beyond its turn may be outside 0–4095."""
-
-    def __post_init__(self) -> None:
-        check_range("tick", self.tick, 0, 0xFFFFFFFF)
-
-
-@dataclass(frozen=True)
-class ServoGains(Gains):
-    """(P, I, D) of each servo as its control table has them: 0–16383."""
-
-    def __post_init__(self) -> None:
-        for gains in self.gains:
-            for name, value in zip("PID", gains, strict=True):
-                check_range(f"gain {name}", value, 0, 0xFFFF)
 
 
 @dataclass(frozen=True)
@@ -85,9 +52,9 @@ class Servo:
         return self.watchdog in (STOP_MARK, WATCHDOG_ERROR)
 
     @property
-    def reading(self) -> ServoReading:
-        """For the driver."""
-        return ServoReading(self.goal, self.position, self.goal - self.position, self.pwm)
+    def reading(self) -> WideReading:
+        """For the driver: goal, position and error in counts of 1/4096 turn, power in steps of the PWM."""
+        return WideReading(self.goal, self.position, self.goal - self.position, self.pwm)
 
 
 _READ = (

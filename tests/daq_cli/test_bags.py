@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from daq.traces.reader import read_trace
+from tests.daq.servo_bench import PAN_TILT
 from tests.daq.traces.samples import write
 from tests.daq.traces.test_ros_bag import bag
 from tests.daq_cli.invoke import CommandLine
@@ -34,3 +35,24 @@ def test_what_is_no_bag_or_leaves_a_choice_is_told_in_one_line(daq: CommandLine,
     daq("traces", "import", tmp_path / "absent.bag").complains(2, "absent.bag: ")
     (tmp_path / "two.toml").write_text("topics = '/left'\n")
     daq("traces", "import", two).complains(2, "two.toml", "topics")
+
+
+def test_joints_have_the_numbers_of_the_configured_machine_and_it_is_told(daq: CommandLine, tmp_path: Path) -> None:
+    turned = {"names": ["tilt", "pan"], "position": [7.0, 8.0]}
+    path = bag(tmp_path / "a", [turned] * 3)
+    (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{PAN_TILT}"\n')
+    said = daq("--config", tmp_path / "daq.toml", "traces", "import", path)
+    assert "From topic /joint_states, joints 2 tilt, 1 pan." in said.err
+    trace = read_trace(Path(said.out.strip()))
+    assert trace.position[0, trace.column(1)] == 8.0
+    other = daq("traces", "import", path)
+    assert "joints 1 tilt, 2 pan." in other.err
+    assert read_trace(Path(other.out.strip())).record.trace_id != trace.record.trace_id
+
+
+def test_a_folder_that_a_cut_off_recording_left_is_named_as_that(daq: CommandLine, tmp_path: Path) -> None:
+    path = bag(tmp_path / "cut", [{}] * 3)
+    (path / "metadata.yaml").unlink()
+    daq("traces", "import", path).complains(2, "is a folder without metadata.yaml", f"name the file in it, {path}/")
+    (tmp_path / "empty").mkdir()
+    daq("traces", "import", tmp_path / "empty").complains(2, "is a folder without metadata.yaml")

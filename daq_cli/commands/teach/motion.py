@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq_cli.app import completion
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption
-from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
+from daq_cli.app.quantities import parse_angle, parse_per_joint_angles, require_units
 from daq_cli.commands.teach import edit, programs
 from daq_cli.robot.access import robot_of
 from firmware_protocol.invalid import first_invalid
@@ -83,8 +83,11 @@ def step(
         raise SpecError(f"step {to or by!r}: write joint=angle pairs like 1=180,2=45")
     robot = robot_of(context)
     kind: type[Absolute | Relative] = Relative if to is None else Absolute
+    require_units("step", angles, robot.machine, tuple(angles))
+    pace = parse_angle(speed.removesuffix("/s"), "speed")
+    require_units("speed", pace, robot.machine, tuple(angles))
     try:
-        instruction: Instruction = kind(angles=angles, speed=parse_angle(speed, "speed"))
+        instruction: Instruction = kind(angles=angles, speed=pace)
     except ValidationError as error:
         first = first_invalid(error)
         raise SpecError(f"step: {first.where()} = {first.value:.5g} rad or rad/s: {first.message}") from error

@@ -129,9 +129,15 @@ class RemoteRobot:
         from daq_cli.robot.imports import to_upload
 
         del folder
-        with to_upload(file, self.call.trace_limits, choice) as made, remote_robot(self.call) as robot:
+        with (
+            to_upload(file, self.call.trace_limits, choice, self._joint_names) as (made, notes),
+            remote_robot(self.call) as robot,
+        ):
             entry = robot.traces.upload(made)
-        return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}")
+        return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}", notes)
+
+    def _joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint in self.machine.joints)
 
     def program(self, name: Path) -> Program:
         """Returns a program from a local file, or else one that the service keeps. Raises SpecError."""

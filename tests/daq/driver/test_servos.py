@@ -21,7 +21,7 @@ from firmware_protocol.commands import (
     Stopped,
 )
 from firmware_protocol.dynamixel import instructions as ask
-from firmware_protocol.dynamixel.control_table import HardwareError, Table
+from firmware_protocol.dynamixel.control_table import TICKS, HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.dynamixel.packets import HEADER, encode
 from firmware_protocol.errors import ProtocolError
@@ -77,9 +77,24 @@ def test_set_points_are_goals_and_are_read_back(controller: Controller, bench: V
 
 def test_samples_come_every_twentieth_tick_of_the_servos_own_clock(controller: Controller) -> None:
     ticks = [controller.next_snapshot().tick]
-    for _ in range(10):
+    for _ in range(50):
         ticks.append(controller.next_snapshot(ticks[-1] + 19).tick)
-    assert [later - earlier for earlier, later in pairwise(ticks)] == [20] * 10
+    assert {later - earlier for earlier, later in pairwise(ticks)} <= {19, 20, 21}
+    assert abs(ticks[-1] - ticks[0] - 50 * 20) <= 1  # a sample beside its tick does not move those after it
+
+
+def test_a_sample_has_the_tick_at_which_it_was_measured(controller: Controller, bench: VirtualBench) -> None:
+    clocks: list[int] = []
+    bench.saying = lambda data: clocks.append(bench.bench.servos[0][Table.REALTIME_TICK]) or data  # type: ignore[func-returns-value]
+    seen: list[tuple[int, int]] = []
+    sample = controller.next_snapshot()
+    for pause in range(40):
+        bench.sleep_until(bench.now() + 0.004 * (pause % 7))  # a host that is now and then a little late
+        sample = controller.next_snapshot(sample.tick + 19)
+        seen.append((sample.tick, clocks[-1]))
+        assert sample.missing_before == 0
+    assert {later - earlier for (earlier, _), (later, _) in pairwise(seen)} >= {20, 24}
+    assert len({(tick - clock) % TICKS for tick, clock in seen}) == 1
 
 
 def test_a_sample_that_is_far_too_late_is_told_as_what_it_is(controller: Controller, bench: VirtualBench) -> None:

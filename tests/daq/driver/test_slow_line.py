@@ -69,7 +69,7 @@ def test_a_question_waits_until_the_periods_before_are_over(controller: Controll
     assert controller.next_snapshot(first.tick + 6).tick == first.tick + 7
 
 
-@pytest.mark.parametrize(("late", "missing"), [(0, 0), (1, 1), (3, 1), (4, 2)])
+@pytest.mark.parametrize(("late", "missing"), [(0, 0), (1, 0), (2, 1), (3, 1), (4, 1), (5, 2)])
 def test_what_is_missing_is_counted_in_samples(
     controller: Controller, monkeypatch: pytest.MonkeyPatch, late: int, missing: int
 ) -> None:

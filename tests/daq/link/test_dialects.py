@@ -43,15 +43,40 @@ def test_a_mock_of_servos_is_given_its_options() -> None:
     assert port == MockPort(("--ids=1,2", "--load=0.2", "--torque"), 57600, dialect="dynamixel", ids=(1, 2))
 
 
-def test_another_package_brings_its_own_dialect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "mine_of_a_lab.py").write_text(MINE)
-    information = tmp_path / "mine_of_a_lab-1.0.dist-info"
+def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    (folder / "mine_of_a_lab.py").write_text(text)
+    information = folder / "mine_of_a_lab-1.0.dist-info"
     information.mkdir()
     (information / "METADATA").write_text("Metadata-Version: 2.1\nName: mine-of-a-lab\nVersion: 1.0\n")
     (information / "entry_points.txt").write_text("[ma2000_daq.dialects]\nmine = mine_of_a_lab:Mine\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.delitem(sys.modules, "mine_of_a_lab", raising=False)
+
+
+def test_another_package_brings_its_own_dialect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    installed(tmp_path, monkeypatch, MINE)
     assert dialect_of("tcp://arm:4000?dialect=mine&ids=7,8,9").scale.joints == 3
-    sys.modules.pop("mine_of_a_lab")
+
+
+REFUSING = "\n        from firmware_protocol.errors import ProtocolError\n        raise ProtocolError('ids: two')\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("import nothing_of_this_name", "dialect 'mine' (mine_of_a_lab:Mine): ModuleNotFoundError: No module named"),
+        ("class Yours: pass", "dialect 'mine' (mine_of_a_lab:Mine): AttributeError: "),
+        (MINE + REFUSING, "port 'tcp://arm:4000?dialect=mine': ids: two"),
+    ],
+    ids=["needs what is not there", "has another name", "refuses its numbers"],
+)
+def test_a_dialect_of_another_package_that_fails_gets_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, line: str
+) -> None:
+    installed(tmp_path, monkeypatch, text)
+    with pytest.raises(PortUrlError) as error:
+        dialect_of("tcp://arm:4000?dialect=mine")
+    assert line in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_a_ramp_becomes_a_trace_in_the_servos_own_time(at: At) -> None:
     assert (trace.record.period, trace.record.every, trace.record.source) == (0.001, 20, "mock")
     assert trace.record.gains == {1: (800, 0, 0), 2: (800, 0, 0)}
     assert trace.tick is not None
-    assert set(np.diff(trace.tick)) == {20}
+    assert set(np.diff(trace.tick)) <= {19, 20, 21}
     assert trace.set_point is not None
     assert np.ptp(trace.set_point, axis=0) == pytest.approx(math.radians(20.0), abs=0.002)
     assert abs(trace.position[-1] - trace.set_point[-1]).max() < 0.02

@@ -101,8 +101,8 @@ def test_joints_that_are_chosen_come_in_their_order_from_the_messages_that_have_
     path = bag(tmp_path / "a", [{}, gripper, turned])
     trace = import_bag(path, joints=("lift", "pan"))
     np.testing.assert_array_equal(trace.position, [[0.0, 0.0], [7.0, 8.0]])
-    assert "1 messages without these joints were left out." in trace.record.notes
-    with pytest.raises(TraceError, match="messages of different joints: lift, pan in 2 messages; finger in 1 messages"):
+    assert "Messages without all of these joints, left out: 1." in trace.record.notes
+    with pytest.raises(TraceError, match="messages of different joints: lift, pan in 2 messages; finger in 1 message;"):
         import_bag(path)
 
 

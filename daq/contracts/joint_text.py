@@ -1,0 +1,25 @@
+"""Positions and speeds of joints as people read them: degrees of a joint that turns, millimetres of one that slides."""
+
+from __future__ import annotations
+
+import math
+
+from daq.contracts.machine import Machine
+
+MM = 1e3
+"""Millimetres in a metre."""
+
+
+def slides(machine: Machine, joint: int) -> bool:
+    """Whether `joint` (from 1) is prismatic: its positions are in m."""
+    return machine.joint(joint).kind == "prismatic"
+
+
+def position_text(machine: Machine, joint: int, value: float, digits: int = 2) -> str:
+    """A position, or a difference of two (rad; m on a prismatic joint), such as `21.60°` or `30.00 mm`."""
+    return f"{value * MM:.{digits}f} mm" if slides(machine, joint) else f"{math.degrees(value):.{digits}f}°"
+
+
+def speed_text(machine: Machine, joint: int, value: float) -> str:
+    """A speed (rad/s; m/s on a prismatic joint), such as `33.2 °/s` or `50.0 mm/s`."""
+    return f"{value * MM:.1f} mm/s" if slides(machine, joint) else f"{math.degrees(value):.1f} °/s"

@@ -1,0 +1,235 @@
+"""The small dialect of the examples: a stage of sliding axes that speaks lines of text, under driver, runner, models.
+
+The stage is that of the example's rig, which shares no code with them; its time passes as the host waits.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib.util import module_from_spec, spec_from_file_location
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.contracts.experiment import ExperimentSpec, Multisine
+from daq.contracts.machine import load_machine
+from daq.driver import Controller
+from daq.link import Link, LinkTimeoutError, RequestRefusedError
+from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
+from daq.traces.reader import read_trace
+from firmware_protocol.commands import FineSetPoints, Hello, Sample, StatusFlag, Stop
+from model.machine_model.model import base_model
+from model.simulation.simulate import simulate
+from tests.daq.servo_bench import Quiet
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+COUNT = 50e-6
+
+
+def example(name: str) -> ModuleType:
+    spec = spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    made = module_from_spec(spec)
+    sys.modules[name] = made  # where dataclasses look for their module
+    spec.loader.exec_module(made)
+    return made
+
+
+DIALECT, RIG = example("line_stage_dialect"), example("line_stage_rig")
+
+
+class Line:
+    """Endpoint, channel and clock at once, as `tests.daq.servo_bench`. `hearing` may change or lose what is written."""
+
+    lock_step = False
+    url = description = "a stage in memory"
+    bytes_per_second = 11520.0
+    control = None
+
+    def __init__(self) -> None:
+        self.stage = RIG.Stage()
+        self.us = 0
+        self.written: list[bytes] = []
+        self.hearing: Callable[[bytes], bytes] = lambda data: data
+        self._coming = self._rest = b""
+
+    def now(self) -> float:
+        return self.us * 1e-6
+
+    def sleep_until(self, time_s: float) -> None:
+        self.us = max(self.us, round(time_s * 1e6))
+        self.stage.advance_to(self.us // 1000)
+
+    def connect(self) -> Line:
+        return self
+
+    def write(self, data: bytes) -> None:
+        self.written.append(data)
+        *lines, self._rest = (self._rest + self.hearing(data)).split(b"\r")
+        self._coming += b"".join(self.stage.obey(line) + b"\r" for line in lines)
+
+    def read(self, timeout_s: float) -> bytes:
+        self.sleep_until(self.now() + (300e-6 if self._coming else max(0.0, timeout_s) + 250e-6))
+        data, self._coming = self._coming, b""
+        return data
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def controller(self) -> Controller:
+        dialect: Any = DIALECT.LineStageDialect((1, 2))
+        return Controller(Link(self, dialect, self.now), clock=self)
+
+    def goals(self) -> list[int]:
+        return [axis.goal for axis in self.stage.axes]
+
+
+@pytest.fixture
+def line() -> Line:
+    return Line()
+
+
+@pytest.fixture
+def controller(line: Line) -> Controller:
+    """A connection to a stage that runs."""
+    made = line.controller()
+    made.release(made.status().stop)
+    return made
+
+
+def test_connecting_and_looking_write_nothing(line: Line) -> None:
+    with line.controller() as controller:
+        assert controller.identity.simulated
+        assert StatusFlag.NO_TORQUE in controller.status().flags
+        assert controller.next_snapshot()[1].position == 2000
+        assert controller.gains() == {1: (2, 0, 0), 2: (2, 0, 0)}
+    assert set(b"".join(line.written).split(b"\r")) == {b"V?", b"P?", b""}
+
+
+def test_set_points_are_refused_until_the_drives_are_on(line: Line) -> None:
+    with line.controller() as controller, pytest.raises(RequestRefusedError, match="its drives are off"):
+        controller.set_points({1: 2100})
+    assert line.goals() == [2000, 2000]
+
+
+def test_nothing_moves_when_the_drives_come_on(line: Line) -> None:
+    line.stage.axes[0].place += 0.01  # pushed by hand while the drives were off
+    line.sleep_until(0.01)
+    with line.controller() as controller:
+        controller.release(controller.status().stop)
+        line.sleep_until(line.now() + 0.2)
+    assert line.stage.axes[0].encoder() == 2200
+
+
+def test_set_points_are_goals_and_are_read_back(controller: Controller, line: Line) -> None:
+    controller.set_points({1: 2100, 2: 1900})
+    assert line.goals() == [2100, 1900]
+    assert controller.next_snapshot().set_points == {1: 2100, 2: 1900}
+
+
+def test_a_sample_comes_every_twentieth_tick_of_the_stage(controller: Controller) -> None:
+    ticks = [controller.next_snapshot().tick]
+    for _ in range(20):
+        ticks.append(controller.next_snapshot(ticks[-1] + 19).tick)
+    assert {later - earlier for earlier, later in pairwise(ticks)} <= {19, 20, 21}
+
+
+def test_a_stop_holds_and_whoever_comes_next_finds_it(controller: Controller, line: Line) -> None:
+    controller.set_points({1: 3000})
+    line.sleep_until(line.now() + 0.05)
+    stopped = controller.stop()
+    assert stopped.acknowledged
+    assert list(stopped.frozen.values()) == line.goals()
+    with pytest.raises(RequestRefusedError, match="is halted until it is released"):
+        controller.set_points({1: 3000})
+    controller.close()
+    with line.controller() as other:
+        assert StatusFlag.FROZEN in other.status().flags
+        other.release(other.status().stop)
+        assert StatusFlag.FROZEN not in other.status().flags
+
+
+def test_a_stop_of_another_host_is_seen_and_its_release_is_not_taken_for_the_own(
+    controller: Controller, line: Line
+) -> None:
+    before = controller.status().stop
+    line.stage.obey(b"H")
+    assert StatusFlag.FROZEN in controller.status().flags
+    with pytest.raises(RequestRefusedError, match="is newer than the one that was to end"):
+        controller.release(before)
+    assert line.stage.state == "H"
+
+
+def test_a_repeat_of_set_points_cannot_undo_a_stop() -> None:
+    dialect = DIALECT.LineStageDialect((1, 2))
+    late = FineSetPoints(((1, 2600),), 4096)
+    frame = dialect.encode(7, late)
+    assert dialect.again(late, frame) == frame
+    dialect.encode(8, Stop())
+    assert dialect.again(late, frame) == b"P?\r"
+
+
+def test_commands_that_are_lost_are_made_good(controller: Controller, line: Line) -> None:
+    lost: list[bytes] = []
+
+    def hearing(data: bytes) -> bytes:
+        if len(lost) < 2 and data != b"P?\r":
+            lost.append(data)
+            return b""
+        return data
+
+    line.hearing = hearing
+    controller.set_points({2: 1800})
+    assert line.goals() == [2000, 1800]
+    lost.clear()
+    assert controller.stop().acknowledged
+    lost.clear()
+    controller.release(controller.status().stop)
+    assert line.stage.state == "R"
+
+
+def test_a_silent_stage_is_told(line: Line) -> None:
+    line.hearing = lambda _: b""
+    with pytest.raises(LinkTimeoutError, match="no reply to Hello"):
+        line.controller()
+
+
+@given(
+    st.lists(
+        st.binary(max_size=60) | st.sampled_from([b"P 5 R 1 2 3 4 5 6\r", b"V STAGE 2 SIM\r", b"OK\r"]), max_size=12
+    )
+)
+def test_no_bytes_raise_anything(pieces: list[bytes]) -> None:
+    dialect = DIALECT.LineStageDialect((1, 2))
+    for number, request in enumerate((Hello(2, 1), Sample(1, 3), Stop())):
+        dialect.encode(number, request)
+    for piece in pieces:
+        dialect.feed(piece)
+        dialect.answer()
+
+
+def test_a_record_of_the_stage_is_what_its_model_does(line: Line, tmp_path: Path) -> None:
+    machine = load_machine(str(EXAMPLES / "line_stage.toml"))
+    trajectory = Multisine(amplitude={1: 0.03, 2: 0.02}, duration=4.0, lowest=0.2, highest=1.5, tones=6, seed=1)
+    spec = ExperimentSpec(trajectory=trajectory, joints=(1, 2), settle=0.3, hold=0.3)
+    with line.controller() as controller:
+        controller.release(controller.status().stop)
+        setup = RunSetup(
+            controller, ArmControl(controller), spec, machine, machine.limits, tmp_path, Quiet(), StopRequests()
+        )
+        result = run_experiment(setup, Consent())
+    assert (result.outcome, result.missing) == ("complete", 0)
+    trace = read_trace(result.trace)
+    simulation = simulate(base_model(machine), trace)
+    apart = simulation.at_samples(simulation.reading) - trace.position
+    speed = simulation.at_samples(simulation.velocity)
+    assert np.sqrt(np.mean(apart**2, axis=0)).max() < 0.5 * COUNT
+    assert np.abs(np.sum(apart * speed, axis=0) / np.sum(speed**2, axis=0)).max() < 2e-4  # s ahead of the record
