@@ -72,7 +72,7 @@ def _check_query(name: str, value: object) -> None:
     if field is None:
         raise SpecError(f"read_traces: {name}: traces are selected by {', '.join(TraceSummary.model_fields)}")
     try:
-        TypeAdapter[Any](field.annotation).validate_python(value)
+        TypeAdapter[Any](cast(Any, field.annotation)).validate_python(value)
     except ValidationError as error:
         raise SpecError(f"read_traces: {name}: {first_invalid(error).message}") from None
 
