@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import json
 import multiprocessing
+import os
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -158,6 +159,7 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
 
 
 def _run(url: str, live: str, watchers: int, paths: Sequence[str], rate: float, parent: Connection) -> None:
+    os.setsid()  # the kernel shares the cores among sessions: clients are other people's programs, not the service's
     parent.send(asyncio.run(_all(url, live, watchers, paths, rate, parent)))
 
 

@@ -64,6 +64,7 @@ OWN_DOOR, STOP_DOOR = "through the service", "through the stop listener"
 FLOOR_RATE = 20.0
 """GETs a second of the empty application beside the service: few, since they are part of the load."""
 TIMED = (sys.executable, "-m", "benchmarks.timed_service")
+COMPUTING = "import os; parent = os.getppid()\nwhile os.getppid() == parent: sum(range(100_000))"
 EMPTY_APP = """
 import sys, uvicorn
 from fastapi import FastAPI
@@ -218,8 +219,7 @@ def computing(count: int) -> Iterator[None]:
     """So many programs that compute without pause, each in a session of its own, as another person's would."""
     with contextlib.ExitStack() as programs:
         for _ in range(count):
-            command = [sys.executable, "-c", "while True: sum(range(100_000))"]
-            programs.callback(subprocess.Popen(command, start_new_session=True).kill)
+            programs.callback(subprocess.Popen([sys.executable, "-c", COMPUTING], start_new_session=True).kill)
         yield
 
 

@@ -1,11 +1,9 @@
-"""Settings of interpreter and kernel that keep pauses of the event loop, and of the process that keeps time, short."""
+"""Settings of the interpreter that keep pauses of the event loop, and of the process that keeps time, short."""
 
 from __future__ import annotations
 
 import gc
 import sys
-
-from server.core_sharing import SHORTEST, ask_for_slices
 
 SWITCH_EVERY = 0.001
 """Longest time (s) that a thread holds the interpreter while another one waits. With Python's default of 5 ms the event
@@ -13,10 +11,8 @@ loop would wait that long for every thread that reads the database or checks a m
 
 
 def keep_steady() -> None:
-    """Freezes loaded objects out of garbage collection, where a full collection would pause everything for 0.1 s;
-    switches threads more often; and asks for a core soon after waking. Call this when everything is loaded, on the
-    thread that must not wait."""
+    """Freezes loaded objects out of garbage collection, where a full collection would pause everything for 0.1 s; and
+    switches threads more often. Call this when everything is loaded."""
     sys.setswitchinterval(SWITCH_EVERY)
     gc.collect()
     gc.freeze()
-    ask_for_slices(SHORTEST)

@@ -15,7 +15,7 @@ from daq.contracts.errors import DaqError
 from server.bounded.messages import ORDER, Answer, Limits, ReadUpload
 from server.bounded.motion import preview_of
 from server.bounded.upload import read_upload
-from server.core_sharing import ask_for_slices, weigh_session
+from server.core_sharing import weigh_session
 from server.problems import NO_ROOM
 
 NICENESS, SESSION_NICENESS = 10, 5
@@ -31,7 +31,6 @@ def main() -> int:
     """Reads the limits, then reads orders and answers them until the service closes its end."""
     os.nice(NICENESS)
     weigh_session(SESSION_NICENESS)
-    ask_for_slices(0)  # the service's are short, and inherited
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE, "ascii")
     orders: queue.SimpleQueue[str] = queue.SimpleQueue()

@@ -14,7 +14,7 @@ import sys
 
 from daq.executors.parent import end_with_parent
 from server import logs
-from server.core_sharing import ask_for_slices, weigh_session
+from server.core_sharing import weigh_session
 
 NICENESS = 19
 """Nice value of the process within its session."""
@@ -40,4 +40,3 @@ def give_way() -> None:
         weigh_session(SESSION_NICENESS)
         with contextlib.suppress(OSError):  # forbidden in some containers
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-        ask_for_slices(0)  # the service's are short, and inherited
