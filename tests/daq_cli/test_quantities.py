@@ -9,7 +9,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq_cli.app.quantities import Length, parse_angle, parse_per_joint_angles, require_units
-from tests.daq.sliding_axis import SLIDE_AND_TURN, slide_and_turn
+from tests.daq.sliding_axis import slide_and_turn
 from tests.daq_cli.invoke import CommandLine
 
 
