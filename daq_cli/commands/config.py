@@ -70,8 +70,10 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     from daq.config.robot_files import load_memory_map
     from daq.config.settings import load_settings
     from daq.executors.address import parse_service_address
+    from daq.link.dialects import dialect_of
     from daq.safety import unchecked
     from daq.transport import parse_port_url
+    from daq.transport.url import FRAMED
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
@@ -89,7 +91,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     for own in settings.each_robot() if call.robot_option is None else (settings.of_robot(call.robot_option),):
         port = call.port_option or own.robot.port
         machine, memory_map = own.machine(), load_memory_map(own.robot.memory_map)
-        parse_port_url(port or own.port)
+        dialect_of(port or own.port)
         found[own.robot.name] = {
             "machine": machine.name,
             "joints": len(machine.joints),
@@ -97,6 +99,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
             "assumed_addresses": len(memory_map.assumed),
             "limits_not_set": list(unchecked(machine, machine.limits)),
             "port": port,
+            "dialect": parse_port_url(port or own.port).dialect,
         }
         titles[own.robot.name] = machine.title
     if json:
@@ -107,6 +110,9 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
         if settings.robots:
             print(f"robot:         {name}")
         print(f"machine:       {told['machine']}, {told['joints']} joints ({titles[name]})")
-        print(f"memory map:    {told['memory_map']}; {told['assumed_addresses']} addresses are assumed")
+        if told["dialect"] == FRAMED:
+            print(f"memory map:    {told['memory_map']}; {told['assumed_addresses']} addresses are assumed")
+        else:
+            print(f"dialect:       {told['dialect']}, which needs no memory map")
         print(f"limits:        {'; '.join(told['limits_not_set']) or 'all set'}")
         print(f"port:          {told['port'] or 'none: the mock is used'}")

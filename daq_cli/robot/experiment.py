@@ -122,7 +122,7 @@ def print_result(finished: Finished) -> None:
     shown = ("retries", "damaged", "torn", "missed_set_points", "restarts")
     late = counters.get(LATE_SET_POINTS)
     if late is None:
-        print("set points taken a period late: not known, for not every period has a sample of the bridge's making")
+        print("set points taken a period late: not known, for not every control period has a sample")
     elif late:
         print(late_set_points_line(late))
     print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in shown))

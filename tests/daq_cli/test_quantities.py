@@ -9,7 +9,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq_cli.app.quantities import Length, parse_angle, parse_per_joint_angles, require_units
-from tests.daq.sliding_axis import slide_and_turn
+from tests.daq.sliding_axis import SLIDE_AND_TURN, slide_and_turn
 from tests.daq_cli.invoke import CommandLine
 
 
@@ -48,7 +48,7 @@ def test_each_joint_takes_its_own_and_nothing_is_both() -> None:
 
 
 def test_a_dry_run_of_a_sliding_joint(tmp_path: Path, daq: CommandLine) -> None:
-    (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{slide_and_turn(tmp_path)}"\n')
+    (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{SLIDE_AND_TURN}"\n')
     config = ("--config", tmp_path / "daq.toml", "run", "ramp", "--joints", "1", "--dry-run")
     daq(*config).complains(2, "amplitude: joint 1 slides: write a length with its unit")
     shown = daq(*config, "--amplitude", "30mm", "--duration", "2")

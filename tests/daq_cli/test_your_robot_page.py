@@ -11,6 +11,7 @@ import pytest
 
 from daq.config.settings import RobotSettings
 from daq.link.dialects import dialect_of
+from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.test_documentation import COMMANDS, command_of
 
 ROOT = Path(__file__).parents[2]
@@ -32,3 +33,16 @@ def test_the_page_s_settings_name_a_machine_and_a_dialect_that_exist() -> None:
     settings = RobotSettings.model_validate(tomllib.loads(SETTINGS.replace("$PWD", "/home"))["robot"])
     assert (ROOT / settings.machine).is_file()
     assert dialect_of(str(settings.port)).scale.joints == 2
+
+
+def test_the_check_of_the_page_s_settings_speaks_of_its_dialect_and_of_no_memory_map(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    settings = SETTINGS.replace("examples/", f"{ROOT}/examples/").replace("$PWD", str(tmp_path))
+    (tmp_path / "daq.toml").write_text(settings)
+    said = daq("--config", tmp_path / "daq.toml", "config", "check")
+    assert said.code == 0, said.err
+    assert "dialect:       dynamixel" in said.out
+    assert "memory map:" not in said.out
+    (tmp_path / "daq.toml").write_text(settings.replace("dynamixel", "nobodys"))
+    daq("--config", tmp_path / "daq.toml", "config", "check").complains(2, "dialect 'nobodys' is unknown")
