@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { FleetComparison } from '../api/types';
-import { residualsOf, rowsOf, verdictOf } from './comparison';
+import { dayAndTime } from '../format';
+import { comparedWith, residualsOf, rowsOf, verdictOf } from './comparison';
 
 type Arm = FleetComparison['robots'][number];
 
@@ -76,4 +77,15 @@ describe('the comparison of arms', () => {
     expect(verdictOf({ ...FLEET, robots: [none!] })).toBe('No arm has two fits that are 30 days apart.');
     expect(residualsOf(FLEET)).toEqual(['1.05', '1.05', '–']);
   });
+});
+
+it('says with which fit an arm is compared', () => {
+  const arm: Arm = {
+    robot: 'left',
+    fits: [fit('old', 1, 0.2), fit('new', 9, 0.3)],
+    reference: 'old',
+    changes: [],
+  };
+  expect(comparedWith(arm)).toBe(`compared with ${dayAndTime('2026-01-01T00:00:00Z')}`);
+  expect(comparedWith({ ...arm, reference: null })).toBe('no earlier fit');
 });

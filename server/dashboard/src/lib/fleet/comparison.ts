@@ -1,7 +1,7 @@
 /** The arms' fits to the same experiment as a table: a row a number, a column an arm. Pure. */
 
 import type { FleetComparison } from '../api/types';
-import { significant } from '../format';
+import { dayAndTime, significant } from '../format';
 
 export interface Point {
   /** ms since 1970. */
@@ -67,6 +67,12 @@ function cellOf(arm: FleetComparison['robots'][number], name: string): Cell {
 /** How much of the noise is explained, of the newest fit of each arm: 1 is all of it. */
 export function residualsOf(comparison: FleetComparison): readonly string[] {
   return comparison.robots.map((arm) => significant(arm.fits.at(-1)?.whitened_mean_square, 3));
+}
+
+/** With which fit an arm's newest one is compared. */
+export function comparedWith(arm: FleetComparison['robots'][number]): string {
+  const reference = arm.fits.find((fit) => fit.job === arm.reference);
+  return reference === undefined ? 'no earlier fit' : `compared with ${dayAndTime(reference.at)}`;
 }
 
 /** What is to be said of the whole, in one line. */
