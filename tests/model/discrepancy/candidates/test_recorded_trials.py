@@ -24,9 +24,9 @@ def driven(volts: float) -> Observation:
 def test_a_limit_is_tried_below_the_largest_recorded_drive() -> None:
     (limit,) = hypotheses(imagined.arm(), ("supply_limit",), (2,))
     (name,) = (p.name for p in limit.main)
-    assert all(trial[name] > 1.0 for trial in limit.trials), "the usual ones are of the supply"
-    tried = with_recorded_trials(limit, driven(1.0)).trials
-    assert [t[name] for t in tried if t[name] < 1.0] == list(SHARES)
+    assert all(trial[name] > 3.0 for trial in limit.trials), "the usual ones are of the supply"
+    tried = with_recorded_trials(limit, driven(3.0)).trials
+    assert [t[name] for t in tried if t[name] < 3.0] == [3.0 * share for share in SHARES]
 
 
 def test_trials_that_the_record_reaches_stay_as_they_are() -> None:
