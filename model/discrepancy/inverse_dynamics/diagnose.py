@@ -175,7 +175,7 @@ class _Workflow:
                 self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
                 self.steps[index] = withdrawn(step, wrong)
             self.now = self._fit(self.model, {}, self.added)
-            self.suspicion = None  # it was of the model with these effects
+            self.suspicion, self.tried = None, ()  # they were of the model with these effects
 
     def _contradicted(self) -> int | None:
         """Index of the first step that the residual contradicts."""
