@@ -23,7 +23,8 @@ def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False
     Args:
         steps: all of them; only those that were adopted count. A group that held-out traces have refused is not one.
         unexplained: whether what is left speaks against the steps, or is there without any. By output error that is
-            any joint above its line; by inverse dynamics a shape in the remaining torque, where no step was adopted.
+            any joint above its line; by inverse dynamics, where no step was adopted, a shape in the remaining torque,
+            or a torque that is slow and far above noise.
         suspected: whether an effect lacks nothing but evidence, and has some.
     """
     if suspected and not any(s.adopted for s in steps):

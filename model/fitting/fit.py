@@ -208,9 +208,14 @@ def _estimate(
 
 def _settled(last: Floats, solution: Solution) -> bool:
     """Whether the last round moved the values by less than matters, in the mean over all directions. The replicas of
-    each round are new draws of the noise, which alone move every direction by a third of its deviation."""
+    each round are new draws of the noise, which alone move every direction by a third of its deviation.
+
+    Values that stay only because no step of the search helped have not settled.
+    """
     if solution.information is None:
         return True
+    if not solution.converged and solution.steps == 0:
+        return False
     moved = solution.values - last
     return bool(moved @ solution.information @ moved < SETTLED**2 * len(last))
 

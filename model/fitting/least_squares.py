@@ -33,7 +33,8 @@ more, above the third the Jacobian serves for another step."""
 class Solution:
     """Where a search ended: values (p,), half the sum of squares with priors, evaluations, and why it ended.
 
-    `information` (p, p) is JᵀJ there, priors included; None where no derivatives were taken.
+    `information` (p, p) is JᵀJ there, priors included; None where no derivatives were taken. `steps` is how many steps
+    were taken, of those that were tried.
     """
 
     values: Floats
@@ -42,6 +43,7 @@ class Solution:
     converged: bool
     message: str
     information: Floats | None = None
+    steps: int = 0
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,7 @@ def solve(
     cost, weights = _cost_and_weights(residual, objective.samples, search.robust)
     damping, fresh, message, reason = FIRST_DAMPING, False, "", "as many evaluations as allowed"
     jacobian = information = np.zeros((0, 0))
+    steps = 0
     while objective.evaluations < search.most_evaluations and not message:
         if jacobian.size == 0:
             jacobian, fresh = objective.jacobian(x), True
@@ -149,7 +152,7 @@ def solve(
         gain = (cost - tried_cost) / promised
         damping = max(damping / 10, LEAST_DAMPING) if gain > GOOD_GAIN else damping * (1 if gain > FAIR_GAIN else 8)
         if gain > LEAST_GAIN:
-            x, residual, cost, weights = x + step, tried, tried_cost, tried_weights
+            x, residual, cost, weights, steps = x + step, tried, tried_cost, tried_weights, steps + 1
         if gain <= GOOD_GAIN and not (fresh and gain <= LEAST_GAIN):
             jacobian = np.zeros((0, 0))
         fresh = fresh and gain <= LEAST_GAIN
@@ -157,7 +160,8 @@ def solve(
         jacobian = objective.jacobian(x)
         information = _information(jacobian, weights)
     information = information / np.outer(objective.scale, objective.scale)
-    return Solution(objective.values(x), cost, objective.evaluations, bool(message), message or reason, information)
+    ended, count = message or reason, objective.evaluations
+    return Solution(objective.values(x), cost, count, bool(message), ended, information, steps)
 
 
 def _information(jacobian: Floats, weights: Floats) -> Floats:

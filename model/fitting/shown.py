@@ -110,15 +110,18 @@ def known_of(parameters: Sequence[ShownParameter]) -> str:
 
 
 def doubt_of(errors: Sequence[ShownError]) -> str:
-    """One line where a fit ends much farther from its records than it began, so that neither values nor intervals mean
-    anything; empty where it does not. The sum of squares that a fit makes small is robust: it may fall all the same."""
+    """One line where a fit ends much farther from its records than it began, so that neither values nor intervals can
+    be relied on; empty where it does not.
+
+    The sum of squares that a fit makes small is robust: it may fall all the same.
+    """
     worse = [one for one in errors if one.after > WORSE * one.before and one.after > ABOVE_NOISE * one.floor]
     if not worse:
         return ""
     joints = f"joint{'s' if len(worse) > 1 else ''} {', '.join(str(one.joint) for one in worse)}"
     return (
-        f"the fitted model is farther from the records than before ({joints}): its values mean nothing. An arm that no "
-        "controller holds runs away from any record: shorten the records, or compare torques"
+        f"the fitted model is farther from the records than before ({joints}): do not use its values. Where no "
+        "controller holds the arm, a simulation soon leaves any record: shorten the records, or compare torques"
     )
 
 

@@ -73,8 +73,9 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     """Inputs of a run that repeats a trace.
 
     The arm starts at rest at the posture measured before the first new set point (at the first reading, and with
-    the measured speed, where the trace has one), with the drive of the first sample. Where the recorded drive moves the
-    model and no speed was measured, a motion that the record begins in is taken from its first readings.
+    the measured speed, where the trace has one), with the drive of the first sample. Where nothing but the recorded
+    drive moves the model and no speed was measured, a motion that the record begins in is taken from its first
+    readings.
 
     Raises:
         TraceError: for fewer than three samples, a joint that is missing, angles that look like degrees, or neither

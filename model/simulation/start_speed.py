@@ -24,8 +24,9 @@ COUNTS = 4.0
 
 
 def speed_at_start(trace: Trace, machine: Machine) -> Floats:
-    """Speeds (n,) rad/s of the modelled joints at the first sample, 0 for those that begin at rest as far as readings
-    tell.
+    """Speeds (n,), rad/s (m/s), of the modelled joints at the first sample.
+
+    They are 0 for joints that begin at rest as far as readings tell.
 
     A parabola is fitted by least squares to the first readings; its slope at the first sample counts where it is
     significant, a good part of the joint's largest speed, and the same from the first half of the readings.

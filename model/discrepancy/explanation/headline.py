@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
 from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
-from model.discrepancy.explanation.renderer import size_words, suspicion_words
+from model.discrepancy.explanation.renderer import size_words, suspicion_words, was_taken_back
 from model.effects.names import effect_on
 
 SHOWN = 3
@@ -19,6 +19,8 @@ def headline(found: Diagnosis) -> str:
     if found.verdict == "suspected" and found.suspicion is not None:
         return f"perhaps {suspicion_words(found.suspicion)}"
     if found.verdict == "nothing-significant":
+        if any(map(was_taken_back, found.steps)):
+            return "none of the known effects, and what is left has no shape of one"
         if any(s.effect is not None for s in found.steps):
             return "nothing that the held-out traces confirm"
         return "the model explains these traces within their noise and its tolerances"

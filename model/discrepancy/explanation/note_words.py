@@ -92,11 +92,11 @@ def _stated_numbers_moved(v: Values) -> str:
     )
     if v.get("named"):
         named = "; ".join(
-            f"{n['name']} is {_rounded(n['value'], n['unit'])}{_times(n['value'], n['expected'])}, where the file "
-            f"states {n['expected']:.4g}: {n['deviations']:.1f} of its deviations"
+            f"{n['name']} is {_rounded(n['value'], n['unit'])} and not {_rounded(n['expected'], n['unit'])} "
+            f"({n['deviations']:.1f} stated deviations away{_times(n['value'], n['expected'])})"
             for n in numbers
         )
-        return f"named beside what the machine file states: {named}"
+        return f"what is named differs from what the machine file states: {named}"
     subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
     return (
         f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. File "

@@ -155,7 +155,8 @@ def summary(answer: Diagnosis) -> str:
     adopted = [s for s in answer.steps if s.adopted]
     match answer.verdict:
         case "nothing-significant":
-            return _nothing(next((s for s in answer.steps if not s.adopted), None))
+            rejected = [s for s in answer.steps if not s.adopted]
+            return _nothing(next(filter(was_taken_back, rejected), rejected[0] if rejected else None))
         case "suspected":
             return _suspected(answer)
         case "unknown-effect":
@@ -164,6 +165,11 @@ def summary(answer: Diagnosis) -> str:
             parts = [_undecided(s.group, s.where, answer.inseparable) if s.group else reason_text(s) for s in adopted]
             rest = ["Something is left that none of the known effects explains."] if answer.remaining else []
             return " ".join([*parts, *rest])
+
+
+def was_taken_back(step: Step) -> bool:
+    """Whether an effect was in the model for a while, and did not explain what it was to explain."""
+    return step.refusal is not None and step.refusal.kind == "only-resembles"
 
 
 def _suspected(answer: Diagnosis) -> str:
@@ -223,9 +229,15 @@ def best_tried(candidates: Sequence[Candidate], needed: float) -> str:
 
 
 def _nothing(rejected: Step | None) -> str:
-    """Why no effect is named. `rejected`: a step that was refused on records not fitted to."""
+    """Why no effect is named. `rejected`: a step that was refused on records not fitted to, or taken back."""
     if rejected is None or rejected.effect is None:
         return "Nothing significant: the model explains the traces within noise and stated tolerances."
+    if was_taken_back(rejected):
+        return (
+            f"Nothing is named: {_called(rejected.effect, rejected.joints)} was added, with evidence of "
+            f"{rejected.evidence:.0f}, and taken back, because {rejected.rejected_because}. What is left without it "
+            "has no shape of an effect."
+        )
     because = rejected.rejected_because or "records that were not fitted to do not confirm it"
     return (
         f"No effect holds on records that were not fitted to: {_called(rejected.effect, rejected.joints)} explains "

@@ -65,7 +65,8 @@ VISCOUS = "viscous_friction"
 MOSTLY = 0.5
 """Share of an effect's evidence from priors, above which it is taken for one that the tolerances had imitated."""
 LEAD = 4.0
-"""Lead with which an effect is named alone where all of its evidence comes from priors: that of the other method."""
+"""Lead with which an effect is named alone where all evidence, its own and the rival's, comes from priors: that of the
+other method."""
 ROUNDED = 5.0
 """s to which the time that is still to be recorded is rounded up."""
 SLIGHTLY_LATE = 0.1
@@ -174,7 +175,7 @@ class _Workflow:
                 self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
                 self.steps[index] = withdrawn(step, wrong)
             self.now = self._fit(self.model, {}, self.added)
-            self.suspicion = None  # it was of the model with these effects
+            self.suspicion, self.tried = None, ()  # they were of the model with these effects
 
     def _contradicted(self) -> int | None:
         """Index of the first step that the residual contradicts."""
@@ -275,10 +276,11 @@ class _Workflow:
         least -= chosen.relief * max(least - SUSPECTED, 0.0)
         return least + self.case.options.echo * self._collected(chosen.joints)
 
-    def _margin(self, chosen: Fitted) -> float:
-        """Lead in evidence with which a candidate is named alone: as `_needed`, less where it comes from priors."""
+    def _margin(self, chosen: Fitted, rival: Fitted) -> float:
+        """Lead in evidence over a rival with which a candidate is named alone: as `_needed`, less where the evidence of
+        both comes from priors. What one of them takes off a residual counts no more for being compared with a prior."""
         least = self.case.options.least_margin
-        return least - chosen.relief * max(least - LEAD, 0.0)
+        return least - min(chosen.relief, rival.relief) * max(least - LEAD, 0.0)
 
     def _is_beyond_noise(self, reference: BalanceFit, chosen: Fitted) -> bool:
         """Whether there was more than noise to explain: of a torque on a joint, on that joint."""
@@ -376,7 +378,7 @@ class _Workflow:
         holds = removed >= case.options.least_share
         standing = [c for c in found.fitted if not any(c is one for one in refused)]
         rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
-        near = [r for r in rivals if chosen.evidence - r.evidence < self._margin(chosen)]
+        near = [r for r in rivals if chosen.evidence - r.evidence < self._margin(chosen, r)]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
         values = found_values(chosen.fit, chosen.parameters)
         squares = [holdout.mean_squares(case.stretches, f.residual) for f in (reference, chosen.fit)]

@@ -100,26 +100,24 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
     weighed = _weigh(found, now, places)
     while weighed and len(weighed[0].joints) > 1:
         stop_if(cancel)
-        best = weighed[0]
-        fewer = _with_fewer_joints(fitted_model, now, slopes, probes, best)
-        known = {(f.effect, f.joints) for f in found}
-        found += [f for f in fewer if (f.effect, f.joints) not in known]
-        weighed = _weigh(found, now, places)
-        if weighed[0] is best or weighed[0].joints == best.joints:
+        fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
+        if not fewer:
             break
+        found += [_fit_effect(fitted_model, now, slopes, p) for p in fewer]
+        weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
 
 
-def _with_fewer_joints(
-    model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe], best: Fitted
-) -> list[Fitted]:
-    """The effect without each of its joints: an effect of one joint promises something on its neighbours, too."""
-    own = [
-        p
-        for p in probes
-        if p.trial.effect == best.effect and len(p.trial.joints) == 1 and p.trial.joints[0] in best.joints
-    ]
-    return [_fit_effect(model, now, slopes, [p for p in own if p.trial.joints != (j,)]) for j in best.joints]
+def _with_fewer_joints(probes: Sequence[Probe], best: Fitted) -> list[list[Probe]]:
+    """The probes of an effect without each of its joints: an effect of one joint promises something on its neighbours,
+    too."""
+    own = [p for p in probes if p.trial.effect == best.effect and set(p.trial.joints) <= set(best.joints)]
+    return [[p for p in own if p.trial.joints != (j,)] for j in best.joints]
+
+
+def _is_fitted(probes: Sequence[Probe], found: Sequence[Fitted]) -> bool:
+    """Whether the effect of these probes has been fitted on their joints already."""
+    return any((f.effect, f.joints) == (probes[0].trial.effect, _joints(probes)) for f in found)
 
 
 def _on(joints: tuple[int, ...]) -> str:

@@ -15,6 +15,7 @@ from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
@@ -70,15 +71,20 @@ class Case:
         old, new = (self.scoring.residuals(p) for p in (before, after))
         return self.scoring.errors(old, new, self.floor)
 
-    def credited_against(self, before: Point, after: Point) -> Point:
-        """The point with which held-out errors of another, `after`, are compared.
+    def credited_against(self, before: Point, after: Point) -> Calibration:
+        """What held-out errors of a point, `after`, are compared with.
 
         That is the point before, unless it has explained records by an unlikely number of the machine, which the effect
-        added since has made likely again: then that number was the effect, and the model as given is without it.
+        added since has made likely again: then that number was the effect. So all numbers are as they were given. The
+        effects that the point before has already stay as they are: what they explain is no merit of the new one.
         """
-        return self.given if before.strain >= STRAINED > after.strain else before
+        if not before.strain >= STRAINED > after.strain:
+            return before
+        given = {u.name for u in self.given.unknowns if u.deviation is not None}
+        as_given = np.array([u.name in given for u in before.unknowns])
+        return before.at(np.where(as_given & (before.precision > 0.0), before.expected, before.values))
 
-    def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
+    def held_residuals(self, before: Calibration, after: Calibration) -> tuple[Signals, Signals]:
         """Residuals of the held-out traces; empty where there are none."""
         return ((), ()) if self.held is None else (self.held.residuals(before), self.held.residuals(after))
 

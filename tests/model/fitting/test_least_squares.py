@@ -11,6 +11,7 @@ from scipy.optimize import least_squares, lsq_linear
 
 from daq.contracts.progress import Never
 from model.arrays import Floats
+from model.fitting.fit import _settled
 from model.fitting.least_squares import Search, solve
 from model.fitting.problem import Evaluation
 from model.fitting.unknowns import Unknown
@@ -221,3 +222,14 @@ def test_a_search_in_which_no_step_helps_ends_soon_and_says_so(factor: float) ->
     assert not found.converged
     assert found.message.startswith("no step helps, however short")
     assert found.evaluations < 50
+    assert found.steps == 0
+    assert not _settled(found.values, found), "values that no step could move have not settled"
+
+
+def test_values_have_settled_where_a_search_takes_no_step_because_none_promises_anything() -> None:
+    problem = curve()
+    first = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never())
+    again = solve(problem, [white(0.01)], first.values, Never())
+    assert first.steps > 0
+    assert again.converged
+    assert _settled(first.values, again)

@@ -56,8 +56,6 @@ def error(joint: int, before: float, after: float) -> JointError:
 def test_a_fit_that_ends_farther_from_its_records_than_it_began_is_doubted() -> None:
     assert doubt_of((error(1, 0.1, 0.01), error(2, 0.010, 0.012), error(3, 0.0001, 0.002))) == ""
     line = doubt_of((error(1, 0.1, 0.01), error(2, 0.1, 0.7)))
-    assert line.startswith(
-        "the fitted model is farther from the records than before (joint 2): its values mean nothing"
-    )
+    assert line.startswith("the fitted model is farther from the records than before (joint 2): do not use its values.")
     page = ET.fromstring(html_of("fit", (LOAD,), REPORT, line))
     assert "".join(page.itertext()).endswith(f"WARNING {line}")

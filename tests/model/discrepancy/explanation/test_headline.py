@@ -7,6 +7,7 @@ import pytest
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, PlacedEffect, Suspicion
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import summary
+from model.discrepancy.grounds import Refusal
 from tests.model.discrepancy.answers import an_answer
 
 
@@ -57,6 +58,11 @@ def test_it_says_when_no_known_effect_is_left(answer: Diagnosis) -> None:
 def test_it_tells_a_sound_model_from_one_whose_effect_was_refused(answer: Diagnosis) -> None:
     nothing = answer.model_copy(update={"verdict": "nothing-significant"})
     assert headline(nothing) == "nothing that the held-out traces confirm"
+    gone = nothing.steps[0].model_copy(
+        update={"adopted": False, "refusal": Refusal(kind="only-resembles", joints=(2,))}
+    )
+    back = nothing.model_copy(update={"steps": (gone,)})
+    assert headline(back) == "none of the known effects, and what is left has no shape of one"
     sound = nothing.model_copy(update={"steps": ()})
     assert headline(sound) == "the model explains these traces within their noise and its tolerances"
 

@@ -9,7 +9,7 @@ import pytest
 
 from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
 from model.discrepancy.explanation.note_words import note_words
-from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
 from model.discrepancy.grounds import Note, NoteKind, PatternKind
 from model.discrepancy.output_error.observation import observe
@@ -31,6 +31,20 @@ def test_a_record_that_ended_early_is_named() -> None:
     assert note.values == {"trace": "broken", "outcome": "fault", "seconds": seconds}
     assert note_words(note).startswith("trace broken was not recorded to its end (fault)")
     assert f"{seconds:.1f} s" in note_words(note)
+
+
+def test_numbers_that_were_named_are_told_beside_what_is_stated_and_are_no_warning() -> None:
+    arm = imagined.arm().with_effect("coulomb_friction", (1,))
+    coulomb = replace(arm.parameter("joint1.coulomb_friction.torque"), value=30.0, deviation=3.0, unit="N")
+    viscous = replace(arm.parameter("joint1.viscous_friction.coefficient"), value=2.0, deviation=0.5, unit="N·s/m")
+    (note,) = on_named_numbers([coulomb, viscous], {coulomb.name: 3.0, viscous.name: 0.0})
+    assert not note.warning
+    assert note_words(note) == (
+        "what is named differs from what the machine file states: joint1.coulomb_friction.torque is 3 N and not 30 N "
+        "(9.0 stated deviations away, 0.1 times as much); joint1.viscous_friction.coefficient is 0 N·s/m and not "
+        "2 N·s/m (4.0 stated deviations away, next to nothing)"
+    )
+    assert on_named_numbers([], {}) == ()
 
 
 def test_numbers_far_from_what_is_stated_are_one_warning_the_furthest_first() -> None:

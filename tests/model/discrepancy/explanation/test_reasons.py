@@ -300,6 +300,20 @@ def test_an_answer_with_nothing_significant_says_what_was_refused(arm: Model) ->
     assert "stiction on joint 2 explains more of the fitted ones, with evidence of 120, but the error" in found.summary
 
 
+def test_an_answer_with_nothing_significant_says_what_was_taken_back(arm: Model) -> None:
+    """It had held on held-out traces, so it is not said that none does."""
+    rises = Refusal(kind="error-rises", numbers={"rise": 15.0, "deviation": 7.0})
+    refused = step_with("stiction", (2,), {}, evidence=120.0).model_copy(update={"refusal": rises, "adopted": False})
+    resembles = Refusal(kind="only-resembles", joints=(2,))
+    back = step_with("backlash", (2,), {}, evidence=90.0).model_copy(update={"refusal": resembles, "adopted": False})
+    found = answer(arm, verdict="nothing-significant", steps=(refused, back))
+    assert found.summary == (
+        "Nothing is named: backlash on joint 2 was added, with evidence of 90, and taken back, because it only "
+        "resembles what is missing: with all that was found, joint 2 still disagrees beyond noise. What is left "
+        "without it has no shape of an effect."
+    )
+
+
 def test_several_reasons_and_what_is_left_are_sentences_one_after_the_other(
     arm: Model, friction: tuple[dict[str, FoundValue], Reason]
 ) -> None:
