@@ -94,6 +94,9 @@ class Hub:
     async def close(self) -> None:
         """Stops sending messages."""
         self._loop = None
+        if self._sending is not None:
+            self._sending.cancel()
+            self._sending = None
         if self._watching is not None:
             self._watching.cancel()
             await asyncio.gather(self._watching, return_exceptions=True)

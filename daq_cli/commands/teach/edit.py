@@ -9,7 +9,7 @@ import typer
 
 from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app.context import JsonOption, invocation, print_json, printable
-from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
+from daq_cli.app.quantities import parse_angle, parse_per_joint_angles, require_units
 from firmware_protocol.invalid import first_invalid
 
 if TYPE_CHECKING:

@@ -12,7 +12,9 @@ import pytest
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import inspect, select, text, update
+from sqlalchemy import event, inspect, select, text, update
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
@@ -226,6 +228,14 @@ def test_a_list_is_read_again_once_its_tables_were_changed_also_while_it_was_rea
         session.execute(update(TraceTagRow).values(tag="never written"))
         raise KeyError
     assert listed("a").items == ("a 5",)
+    with pytest.raises(OperationalError), store.writing() as session:
+        session.execute(update(TraceTagRow).values(tag="written"))
+        event.listen(session, "after_commit", _broken)
+    assert listed("a").items == ("a 6",), "the answer to a commit may be lost, but not what was committed"
+
+
+def _broken(_session: Session) -> None:
+    raise OperationalError("COMMIT", {}, ConnectionError("the connection is broken"))
 
 
 def _tag(store: Store, tag: str) -> None:
