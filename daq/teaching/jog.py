@@ -36,8 +36,8 @@ class JogCommand:
 
 @dataclass(frozen=True)
 class JogStep:
-    """Set points for after a sample (joint → posture units), the angles (rad, m) that they stand for, and why joints that
-    should move do not."""
+    """Set points for after a sample (joint → posture units), the positions (rad, m) that they stand for, and why joints
+    that should move do not."""
 
     postures: Mapping[int, int] = field(default_factory=dict)
     angles: Mapping[int, float] = field(default_factory=dict)

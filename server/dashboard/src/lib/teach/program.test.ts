@@ -17,7 +17,10 @@ describe('a taught program', () => {
   });
 
   it('moves a joint that slides at 50 mm/s', () => {
-    const machine = { ...MACHINE, joints: [{ kind: 'revolute' }, { kind: 'prismatic' }] } as unknown as Machine;
+    const machine = {
+      ...MACHINE,
+      joints: [{ kind: 'revolute' }, { kind: 'prismatic' }],
+    } as unknown as Machine;
     expect(moveTo(machine, [1, 2], [0.1, 0.03])).toMatchObject({ speed: 0.05 });
   });
 
