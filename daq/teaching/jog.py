@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -48,6 +48,15 @@ def top_speed(machine: Machine, limits: Limits, joint: int) -> float:
     """Highest speed (rad/s; m/s of a joint that slides) at which `joint` may be jogged."""
     own, usual = limits.joint(joint).speed, SLIDE_JOG_SPEED if slides(machine, joint) else JOG_SPEED
     return usual if own is None else min(usual, own)
+
+
+def require_step_speed(machine: Machine, joints: Iterable[int], speed: float) -> None:
+    """Raises SpecError where `speed` is too fast for a joint that slides: a usual speed in rad/s is five times too fast
+    in m/s."""
+    for joint in joints:
+        if slides(machine, joint) and speed > SLIDE_JOG_SPEED:
+            line = f"speed = {speed:g} m/s: joint {joint} slides: allowed are up to {SLIDE_JOG_SPEED:g} m/s"
+            raise SpecError(f"step: {line}")
 
 
 class Jogger:

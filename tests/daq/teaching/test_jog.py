@@ -10,7 +10,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.sample import SampleRow
 from daq.runner import StoppedError
 from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, TeachingError, jog
-from daq.teaching.jog import SLIDE_JOG_SPEED, top_speed
+from daq.teaching.jog import SLIDE_JOG_SPEED, require_step_speed, top_speed
 from daq_cli.robot.pendant import Pendant
 from tests.daq.sliding_axis import slide_and_turn
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, PERIOD, REST, StandIn
@@ -214,6 +214,14 @@ def test_a_joint_that_slides_has_a_speed_of_its_own() -> None:
     row = SampleRow(0, 0.0, 0.0, (0.1, 0.5), (0.1, 0.5), (0.0, 0.0), (0.0, 0.0), (0, 0))
     with pytest.raises(SpecError, match=r"joint 1: velocity of 0\.35 m/s: allowed are up to ±0\.07 m/s"):
         Jogger(machine, free, (1, 2)).step(row, JogCommand({1: JOG_SPEED}, 0.0))
+
+
+def test_a_step_takes_no_speed_of_turning_joints_for_one_that_slides() -> None:
+    machine = slide_and_turn()
+    require_step_speed(machine, (2,), 0.25)
+    require_step_speed(machine, (1, 2), SLIDE_JOG_SPEED)
+    with pytest.raises(SpecError, match=r"speed = 0\.25 m/s: joint 1 slides: allowed are up to 0\.07 m/s"):
+        require_step_speed(machine, (2, 1), 0.25)
 
 
 def test_the_keys_drive_a_joint_that_slides_at_the_same_share_of_its_highest_speed() -> None:

@@ -173,6 +173,7 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
     assert found(text="'; DROP TABLE traces; --") == []
     assert found(text='"belt" OR loose') == []
     assert found(text="\0\0\0") == []
+    assert found(tag="\0") == []
     assert found(text="elt") == [2, 1]
     assert found(text="lt") == [3, 2, 1]
     assert found(outcome="fault") == [3]
