@@ -74,7 +74,7 @@ class LineStageDialect:
         """The lines of a request's first step; each ends by asking for the state."""
         match request:
             case Hello():
-                self._tick, before = 0, b"V?\r"
+                self._tick, self._simulated, before = 0, None, b"V?\r"
             case Stop():
                 self._stopped, self._stops, self._next, before = True, self._stops + 1, b"", b"H\r"
             case WriteSetPoints():

@@ -75,13 +75,14 @@ class HeldControl:
         return self._lease
 
     def jog(self, velocities: Mapping[int, float]) -> TeachingStatus:
-        """Drives joints (rad/s) for at most 0.3 s; to be repeated while the key is held."""
+        """Drives joints (rad/s; m/s those that slide) for at most 0.3 s; to be repeated while the key is held."""
         return self._teaching("jog", JogRequest(velocities=dict(velocities)))
 
     def step(
         self, *, to: Mapping[int, float] | None = None, by: Mapping[int, float] | None = None, speed: float = 0.25
     ) -> TeachingStatus:
-        """Begins one step to absolute angles, or by relative ones (rad), the fastest joint at `speed` (rad/s)."""
+        """Begins one step to absolute angles, or by relative ones (rad, m), the fastest joint at `speed` (rad/s; m/s
+        where one slides, up to 0.07)."""
         given = {name: dict(angles) for name, angles in (("to", to), ("by", by)) if angles is not None}
         return self._teaching("step", StepRequest(speed=speed, **given))
 

@@ -23,3 +23,8 @@ def position_text(machine: Machine, joint: int, value: float, digits: int = 2) -
 def speed_text(machine: Machine, joint: int, value: float) -> str:
     """A speed (rad/s; m/s on a prismatic joint), such as `33.2 °/s` or `50.0 mm/s`."""
     return f"{value * MM:.1f} mm/s" if slides(machine, joint) else f"{math.degrees(value):.1f} °/s"
+
+
+def speed_unit(machine: Machine, joint: int) -> str:
+    """Unit of a joint's speed in the files and at the service: `rad/s`, or `m/s` on a prismatic joint."""
+    return "m/s" if slides(machine, joint) else "rad/s"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -29,8 +30,22 @@ class SampleRow:
     taken: int = 0
 
 
-def samples_missing(step: int, every: int) -> int:
-    """How many samples would have had their place between two that are `step` periods apart, when one is asked for in
-    every `every` periods: step / every, rounded, less one. A sample that is less than half its distance late is late,
-    and not missing: its tick says when it was taken. 0 where `step` is not positive."""
-    return max(0, (2 * step + every) // (2 * every) - 1)
+class SampleCount:
+    """Counts the samples that are missing where one is asked for in every `every` control periods.
+
+    A sample that is less than half its distance late is late, and not missing: its tick says when it was taken. But
+    lateness adds up: where every sample is a third of the distance late, every fourth one is missing. A sample that
+    comes early makes up for half a distance at most.
+    """
+
+    def __init__(self, every: int) -> None:
+        self.every = every
+        self._late = 0.0
+        """Periods by which the newest sample is beside its place; negative: before it."""
+
+    def missing(self, step: int) -> int:
+        """How many samples are missing between the sample before and one that is `step` periods newer."""
+        late = max(self._late + step - self.every, -self.every / 2)
+        lost = max(0, math.floor(late / self.every + 0.5))
+        self._late = late - lost * self.every
+        return lost

@@ -17,7 +17,7 @@ from daq.contracts.extras import require_extra
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine
-from daq.contracts.sample import samples_missing
+from daq.contracts.sample import SampleCount
 from daq.contracts.sketch import html_of, name_of
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class Trace:
                turn the joint to larger angles, whichever way its sensor counts, unless its gear ratio is negative
     velocity:  (n, j) rad/s
     power_raw: (n, j) the controller's output before the amplifier, DAC counts
-    tick:      (n,)   number of the control period; a step in which a sample is missing (`samples_missing`) is a gap
+    tick:      (n,)   number of the control period; a step in which a sample is missing (`SampleCount`) is a gap
     host_time: (n,)   s, the host's monotonic clock when the sample arrived
     status:    (n,)   the board's flags (`firmware_protocol.commands.StatusFlag`)
     taken:     (n,)   number of the first control period that used the sample's set points, 0 where it is not known;
@@ -215,19 +215,20 @@ class Trace:
 
     @property
     def missing(self) -> int:
-        """Number of samples that are not there between the first and the last. A sample that came early makes up for
-        none of them."""
+        """Number of samples that are not there between the first and the last."""
         return sum(lost for _, lost in self.gaps)
 
     @property
     def gaps(self) -> list[tuple[int, int]]:
-        """Row before each gap, and how many samples are missing in it (`samples_missing`)."""
+        """Row before each gap, and how many samples are missing in it (`SampleCount`)."""
         if self.tick is None or len(self) == 0:
             return []
         steps, every = np.diff(self.tick.astype(np.int64)), self.record.every
-        rows = np.flatnonzero(steps > every)
-        found = [(int(row), samples_missing(int(steps[row]), every)) for row in rows]
-        return [(row, lost) for row, lost in found if lost]
+        if every == 1:  # no sample is late without that another is missing; records may have millions of them
+            rows = np.flatnonzero(steps > 1)
+            return [(int(row), int(steps[row]) - 1) for row in rows]
+        count = SampleCount(every)
+        return [(row, lost) for row, step in enumerate(steps.tolist()) if (lost := count.missing(step))]
 
     def column(self, joint: int) -> int:
         """Column of joint `joint` (from 1). Raises TraceError when the trace has none."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from daq.contracts.sample import samples_missing
+from daq.contracts.sample import SampleCount
 from daq.driver.clock import Clock, LockStepClock
 from daq.driver.double_read import DoubleReader
 from daq.driver.errors import ControllerRestartedError, NoSampleError
@@ -64,6 +64,7 @@ class Deliveries:
         self.clock = clock
         self.period_s = period_s
         self.watch = watch
+        self._count = SampleCount(1)
 
     def send(self, postures: Mapping[int, int]) -> tuple[SentSetPoints, WriteSetPoints]:
         """The request for a batch of set points, noted as sent."""
@@ -108,7 +109,9 @@ class Deliveries:
     ) -> BoardSnapshot:
         """A snapshot, with everything counted that it shows. `times` are host time and tick time (s). It counts as late
         after the time between two samples, `every` periods. What is missing is counted in samples, too."""
-        missing = 0 if after is None else samples_missing(tick - after + every - 1, every)
+        if after is None or every != self._count.every:
+            self._count = SampleCount(every)
+        missing = 0 if after is None else self._count.missing(tick - after + every - 1)
         used = self.watch.seen(tick, joints)
         missed = used.missed or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
         snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed, used.since)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
-from daq.contracts.sample import SampleRow, samples_missing
+from daq.contracts.sample import SampleCount, SampleRow
 from daq.contracts.trace import EventKind, TraceEvent
 from daq.traces.writer import TraceWriter
 
@@ -39,11 +39,15 @@ class Recorder:
     samples: int = 0
     missing: int = 0
     """Number of samples that are not there between the first and the last, counted as `Trace.missing` counts them."""
+    count: SampleCount = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.count = SampleCount(self.every)
 
     def row(self, row: SampleRow) -> None:
         """A control period. Raises TraceError."""
         if self.last is not None:
-            self.missing += samples_missing(row.tick - self.last, self.every)
+            self.missing += self.count.missing(row.tick - self.last)
         self.last = row.tick
         self.samples += 1
         self.writer.sample(row)

@@ -5,9 +5,9 @@ The link itself notices silence: when its retries are used up it raises LinkTime
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from daq.contracts.sample import SampleRow, samples_missing
+from daq.contracts.sample import SampleCount, SampleRow
 from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
@@ -26,6 +26,10 @@ class Freshness:
     every: int = 1
     """Control periods from one sample to the next, as the line allows."""
     tick: int | None = None
+    count: SampleCount = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.count = SampleCount(self.every)
 
     def check(self, row: SampleRow) -> Verdict:
         """The verdict after a sample."""
@@ -37,7 +41,7 @@ class Freshness:
             return NOTHING
         if row.tick == last:
             return Verdict(trips=(f"stale sample: tick {row.tick} came twice",))
-        if not samples_missing(row.tick - last, self.every):
+        if not self.count.missing(row.tick - last):
             return NOTHING
         lost = row.tick - last - self.every
         line = f"{lost} control periods between ticks {last} and {row.tick} have no sample"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.joint_text import slides, speed_unit
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
@@ -19,13 +20,15 @@ from daq.trajectories import control_period, make_plan
 
 JOG_SPEED = 0.35
 """Highest speed of jogging in rad/s (20 °/s): an assumption. A joint's own limit may be lower."""
+SLIDE_JOG_SPEED = 0.07
+"""The same of a joint that slides, in m/s: an assumption, what a joint that turns at JOG_SPEED moves at 0.2 m."""
 DEAD_MAN = 0.3
 """Time (s) for which a command moves the arm: an assumption. While the key is held, commands come more often."""
 
 
 @dataclass(frozen=True)
 class JogCommand:
-    """Joints to be driven, with their velocities (rad/s), and when they were given (s, on the samples' clock)."""
+    """Joints to be driven, with their velocities (rad/s, m/s), and when they were given (s, on the samples' clock)."""
 
     velocities: Mapping[int, float]
     time: float
@@ -33,18 +36,27 @@ class JogCommand:
 
 @dataclass(frozen=True)
 class JogStep:
-    """Set points for after a sample (joint → posture units), the angles (rad) that they stand for, and why joints that
-    should move do not."""
+    """Set points for after a sample (joint → posture units), the positions (rad, m) that they stand for, and why joints
+    that should move do not."""
 
     postures: Mapping[int, int] = field(default_factory=dict)
     angles: Mapping[int, float] = field(default_factory=dict)
     refused: tuple[str, ...] = ()
 
 
-def top_speed(limits: Limits, joint: int) -> float:
-    """Highest speed (rad/s) at which `joint` may be jogged."""
-    own = limits.joint(joint).speed
-    return JOG_SPEED if own is None else min(JOG_SPEED, own)
+def top_speed(machine: Machine, limits: Limits, joint: int) -> float:
+    """Highest speed (rad/s; m/s of a joint that slides) at which `joint` may be jogged."""
+    own, usual = limits.joint(joint).speed, SLIDE_JOG_SPEED if slides(machine, joint) else JOG_SPEED
+    return usual if own is None else min(usual, own)
+
+
+def require_step_speed(machine: Machine, joints: Iterable[int], speed: float) -> None:
+    """Raises SpecError where `speed` is too fast for a joint that slides: a usual speed in rad/s is five times too fast
+    in m/s."""
+    for joint in joints:
+        if slides(machine, joint) and speed > SLIDE_JOG_SPEED:
+            line = f"speed = {speed:g} m/s: joint {joint} slides: allowed are up to {SLIDE_JOG_SPEED:g} m/s"
+            raise SpecError(f"step: {line}")
 
 
 class Jogger:
@@ -93,7 +105,7 @@ class Jogger:
         return self._every if before is None else max(1, min(self._every, row.tick - before))
 
     def _moved(self, here: Floats, command: JogCommand, periods: int) -> JogStep:
-        """The step of so many periods from set points `here` (rad), or why there is none."""
+        """The step of so many periods from set points `here` (rad, m), or why there is none."""
         there = here.copy()
         moving = tuple(joint for joint, velocity in command.velocities.items() if velocity)
         for joint in moving:
@@ -111,9 +123,9 @@ class Jogger:
         for joint, velocity in command.velocities.items():
             if joint not in self._joints:
                 raise SpecError(f"jog: joint {joint}: allowed are {list(self._joints)}")
-            top = top_speed(self._limits, joint)
+            top, unit = top_speed(self._machine, self._limits, joint), speed_unit(self._machine, joint)
             if not abs(velocity) <= top:
-                raise SpecError(f"jog: joint {joint}: velocity of {velocity} rad/s: allowed are up to ±{top:g} rad/s")
+                raise SpecError(f"jog: joint {joint}: velocity of {velocity} {unit}: allowed are up to ±{top:g} {unit}")
 
     def _angles(self, row: SampleRow) -> Floats:
         """Set points of all joints: those sent last, else those that the controller holds."""

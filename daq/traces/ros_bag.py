@@ -106,7 +106,7 @@ def import_bag(
     signals = (trace.time, trace.position, trace.velocity, trace.drive)
     identity = trace_id_of(
         *(text.encode() for text in (found_topic, " ".join(names), record.created.isoformat())),
-        b"" if machine is not None or numbers == _in_order(names) else " ".join(map(str, numbers)).encode(),
+        *([] if machine is not None or numbers == _in_order(names) else [" ".join(map(str, numbers)).encode()]),
         *(b"" if signal is None else signal.tobytes() for signal in signals),
         *described,
     )

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from daq.contracts.errors import SpecError
+from daq.contracts.joint_text import slides, speed_text
 from daq.contracts.machine import Machine
-from daq.teaching.jog import JOG_SPEED, JogCommand, top_speed
+from daq.teaching.jog import JOG_SPEED, SLIDE_JOG_SPEED, JogCommand, top_speed
 from daq_cli.app.context import console
 from daq_cli.app.keyboard import LEFT, RIGHT
 
@@ -32,7 +33,7 @@ def require_jog_speed(speed: float) -> float:
 
 class Pendant:
     """The joint, direction and speed (rad/s) that the keys have chosen. No joint is driven faster than its own
-    limit."""
+    limit. A joint that slides has the same share of its highest speed of jogging as one that turns."""
 
     def __init__(self, machine: Machine, speed: float) -> None:
         self.joint = 1
@@ -45,8 +46,14 @@ class Pendant:
 
     @property
     def speed(self) -> float:
-        """Speed of the chosen joint in rad/s."""
-        return min(self.wish, top_speed(self._machine.limits, self.joint))
+        """Speed of the chosen joint in rad/s; in m/s if it slides."""
+        usual = SLIDE_JOG_SPEED / JOG_SPEED if slides(self._machine, self.joint) else 1.0
+        return min(self.wish * usual, top_speed(self._machine, self._machine.limits, self.joint))
+
+    @property
+    def speed_text(self) -> str:
+        """Speed of the chosen joint as people read it."""
+        return speed_text(self._machine, self.joint, self.speed)
 
     def command(self, typed: str, now: float) -> JogCommand | None:
         """Returns the newest command after the keys `typed` at `now` (s, the samples' clock), or the command before if
@@ -76,7 +83,7 @@ class StatusLine:
 
     def show(self, pendant: Pendant) -> None:
         """Shows the joint that the keys drive, and its speed."""
-        line = f"joint {pendant.joint}   {math.degrees(pendant.speed):.1f}°/s"
+        line = f"joint {pendant.joint}   {pendant.speed_text}"
         if line != self._shown:
             sys.stderr.write(f"\r{line:<{len(self._shown)}}")
             sys.stderr.flush()

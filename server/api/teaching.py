@@ -16,6 +16,7 @@ from daq.contracts.service.teaching import (
     TeachingStatus,
 )
 from daq.teaching import Program
+from daq.teaching.jog import require_step_speed
 from daq.teaching.program import Absolute, Instruction, Relative
 from daq.traces.reader import read_trace
 from server.api.dependencies import (
@@ -63,6 +64,7 @@ def step_robot(
     angles = dict(request.to or request.by or {})
     if not angles:
         raise SpecError("step: names no joint")
+    require_step_speed(rig.robot.machine, angles, request.speed)
     instruction: Instruction = kind(angles=angles, speed=request.speed)
     rig.teaching.perform(
         rig.word(lease, arrived),

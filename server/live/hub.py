@@ -33,8 +33,9 @@ LOOK_EVERY = 1.0
 MOST_OFTEN = 0.05
 """Shortest time (s) between two reads of the status."""
 MANY, WAITS = 8, 0.02
-"""From so many watchers on, messages other than samples wait for the next sample, at most so long (s): the end of an
-experiment brings ten messages at once, and to send one to 50 watchers takes the event loop some 3 ms."""
+"""Number of watchers from which messages other than samples wait for the next sample, and the longest time (s) that
+they wait. The end of an experiment brings ten messages at once, and the event loop needs some 3 ms to send one to 50
+watchers."""
 PROGRESS_EVERY = 0.2
 """Time (s) between two messages about progress."""
 log = logging.getLogger("server.live")
@@ -94,6 +95,9 @@ class Hub:
     async def close(self) -> None:
         """Stops sending messages."""
         self._loop = None
+        if self._sending is not None:
+            self._sending.cancel()
+            self._sending = None
         if self._watching is not None:
             self._watching.cancel()
             await asyncio.gather(self._watching, return_exceptions=True)

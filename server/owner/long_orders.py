@@ -8,6 +8,7 @@ from daq.acquisition.guardian import EndCause
 from daq.acquisition.messages import Finished
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
+from daq.contracts.joint_text import speed_unit
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
 from daq.runner import Consent, RunSetup, StoppedError, StopRequests, run_experiment
@@ -151,7 +152,10 @@ def _between_samples(robot: OwnedRobot) -> None:
 def _allowed(robot: OwnedRobot, said: JogDrive) -> bool:
     """Whether a jog command is allowed: every joint exists and is not driven too fast. Otherwise the arm holds."""
     for joint, velocity in said.velocities.items():
-        if not 1 <= joint <= len(robot.machine.joints) or not abs(velocity) <= top_speed(robot.limits, joint):
-            robot.say(f"jog refused: joint {joint} at {velocity:g} rad/s")
+        if not 1 <= joint <= len(robot.machine.joints):
+            robot.say(f"jog refused: joint {joint}")
+            return False
+        if not abs(velocity) <= top_speed(robot.machine, robot.limits, joint):
+            robot.say(f"jog refused: joint {joint} at {velocity:g} {speed_unit(robot.machine, joint)}")
             return False
     return True

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from daq.contracts.errors import SpecError
+from daq.contracts.joint_text import speed_unit
 from daq.contracts.service.robot import Activity
 from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
 from daq.teaching import Program
@@ -176,6 +177,6 @@ class TeachingService:
         for joint, velocity in velocities.items():
             if joint > len(machine.joints):
                 raise SpecError(f"velocities.{joint}: {machine.name} has joints 1 to {len(machine.joints)}")
-            top = top_speed(machine.limits, joint)
+            top, unit = top_speed(machine, machine.limits, joint), speed_unit(machine, joint)
             if not abs(velocity) <= top:
-                raise SpecError(f"velocities.{joint} = {velocity} rad/s: allowed are up to ±{top:g} rad/s")
+                raise SpecError(f"velocities.{joint} = {velocity} {unit}: allowed are up to ±{top:g} {unit}")

@@ -17,7 +17,7 @@ from alembic import command
 from alembic.config import Config
 from pydantic import ValidationError
 from sqlalchemy import Engine, event, text
-from sqlalchemy.exc import DatabaseError, OperationalError
+from sqlalchemy.exc import DatabaseError, DBAPIError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.sql.dml import UpdateBase
 from sqlalchemy.sql.selectable import SelectBase
@@ -97,9 +97,16 @@ class Store:
         """A session whose changes are on the disk when it ends, all of them or none. Raises DamagedError for rows that
         this program cannot have written; errors of the code within the block pass unchanged."""
         with self._writing:
+            before = getattr(self._last, "changed", None)
             self._last.changed = changed = set[str]()
-            with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
-                yield session
+            try:
+                with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
+                    yield session
+            except DBAPIError:  # a connection may break when the database has committed already
+                self._changes.update(changed)
+                raise
+            finally:
+                self._last.changed = before
             self._changes.update(changed)
 
     def changes_of(self, tables: Iterable[str]) -> int:

@@ -163,7 +163,7 @@ class TraceStore:
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
         place = None if cursor is None else Cursor.parse(cursor)
-        if "\0" in (search.text or ""):  # which no database looks for
+        if any("\0" in one for one in _texts(search)):  # which no database looks for
             return Page(items=())
         with self._store.reading() as session:
             rows = self._rows(session, robot, search, place, limit + 1)

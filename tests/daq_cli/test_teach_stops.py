@@ -64,9 +64,9 @@ def test_ctrl_c_ends_a_jog_with_the_exit_code_of_a_stop(
 
 def test_a_jog_shows_joint_and_speed_and_ends_with_q(mock: MockProcess, port: str) -> None:
     with at_a_terminal(["--port", port, "teach", "jog", "--speed", "8"]) as person:
-        person.until("joint 1   8.0°/s".encode())
+        person.until("joint 1   8.0 °/s".encode())
         person.type(b"3+")
-        person.until("joint 3   10.0°/s".encode())
+        person.until("joint 3   10.0 °/s".encode())
         person.type(b"q")
         assert person.end() == 0, person.seen
     assert not ask(mock, "state")["frozen"]

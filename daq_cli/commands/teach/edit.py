@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,10 +10,11 @@ import typer
 
 from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app.context import JsonOption, invocation, print_json, printable
-from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
+from daq_cli.app.quantities import parse_angle, parse_per_joint_angles, require_units
 from firmware_protocol.invalid import first_invalid
 
 if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
     from daq.teaching.program import Instruction, Program
 
 app = typer.Typer(add_completion=False, help="Change a taught program: nothing moves.", no_args_is_help=True)
@@ -66,7 +68,8 @@ def insert(
     from daq.teaching import editing
 
     made = _instruction(to=to, by=by, speed=speed, wait=wait, output=output, awaited=input_, gripper=gripper)
-    _edit(context, file, lambda program: editing.insert(program, number, made))
+    typed = {} if to is None and by is None else _angles(to or by or "")
+    _edit(context, file, lambda program: editing.insert(program, number, made), _Typed(number, typed, speed))
 
 
 @app.command()
@@ -102,11 +105,12 @@ def change(
 
     fields: dict[str, Any] = {"duration": wait, "rate": rate, "longest": longest}
     fields["angles"] = None if angles is None else _angles(angles)
-    fields["speed"] = None if speed is None else parse_angle(speed, "speed")
+    fields["speed"] = None if speed is None else _speed(speed)
     given = {name: value for name, value in fields.items() if value is not None}
     if not given:
         raise SpecError("change: nothing to change: give --angles, --speed, --wait, --rate or --longest")
-    _edit(context, file, lambda program: editing.change(program, number, given))
+    typed = _Typed(number, fields["angles"] or {}, speed)
+    _edit(context, file, lambda program: editing.change(program, number, given), typed)
 
 
 @app.command()
@@ -119,7 +123,23 @@ def rename(
     _edit(context, file, lambda program: editing.rename(program, name))
 
 
-def _edit(context: typer.Context, file: Path, edited: Any) -> None:
+@dataclass(frozen=True)
+class _Typed:
+    """What was typed for an instruction: angles and a speed, whose units must be those of its joints."""
+
+    number: int
+    angles: dict[int, float]
+    speed: str | None
+
+    def check(self, program: Program, machine: Machine) -> None:
+        """Raises SpecError where a length was typed for a joint that turns, or an angle for one that slides."""
+        require_units("angles", self.angles, machine, tuple(self.angles))
+        if self.speed is not None:
+            joints = tuple(getattr(program.instructions[self.number - 1], "angles", ()))
+            require_units("speed", _speed(self.speed), machine, joints)
+
+
+def _edit(context: typer.Context, file: Path, edited: Any, typed: _Typed | None = None) -> None:
     """Reads, changes, checks and writes a program. Raises SpecError, SafetyError, and leaves the file as it was
     then."""
     from daq.config.settings import load_settings
@@ -131,6 +151,8 @@ def _edit(context: typer.Context, file: Path, edited: Any) -> None:
     before = load_program(file)
     after: Program = edited(before)
     machine = load_settings(invocation(context).config_file)[0].machine()
+    if typed is not None:
+        typed.check(after, machine)
     against = new_violations(before, after, machine)
     if against:
         raise SafetyError(f"program {file}: refused: {against[0]}; the file is as it was")
@@ -162,7 +184,7 @@ def _instruction(
     data: dict[str, Any]
     if to is not None or by is not None:
         data = {"kind": "absolute" if by is None else "relative", "angles": _angles(to or by or "")}
-        data |= {} if speed is None else {"speed": parse_angle(speed, "speed")}
+        data |= {} if speed is None else {"speed": _speed(speed)}
     elif wait is not None:
         data = {"kind": "wait", "duration": wait}
     elif gripper is not None:
@@ -180,6 +202,10 @@ def _instruction(
         first = first_invalid(error)
         raise SpecError(f"insert: {'.'.join(map(str, first.place[1:]))}: {first.message}") from error
     return made
+
+
+def _speed(text: str) -> float:
+    return parse_angle(text.removesuffix("/s"), "speed")
 
 
 def _angles(text: str) -> dict[int, float]:

@@ -40,6 +40,7 @@ def jog(
 ) -> None:
     """Drive joints with the keys, as the teach pendant did; a joint moves only while its key repeats."""
     from daq.teaching.program import Absolute, Program, require_program_file, save_program
+    from daq.trajectories.move import slow_speeds
     from daq_cli.robot.pendant import Pendant, StatusLine, require_jog_speed
 
     robot = robot_of(context)
@@ -51,7 +52,7 @@ def jog(
     line = StatusLine()
 
     def keep(angles: Mapping[int, float]) -> None:
-        kept.append(Absolute(angles=dict(angles)))
+        kept.append(Absolute(angles=dict(angles), speed=float(slow_speeds(machine, tuple(angles)).min())))
         line.tell(f"posture {len(kept)} kept")
 
     try:

@@ -24,6 +24,7 @@ from daq.driver import Controller
 from daq.link import Link, LinkTimeoutError, RequestRefusedError
 from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
 from daq.traces.reader import read_trace
+from firmware_protocol.codes import Capability
 from firmware_protocol.commands import FineSetPoints, Hello, Sample, StatusFlag, Stop
 from model.machine_model.model import base_model
 from model.simulation.simulate import simulate
@@ -194,6 +195,17 @@ def test_commands_that_are_lost_are_made_good(controller: Controller, line: Line
     lost.clear()
     controller.release(controller.status().stop)
     assert line.stage.state == "R"
+
+
+def test_what_was_said_before_does_not_make_a_new_connection_a_simulated_one() -> None:
+    dialect = DIALECT.LineStageDialect((1, 2))
+    dialect.encode(1, Hello(2, 1))
+    ((number, reply),) = dialect.feed(b"V STAGE 2 SIM\rP 5 R 1 1 0 2 2 0\r")
+    assert (number, Capability.SIMULATED in Capability(reply.capabilities)) == (1, True)
+    dialect.encode(2, Hello(2, 2))
+    assert dialect.feed(b"P 6 R 1 1 0 2 2 0\r") == [], "a late answer to an earlier question"
+    ((number, reply),) = dialect.feed(b"V STAGE 2 HW\rP 7 R 1 1 0 2 2 0\r")
+    assert (number, Capability.SIMULATED in Capability(reply.capabilities)) == (2, False)
 
 
 def test_a_silent_stage_is_told(line: Line) -> None:

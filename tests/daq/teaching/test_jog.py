@@ -10,6 +10,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.sample import SampleRow
 from daq.runner import StoppedError
 from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, TeachingError, jog
+from daq.teaching.jog import SLIDE_JOG_SPEED, require_step_speed, top_speed
+from daq_cli.robot.pendant import Pendant
+from tests.daq.sliding_axis import slide_and_turn
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, PERIOD, REST, StandIn
 
 LIMITS = MA2000.limits
@@ -201,3 +204,30 @@ def test_samples_that_stay_late_end_the_jog() -> None:
     with pytest.raises(TeachingError, match="the line too slow"):
         driven(arm, {1: 0.1}, held_until=100, periods=100)
     assert "set points" not in arm.log
+
+
+def test_a_joint_that_slides_has_a_speed_of_its_own() -> None:
+    machine = slide_and_turn()
+    free = machine.limits.model_copy(update={"joints": ()})
+    assert [top_speed(machine, free, joint) for joint in (1, 2)] == [SLIDE_JOG_SPEED, JOG_SPEED]
+    assert [top_speed(machine, machine.limits, joint) for joint in (1, 2)] == [0.04, 0.2]
+    row = SampleRow(0, 0.0, 0.0, (0.1, 0.5), (0.1, 0.5), (0.0, 0.0), (0.0, 0.0), (0, 0))
+    with pytest.raises(SpecError, match=r"joint 1: velocity of 0\.35 m/s: allowed are up to ±0\.07 m/s"):
+        Jogger(machine, free, (1, 2)).step(row, JogCommand({1: JOG_SPEED}, 0.0))
+
+
+def test_a_step_takes_no_speed_of_turning_joints_for_one_that_slides() -> None:
+    machine = slide_and_turn()
+    require_step_speed(machine, (2,), 0.25)
+    require_step_speed(machine, (1, 2), SLIDE_JOG_SPEED)
+    with pytest.raises(SpecError, match=r"speed = 0\.25 m/s: joint 1 slides: allowed are up to 0\.07 m/s"):
+        require_step_speed(machine, (2, 1), 0.25)
+
+
+def test_the_keys_drive_a_joint_that_slides_at_the_same_share_of_its_highest_speed() -> None:
+    machine = slide_and_turn()
+    pendant = Pendant(machine, JOG_SPEED / 2)
+    pendant.command("1", 0.0)
+    assert (pendant.speed, pendant.speed_text) == (pytest.approx(SLIDE_JOG_SPEED / 2), "35.0 mm/s")
+    pendant.command("2", 0.0)
+    assert pendant.speed_text == "10.0 °/s"

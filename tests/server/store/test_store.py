@@ -12,7 +12,9 @@ import pytest
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import inspect, select, text, update
+from sqlalchemy import event, inspect, select, text, update
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
@@ -171,6 +173,7 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
     assert found(text="'; DROP TABLE traces; --") == []
     assert found(text='"belt" OR loose') == []
     assert found(text="\0\0\0") == []
+    assert found(tag="\0") == []
     assert found(text="elt") == [2, 1]
     assert found(text="lt") == [3, 2, 1]
     assert found(outcome="fault") == [3]
@@ -226,6 +229,19 @@ def test_a_list_is_read_again_once_its_tables_were_changed_also_while_it_was_rea
         session.execute(update(TraceTagRow).values(tag="never written"))
         raise KeyError
     assert listed("a").items == ("a 5",)
+    with pytest.raises(OperationalError):
+        _write_without_an_answer(store)
+    assert listed("a").items == ("a 6",), "the answer to a commit may be lost, but not what was committed"
+
+
+def _write_without_an_answer(store: Store) -> None:
+    with store.writing() as session:
+        session.execute(update(TraceTagRow).values(tag="written"))
+        event.listen(session, "after_commit", _broken)
+
+
+def _broken(_session: Session) -> None:
+    raise OperationalError("COMMIT", {}, ConnectionError("the connection is broken"))
 
 
 def _tag(store: Store, tag: str) -> None:

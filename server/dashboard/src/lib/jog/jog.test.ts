@@ -1,8 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import type { Machine } from '../api/types';
-import { Held, jogKeyOf, speedOf, TOP_SPEED } from './jog';
+import { Held, jogKeyOf, speedOf, stepSpeedOf, TOP_SPEED } from './jog';
 
 const MACHINE = {
+  joints: [{ kind: 'revolute' }, { kind: 'revolute' }, { kind: 'revolute' }],
   limits: { joints: [{ speed: 1.6 }, { speed: 0.2 }, { speed: null }] },
 } as unknown as Machine;
 
@@ -11,6 +12,18 @@ describe('jogging', () => {
     expect(speedOf(MACHINE, 1, 5)).toBe(TOP_SPEED);
     expect(speedOf(MACHINE, 2, 5)).toBe(0.2);
     expect(speedOf(MACHINE, 3, 0.1)).toBe(0.1);
+  });
+
+  it('drives and steps a joint that slides at 0.2 m/s for each rad/s', () => {
+    const machine = {
+      joints: [{ kind: 'prismatic' }, { kind: 'prismatic' }],
+      limits: { joints: [{ speed: null }, { speed: 0.03 }] },
+    } as unknown as Machine;
+    expect(speedOf(machine, 1, 0.1)).toBeCloseTo(0.02);
+    expect(speedOf(machine, 1, 5)).toBeCloseTo(0.07);
+    expect(speedOf(machine, 2, 5)).toBe(0.03);
+    expect(stepSpeedOf(machine, 1)).toBeCloseTo(0.05);
+    expect(stepSpeedOf(MACHINE, 1)).toBe(0.25);
   });
 
   it('sends what is held, and an empty command when nothing is: hold', () => {

@@ -11,10 +11,29 @@ export const REPEAT_EVERY = 0.1;
 export const TOP_SPEED = 0.35;
 export const SPEEDS = [0.05, 0.1, 0.2, 0.35] as const;
 
-/** rad/s (m/s) at which a joint is driven when `speed` is asked for. */
+/** Metres of a joint that slides for each radian of one that turns, as of the service's highest speeds of jogging. */
+const SLIDE = 0.2;
+/** Speed (rad/s) of a step of a joint that turns. */
+const STEP_SPEED = 0.25;
+
+/** What a speed in rad/s is multiplied with for a joint: m/s of one that slides, rad/s of one that turns. */
+export function shareOf(machine: Machine, joint: number): number {
+  return machine.joints[joint - 1]?.kind === 'prismatic' ? SLIDE : 1;
+}
+
+/** Speed of a step of a joint, rad/s (m/s). */
+export function stepSpeedOf(machine: Machine, joint: number): number {
+  return STEP_SPEED * shareOf(machine, joint);
+}
+
+/**
+ * rad/s at which a joint is driven when `speed` (rad/s) is asked for; of a joint that slides the same share of its
+ * highest speed, in m/s.
+ */
 export function speedOf(machine: Machine, joint: number, speed: number): number {
+  const share = shareOf(machine, joint);
   const own = machine.limits.joints[joint - 1]?.speed ?? TOP_SPEED;
-  return Math.min(speed, own, TOP_SPEED);
+  return Math.min(speed * share, own, TOP_SPEED * share);
 }
 
 /** Keys of the keyboard: the chosen joint is driven by ← and →, chosen by its number. */

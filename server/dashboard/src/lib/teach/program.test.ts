@@ -9,15 +9,23 @@ const MACHINE = {
 
 describe('a taught program', () => {
   it('keeps the measured posture as a move to it', () => {
-    expect(moveTo([1, 2], [0.123456789, -1])).toEqual({
+    expect(moveTo(MACHINE, [1, 2], [0.123456789, -1])).toEqual({
       kind: 'absolute',
       angles: { 1: 0.12346, 2: -1 },
       speed: 0.25,
     });
   });
 
+  it('moves a joint that slides at 50 mm/s', () => {
+    const machine = {
+      ...MACHINE,
+      joints: [{ kind: 'revolute' }, { kind: 'prismatic' }],
+    } as unknown as Machine;
+    expect(moveTo(machine, [1, 2], [0.1, 0.03])).toMatchObject({ speed: 0.05 });
+  });
+
   it('says what each instruction does', () => {
-    expect(told(moveTo([1, 2], [Math.PI / 2, 0]), MACHINE, '°')).toBe('Move to J1 90.0°, J2 0.0°');
+    expect(told(moveTo(MACHINE, [1, 2], [Math.PI / 2, 0]), MACHINE, '°')).toBe('Move to J1 90.0°, J2 0.0°');
     expect(told({ kind: 'wait', duration: 2 }, MACHINE, '°')).toBe('Wait 2.0 s');
     expect(told({ kind: 'gripper', closed: true }, MACHINE, '°')).toBe('Close the gripper');
   });

@@ -4,20 +4,25 @@ import type { Machine } from '../api/types';
 import type { components } from '../api/schema';
 import { fixed } from '../format';
 import { shownAs, type AngleUnit } from '../live/units';
+import { stepSpeedOf } from '../jog/jog';
 
 export type Program = components['schemas']['Program'];
 export type Instruction = Program['instructions'][number];
 export type TaughtPath = components['schemas']['TaughtPath'];
 
-export const MOVE_SPEED = 0.25;
+const MOVE_SPEED = 0.25;
 /** As the service allows. */
 const FASTEST_RATE = 10;
 const LONGEST_WAIT = 3600;
 
 /** Keeps the posture that is measured now: a move to it. */
-export function moveTo(joints: readonly number[], position: readonly number[]): Instruction {
+export function moveTo(
+  machine: Machine,
+  joints: readonly number[],
+  position: readonly number[],
+): Instruction {
   const angles = Object.fromEntries(joints.map((joint, index) => [joint, round(position[index] ?? 0)]));
-  return { kind: 'absolute', angles, speed: MOVE_SPEED };
+  return { kind: 'absolute', angles, speed: Math.min(...joints.map((joint) => stepSpeedOf(machine, joint))) };
 }
 
 export function play(path: TaughtPath): Instruction {

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Schema } from './fields';
-import { formField, formOf, rulesOf, specOf, withKind, type Spec } from './form';
+import { formField, formOf, rulesOf, specOf, unitOfField, withKind, type Spec } from './form';
 
 const number = (more: Schema): Schema => ({ type: 'number', ...more });
 const amplitude: Schema = {
@@ -181,5 +181,39 @@ describe('what is wrong with what is typed', () => {
     expect(formField('spec.trajectory.ramp.amplitude')).toBe('trajectory.amplitude');
     expect(formField('spec.gains.1.0')).toBe('gains.1.0');
     expect(formField('at')).toBe('at');
+  });
+});
+
+describe('joints that slide', () => {
+  const first = (joint: number): boolean => joint === 1;
+  const given: Spec = {
+    ...RAMP,
+    trajectory: { kind: 'ramp', amplitude: { 1: 0.03, 2: 0.3769911184307752 }, duration: 0.65 },
+    joints: [1, 2],
+    start: { 1: 0.1 },
+  };
+
+  it('are typed in millimetres, and give the same specification back', () => {
+    const form = formOf(given, RULES, first);
+    expect([form.amplitudes, form.start]).toEqual([{ 1: '30', 2: '21.6' }, { 1: '100' }]);
+    expect(specOf(form, RULES, first).spec).toEqual(given);
+    const typed = specOf({ ...form, amplitudes: { 1: '21.6', 2: '21.6' } }, RULES, first).spec!;
+    const { 1: slide, 2: turn } = typed.trajectory['amplitude'] as Record<number, number>;
+    expect(slide).toBeCloseTo(0.0216);
+    expect(turn).toBeCloseTo(0.377, 4);
+  });
+
+  it('share no number with joints that turn', () => {
+    const form = { ...formOf(RAMP, RULES, first), joints: [1, 2] };
+    const { spec, problems } = specOf(form, RULES, first);
+    expect(spec).toBeNull();
+    expect(problems['trajectory.amplitude']).toContain('some of these joints slide');
+  });
+
+  it('take no degrees of another joint for their own', () => {
+    const form = { ...formOf({ ...RAMP, joints: [2] }, RULES, first), joints: [1] };
+    expect(unitOfField(RULES.kinds[1]!.fields[0]!, form.joints, first)).toBe('mm');
+    expect(specOf(form, RULES, first).spec!.trajectory['amplitude']).toBeCloseTo(0.0216);
+    expect(withKind(form, RULES.kinds[1]!, [], first).values['amplitude']).toBe('');
   });
 });

@@ -54,6 +54,11 @@ export interface SpecRules {
   readonly standard: Readonly<Record<string, unknown>>;
 }
 
+/** Whether a joint (from 1) slides: its amplitude, start and speed are lengths. */
+export type Slides = (joint: number) => boolean;
+
+const NONE_SLIDES: Slides = () => false;
+
 export interface FormResult {
   /** null while something is wrong with a field. */
   readonly spec: Spec | null;
@@ -69,6 +74,27 @@ const ANGLE: NumberRule = {
   scale: DEGREES,
   integer: false,
 };
+
+const MILLIMETRES = 1000;
+
+/** A rule of angles as that of a joint: of lengths where it slides, with the same bounds in m. */
+function ruleFor(rule: NumberRule, slides: boolean): NumberRule {
+  return slides ? { ...rule, unit: rule.unit.replace('°', 'mm'), scale: MILLIMETRES } : rule;
+}
+
+/** Whether one number for these joints is a length. Null where some slide and others turn: no number is both. */
+export function isLength(joints: readonly number[], slides: Slides): boolean | null {
+  const sliding = joints.filter(slides).length;
+  return sliding === 0 ? false : sliding === joints.length ? true : null;
+}
+
+/** Fields with one number for all joints that is a distance, or a speed. */
+const ofJoints = (field: TrajectoryField): boolean => field.name === 'amplitude' || field.name === 'speed';
+
+/** The unit of a field, as people read it. */
+export function unitOfField(field: TrajectoryField, joints: readonly number[], slides: Slides): string {
+  return ofJoints(field) && isLength(joints, slides) ? field.unit.replace('°', 'mm') : field.unit;
+}
 
 export function rulesOf(schema: Schema): SpecRules {
   const properties = schema.properties ?? {};
@@ -89,7 +115,7 @@ export function rulesOf(schema: Schema): SpecRules {
 }
 
 /** The fields filled with a specification; what it leaves out is as usual. */
-export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
+export function formOf(given: Partial<Spec>, rules: SpecRules, slides: Slides = NONE_SLIDES): SpecForm {
   const spec = { ...rules.standard, ...given } as Spec;
   const kind = rules.kinds.find((one) => one.kind === spec.trajectory.kind);
   const rounded: SpecForm['rounded'] = {};
@@ -98,13 +124,17 @@ export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
     rounded[field] = { text, value };
     return text;
   };
-  const values = valuesOf(kind, spec.trajectory, show);
+  const values = valuesOf(kind, spec.trajectory, show, isLength(spec.joints, slides) === true);
   const amplitude = spec.trajectory.amplitude;
   const perJoint = typeof amplitude === 'object' && amplitude !== null;
   const amplitudes: Record<number, string> = {};
   if (perJoint)
     for (const [joint, value] of Object.entries(amplitude as Record<string, number>))
-      amplitudes[Number(joint)] = show(`trajectory.amplitude.${joint}`, value, DEGREES);
+      amplitudes[Number(joint)] = show(
+        `trajectory.amplitude.${joint}`,
+        value,
+        scaleOf(Number(joint), slides),
+      );
   return {
     kind: spec.trajectory.kind,
     values,
@@ -114,7 +144,7 @@ export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
     start: Object.fromEntries(
       Object.entries(spec.start ?? {}).map(([joint, angle]) => [
         joint,
-        show(`start.${joint}`, angle, DEGREES),
+        show(`start.${joint}`, angle, scaleOf(Number(joint), slides)),
       ]),
     ),
     gains: Object.fromEntries(
@@ -134,17 +164,28 @@ export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
   };
 }
 
+/** What a position of a joint is multiplied with to be shown. */
+export function scaleOf(joint: number, slides: Slides): number {
+  return slides(joint) ? MILLIMETRES : DEGREES;
+}
+
 /**
  * The same form with another kind of trajectory, filled with what is usual for it. A name that a preset or the form gave
  * (`given`: the presets' names) goes with the motion that it named; one that somebody chose stays.
  */
-export function withKind(form: SpecForm, kind: TrajectoryKind, given: readonly string[] = []): SpecForm {
+export function withKind(
+  form: SpecForm,
+  kind: TrajectoryKind,
+  given: readonly string[] = [],
+  slides: Slides = NONE_SLIDES,
+): SpecForm {
+  const length = isLength(form.joints, slides) === true;
   const isGiven = [form.kind, ...given].includes(form.name);
   return {
     ...form,
     kind: kind.kind,
     name: isGiven ? kind.kind : form.name,
-    values: valuesOf(kind, {}, (_field, value, scale) => shownNumber(value * scale)),
+    values: valuesOf(kind, {}, (_field, value, scale) => shownNumber(value * scale), length),
     perJoint: false,
     amplitudes: {},
     rounded: {},
@@ -153,16 +194,23 @@ export function withKind(form: SpecForm, kind: TrajectoryKind, given: readonly s
 }
 
 /** The specification that is in the fields, or what is wrong with them. */
-export function specOf(form: SpecForm, rules: SpecRules): FormResult {
+export function specOf(form: SpecForm, rules: SpecRules, slides: Slides = NONE_SLIDES): FormResult {
   const problems: Record<string, string> = {};
   const number = (field: string, text: string, rule: NumberRule): number => {
     const { value, problem } = typedNumber(text, rule);
     if (problem) problems[field] = problem;
     const before = form.rounded[field];
-    return value !== null && before?.text === text ? before.value : (value ?? 0);
+    const isSame = before?.text === text && shownNumber(before.value * rule.scale) === text;
+    return value !== null && isSame ? before.value : (value ?? 0);
   };
   const kind = rules.kinds.find((one) => one.kind === form.kind);
-  const trajectory = form.kept ?? trajectoryOf(form, kind?.fields ?? [], number);
+  const fields = kind?.fields ?? [];
+  if (form.kept === null && isLength(form.joints, slides) === null)
+    for (const field of fields)
+      if (ofJoints(field) && !(field.type === 'amplitude' && form.perJoint))
+        problems[`trajectory.${field.name}`] =
+          'some of these joints slide: no number is an angle and a length';
+  const trajectory = form.kept ?? trajectoryOf(form, fields, number, slides);
   if (form.joints.length === 0) problems.joints = 'choose at least one joint';
   if (form.name !== '' && !NAME.test(form.name))
     problems.name = 'letters, digits, and . _ - inside, 64 at most';
@@ -172,7 +220,10 @@ export function specOf(form: SpecForm, rules: SpecRules): FormResult {
     start: Object.fromEntries(
       Object.entries(form.start)
         .filter(([, text]) => text.trim() !== '')
-        .map(([joint, text]) => [joint, number(`start.${joint}`, text, ANGLE)]),
+        .map(([joint, text]) => [
+          joint,
+          number(`start.${joint}`, text, ruleFor(ANGLE, slides(Number(joint)))),
+        ]),
     ),
     gains: gainsOf(form, number),
     settle: number('settle', form.settle, rules.settle),
@@ -199,6 +250,7 @@ function trajectoryOf(
   form: SpecForm,
   fields: readonly TrajectoryField[],
   number: ReadNumber,
+  slides: Slides,
 ): Spec['trajectory'] {
   const trajectory: Record<string, unknown> = {};
   for (const field of fields) {
@@ -208,9 +260,15 @@ function trajectoryOf(
     if (field.type === 'boolean') trajectory[field.name] = text === 'true';
     else if (field.type === 'amplitude' && form.perJoint)
       trajectory[field.name] = Object.fromEntries(
-        form.joints.map((joint) => [joint, number(`${name}.${joint}`, form.amplitudes[joint] ?? '', rule)]),
+        form.joints.map((joint) => [
+          joint,
+          number(`${name}.${joint}`, form.amplitudes[joint] ?? '', ruleFor(rule, slides(joint))),
+        ]),
       );
-    else trajectory[field.name] = number(name, text, rule);
+    else {
+      const length = ofJoints(field) && isLength(form.joints, slides) === true;
+      trajectory[field.name] = number(name, text, ruleFor(rule, length));
+    }
   }
   return { kind: form.kind, ...trajectory };
 }
@@ -229,15 +287,21 @@ function valuesOf(
   kind: TrajectoryKind | undefined,
   trajectory: Readonly<Record<string, unknown>>,
   show: (field: string, value: number, scale: number) => string,
+  length: boolean,
 ): Record<string, string> {
   return Object.fromEntries(
     (kind?.fields ?? []).map((field) => {
-      const given = trajectory[field.name] ?? field.standard;
-      const value = field.type === 'amplitude' && typeof given !== 'number' ? field.standard : given;
+      const isLong = length && ofJoints(field);
+      // What is usual is meant for joints that turn: 21.6° would be 377 mm.
+      const given = trajectory[field.name] ?? (isLong ? null : field.standard);
+      const value =
+        field.type === 'amplitude' && typeof given !== 'number' && !isLong ? field.standard : given;
       if (field.type === 'boolean') return [field.name, String(value)];
       return [
         field.name,
-        typeof value === 'number' ? show(`trajectory.${field.name}`, value, field.scale) : '',
+        typeof value === 'number'
+          ? show(`trajectory.${field.name}`, value, isLong ? MILLIMETRES : field.scale)
+          : '',
       ];
     }),
   );

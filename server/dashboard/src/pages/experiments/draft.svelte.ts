@@ -18,6 +18,7 @@ import {
   rulesOf,
   specOf,
   type FormResult,
+  type Slides,
   type Spec,
   type SpecForm,
   type SpecRules,
@@ -37,7 +38,7 @@ export class Draft {
   /** The specification as text, while it is edited so; the fields wait meanwhile. */
   text = $state<string | null>(null);
   result: FormResult = $derived.by(() =>
-    this.text === null ? specOf($state.snapshot(this.form), this.rules) : parsed(this.text),
+    this.text === null ? specOf($state.snapshot(this.form), this.rules, this.slides) : parsed(this.text),
   );
   /** By field, whoever found it: this page or the service. */
   problems: Readonly<Record<string, string>> = $derived.by(() => ({
@@ -53,18 +54,21 @@ export class Draft {
   constructor(
     readonly rules: SpecRules,
     readonly presets: readonly ExperimentPreset[],
+    readonly slides: Slides,
   ) {
     this.fill(presets[0]!.name);
   }
 
-  /** Asks the service for presets and rules. Throws a Problem. */
+  /** Asks the service for presets, rules and machine. Throws a Problem. */
   static async load(): Promise<Draft> {
     const params = { path: here() };
-    const [presets, schema] = await Promise.all([
+    const [presets, schema, machine] = await Promise.all([
       ask(api.GET('/api/v1/robots/{robot}/presets', { params })),
       ask(api.GET('/api/v1/robots/{robot}/spec-schema', { params })),
+      ask(api.GET('/api/v1/robots/{robot}/machine', { params })),
     ]);
-    return new Draft(rulesOf(schema as Schema), presets);
+    const slides: Slides = (joint) => machine.joints[joint - 1]?.kind === 'prismatic';
+    return new Draft(rulesOf(schema as Schema), presets, slides);
   }
 
   fill(preset: string): void {
@@ -75,7 +79,7 @@ export class Draft {
 
   take(spec: Partial<Spec>): void {
     this.preset = '';
-    this.form = formOf(spec, this.rules);
+    this.form = formOf(spec, this.rules, this.slides);
     if (this.text !== null) this.text = written(spec);
   }
 
