@@ -67,6 +67,12 @@ MethodOption = Annotated[
     typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the starting values.")]
+ConsistentOption = Annotated[
+    bool,
+    typer.Option(
+        "--consistent-inertias", help="Find only bodies that can exist: mass and moments that some real body has."
+    ),
+]
 OpenLoopOption = Annotated[
     bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
 ]
@@ -92,6 +98,7 @@ def fit(
     starts: Annotated[int, typer.Option(min=1, max=100, help="Number of fits from different starting values.")] = 1,
     seed: SeedOption = 0,
     open_loop: OpenLoopOption = False,
+    consistent_inertias: ConsistentOption = False,
     torques: Annotated[
         bool,
         typer.Option(
@@ -126,6 +133,7 @@ def fit(
         starts=starts,
         seed=seed,
         loop="open" if open_loop else None,
+        consistent_inertias=consistent_inertias,
     )
     if (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
