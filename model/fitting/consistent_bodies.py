@@ -96,7 +96,7 @@ class ConsistentBodies(Scaled):
 
     def __init__(self, model: Model, unknowns: tuple[Unknown, ...]) -> None:
         super().__init__(unknowns)
-        self._unknowns = unknowns
+        self.unknowns = unknowns
         self.bodies = tuple(_bodies(model, unknowns))
         self._starts = [self._start(body) for body in self.bodies]
         for body, start in zip(self.bodies, self._starts, strict=True):
@@ -125,7 +125,7 @@ class ConsistentBodies(Scaled):
         for body, start in zip(self.bodies, self._starts, strict=True):
             seven = self._seven_at(body, start, x)
             if body.places[MASS] >= 0:
-                mass = self._unknowns[body.places[MASS]]
+                mass = self.unknowns[body.places[MASS]]
                 found[body.places[MASS]] = np.clip(np.exp(2 * seven[0]), mass.low, mass.high)  # for rounding alone
             if body.has_fitted_moments:
                 moments, _ = body_of(seven, body.held_products, body.numbers[MOMENTS])
@@ -170,8 +170,7 @@ class ConsistentBodies(Scaled):
 
     @staticmethod
     def _start(body: _Body) -> _Start:
-        """Where the search begins. Raises SpecError for a body that cannot exist."""
-        _check_stated(body)
+        """Where the search begins: as stated, moved inside where the stated body lies on the edge."""
         moments = body.numbers[MOMENTS].copy()
         if body.has_fitted_moments:
             second = second_moments(moments)
@@ -191,7 +190,7 @@ class ConsistentBodies(Scaled):
             self.scale[place] = 1.0
             self.reach[place] = LONGEST_STEP
             if number == 0:
-                given = self._unknowns[place]
+                given = self.unknowns[place]
                 low, high = begun + np.log(LEAST_MASS), begun + np.log(WIDEST)
                 low = max(low, 0.5 * np.log(given.low)) if given.low > 0.0 else low
                 high = min(high, 0.5 * np.log(given.high)) if np.isfinite(given.high) else high
@@ -222,6 +221,7 @@ def _bodies(model: Model, unknowns: Sequence[Unknown]) -> list[_Body]:
                 )
         numbers = np.array([model.vector[s] if p < 0 else unknowns[p].start for s, p in zip(slots, own, strict=True)])
         body = _Body(f"link{number}", numbers, own)
+        _check_stated(body)
         _check_choice(body, unknowns)
         found.append(body)
     return found
