@@ -33,9 +33,10 @@ THINNEST = 1e-3
 """Least e^d, as a share of the body's root mean square radius as stated: no body comes out thinner, as long as the
 stated one is not. It keeps a fit that would rather leave what can exist away from its very edge."""
 WIDEST = 1e3
-"""Most e^d, as a multiple of that radius, and most of e^α, as a multiple of the stated body's."""
-LEAST_MASS = 1e-4
-"""Least e^α, as a share of the stated body's: a hundred-millionth of its mass."""
+"""Most e^d, as a multiple of that radius."""
+LIGHTEST = 1e-4
+"""Least mass, as a share of the stated one, and the inverse of the most; narrower bounds are the user's. Where nothing
+tells a mass from others, a search may go anywhere."""
 LONGEST_STEP = 1.0
 """Farthest that one step changes a logarithm: beyond that, the derivatives of where it began say nothing."""
 LEAST_SHARE = 1e-12
@@ -191,7 +192,7 @@ class ConsistentBodies(Scaled):
             self.reach[place] = LONGEST_STEP
             if number == 0:
                 given = self.unknowns[place]
-                low, high = begun + np.log(LEAST_MASS), begun + np.log(WIDEST)
+                low, high = begun + 0.5 * np.log(LIGHTEST), begun - 0.5 * np.log(LIGHTEST)
                 low = max(low, 0.5 * np.log(given.low)) if given.low > 0.0 else low
                 high = min(high, 0.5 * np.log(given.high)) if np.isfinite(given.high) else high
             elif number <= 3:
