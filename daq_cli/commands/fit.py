@@ -26,7 +26,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -236,6 +236,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "agreement": agreement_data(agreement),
             "whitened_mean_square": found.whitened_mean_square,
             "converged": found.converged,
+            "on_the_edge": list(found.on_the_edge),
             "evaluations": found.evaluations,
             "seconds": found.seconds,
         }
@@ -261,3 +262,4 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
         print(f"the search did not converge: {found.message}")
     if found.doubt:
         print(f"WARNING {found.doubt}")
+    print_on_the_edge(found.on_the_edge)

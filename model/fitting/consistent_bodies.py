@@ -41,6 +41,8 @@ LONGEST_STEP = 1.0
 """Farthest that one step changes a logarithm: beyond that, the derivatives of where it began say nothing."""
 LEAST_SHARE = 1e-12
 """Least of the second moments, as a share of their sum, of a body of which log-Cholesky parameters are taken."""
+FLAT = 1e-4
+"""Share of the second moments of a body below which the least one is told: a hundredth of its size in thickness."""
 EDGE = 1e-9
 """Share of the sum of second moments by which the least may be below 0: numbers of a file are rounded."""
 INSIDE = 1e-6
@@ -276,6 +278,24 @@ def _seven(numbers: Floats, body: _Body) -> Floats:
     if body.has_fitted_moments:
         return log_cholesky(float(numbers[MASS]), numbers[MOMENTS])
     return np.array([0.5 * np.log(numbers[MASS]), *np.zeros(6)])
+
+
+def on_the_edge(before: Model, fitted: Model, options: FitOptions) -> tuple[str, ...]:
+    """Links whose fitted body is flat or thin as their stated one is not: the records ask for one that cannot exist.
+
+    Empty without consistent inertias.
+    """
+    if not options.consistent_inertias:
+        return ()
+    found = []
+    for number in fitted.machine.modelled_joints:
+        if isinstance(fitted.machine.joint(number).link, Body):
+            slots = [at.slot(number, column) for column in COLUMNS[MOMENTS]]
+            least = [np.linalg.eigvalsh(second_moments(model.vector[slots])) for model in (before, fitted)]
+            stated, now = (float(s[0] / s.sum()) if s.sum() > 0.0 else 0.0 for s in least)
+            if now < FLAT and now < 0.1 * stated:
+                found.append(f"link{number}")
+    return tuple(found)
 
 
 def coordinates_of(model: Model, unknowns: tuple[Unknown, ...], options: FitOptions) -> Coordinates | None:

@@ -14,7 +14,7 @@ from daq.contracts.progress import Cancel, CancelledError, Never, Progress, sile
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import BEND, chosen_unknowns, friction_forms, start_postures, with_bends
-from model.fitting.consistent_bodies import coordinates_of
+from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.coordinates import Coordinates
 from model.fitting.covariance import sandwich
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
@@ -263,6 +263,7 @@ def _result(
         seconds=seconds,
         converged=solution.converged,
         message=solution.message,
+        on_the_edge=on_the_edge(model, fitted, options),
     )
 
 

@@ -13,7 +13,7 @@ from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import chosen_unknowns
-from model.fitting.consistent_bodies import coordinates_of
+from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fitted_parameter
 from model.fitting.identifiability import IdentifiabilityReport, judged
@@ -64,6 +64,8 @@ class TorqueFit(FrozenRecord):
     cutoff: float
     evaluations: int
     converged: bool
+    on_the_edge: tuple[str, ...] = ()
+    """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
 
     def __repr__(self) -> str:
         """One line; `print` shows the parameters, too."""
@@ -150,6 +152,7 @@ def fit_torques(
         cutoff=cutoff,
         evaluations=found.evaluations,
         converged=found.converged,
+        on_the_edge=on_the_edge(model, fitted, options),
     )
 
 
