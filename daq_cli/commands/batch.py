@@ -12,6 +12,7 @@ from daq_cli.app import completion
 from daq_cli.app.context import JsonOption
 from daq_cli.commands.fit import (
     BoundOption,
+    ConsistentOption,
     HoldOption,
     MethodOption,
     NoPriorsOption,
@@ -70,6 +71,7 @@ def fit(
     starts: Annotated[int, typer.Option(min=1, max=20, help="Number of fits from different starting values.")] = 1,
     seed: SeedOption = 0,
     open_loop: OpenLoopOption = False,
+    consistent_inertias: ConsistentOption = False,
     json: JsonOption = False,
 ) -> None:
     """Fit a model to every trace by itself: a row of parameters and errors for each."""
@@ -86,6 +88,7 @@ def fit(
         starts=starts,
         seed=seed,
         loop="open" if open_loop else None,
+        consistent_inertias=consistent_inertias,
     )
     _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
 

@@ -26,7 +26,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -67,6 +67,12 @@ MethodOption = Annotated[
     typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the starting values.")]
+ConsistentOption = Annotated[
+    bool,
+    typer.Option(
+        "--consistent-inertias", help="Find only bodies that can exist: mass and moments that some real body has."
+    ),
+]
 OpenLoopOption = Annotated[
     bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
 ]
@@ -92,6 +98,7 @@ def fit(
     starts: Annotated[int, typer.Option(min=1, max=100, help="Number of fits from different starting values.")] = 1,
     seed: SeedOption = 0,
     open_loop: OpenLoopOption = False,
+    consistent_inertias: ConsistentOption = False,
     torques: Annotated[
         bool,
         typer.Option(
@@ -126,6 +133,7 @@ def fit(
         starts=starts,
         seed=seed,
         loop="open" if open_loop else None,
+        consistent_inertias=consistent_inertias,
     )
     if (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
@@ -228,6 +236,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "agreement": agreement_data(agreement),
             "whitened_mean_square": found.whitened_mean_square,
             "converged": found.converged,
+            "on_the_edge": list(found.on_the_edge),
             "evaluations": found.evaluations,
             "seconds": found.seconds,
         }
@@ -253,3 +262,4 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
         print(f"the search did not converge: {found.message}")
     if found.doubt:
         print(f"WARNING {found.doubt}")
+    print_on_the_edge(found.on_the_edge)

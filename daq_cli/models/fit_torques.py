@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from daq_cli.app.context import console, print_json, print_table
 from daq_cli.app.output_file import replacing
-from daq_cli.models.parameter_table import print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,3 +72,4 @@ def _print(found: TorqueFit) -> None:
     print_table(errors, 120)
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")
+    print_on_the_edge(found.on_the_edge)

@@ -24,3 +24,12 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     for p in parameters:
         table.add_row(*row_of(p))
     print_table(table, 140)
+
+
+def print_on_the_edge(links: Sequence[str]) -> None:
+    """Prints which bodies a fit with consistent inertias left on the edge of what can exist, if any."""
+    if links:
+        print(
+            f"{', '.join(links)}: flat or thin after the fit; the traces ask for a body that cannot exist: something "
+            "else is missing from the model, or they do not tell these moments"
+        )

@@ -113,6 +113,7 @@ class ServiceJobs:
             starts=options.starts,
             seed=options.seed,
             loop=options.loop,
+            consistent_inertias=options.consistent_inertias,
             name=model_name(out.name),
         )
         found = self._done(request, report)

@@ -14,6 +14,8 @@ from daq.contracts.progress import Cancel, CancelledError, Never, Progress, sile
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import BEND, chosen_unknowns, friction_forms, start_postures, with_bends
+from model.fitting.consistent_bodies import coordinates_of, on_the_edge
+from model.fitting.coordinates import Coordinates
 from model.fitting.covariance import sandwich
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
 from model.fitting.least_squares import Search, Solution, solve
@@ -61,8 +63,9 @@ def fit(
     """
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
     problem = fit_problem(model, traces, options)
+    coordinates = coordinates_of(problem.model, problem.unknowns, options)
     before = problem.evaluate(_starts(problem), derivatives=False)
-    solution = _first_search(problem, options, progress, cancel)
+    solution = _first_search(problem, coordinates, options, progress, cancel)
     evaluations = solution.evaluations
     whiteners: list[Whitener] = [white(d) for d in problem.floor]
     for number in range(options.rounds):
@@ -74,7 +77,7 @@ def fit(
         if options.method == "nelder_mead":
             break
         search = Search(options.robust, options.tolerance, most)
-        solution = solve(problem, whiteners, solution.values, cancel, search)
+        solution = solve(problem, whiteners, solution.values, cancel, search, coordinates)
         evaluations += solution.evaluations
         if _settled(last.values, solution):
             solution = replace(solution, converged=True, message="no value moves any more")
@@ -121,7 +124,9 @@ def _starts(problem: SimulatedProblem) -> Floats:
     return np.array([u.start for u in problem.unknowns])
 
 
-def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Progress, cancel: Cancel) -> Solution:
+def _first_search(
+    problem: SimulatedProblem, coordinates: Coordinates | None, options: FitOptions, progress: Progress, cancel: Cancel
+) -> Solution:
     """The best of the searches from the model's own values and from seeded draws, every sample weighed alike."""
     whiteners = [white(d) for d in problem.floor]
     found: list[Solution] = []
@@ -140,7 +145,7 @@ def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Prog
             else:
                 most = options.most_evaluations or LEAST_SQUARES_EVALUATIONS
                 search = Search(False, FIRST_TOLERANCE * options.tolerance, most, tell)
-                found.append(solve(problem, whiteners, begin, cancel, search))
+                found.append(solve(problem, whiteners, begin, cancel, search, coordinates))
         except SpecError as error:
             failure = failure or error
     if not found:
@@ -263,6 +268,7 @@ def _result(
         seconds=seconds,
         converged=solution.converged,
         message=solution.message,
+        on_the_edge=on_the_edge(model, fitted, options),
     )
 
 

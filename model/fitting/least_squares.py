@@ -1,4 +1,5 @@
-"""Bounded robust least squares with priors and exact Jacobians, in coordinates scaled by the expected deviations."""
+"""Bounded robust least squares with priors and exact Jacobians, in coordinates scaled by the expected deviations or
+in others (`coordinates`)."""
 
 from __future__ import annotations
 
@@ -11,9 +12,10 @@ from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, stop_if
 from model.arrays import Floats
 from model.fitting.bounded_step import bounded_step
+from model.fitting.coordinates import Coordinates, Scaled
 from model.fitting.problem import Problem, whitened
 from model.fitting.robust import huber
-from model.fitting.unknowns import prior_precision, scales
+from model.fitting.unknowns import prior_precision
 from model.fitting.whitening import Whitener
 
 DIVERGED = 1e3
@@ -59,10 +61,16 @@ class Search:
 class _Objective:
     """Residuals and Jacobian of the scaled problem; both of one point come from one simulation."""
 
-    def __init__(self, problem: Problem, whiteners: Sequence[Whitener], cancel: Cancel, search: Search) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        whiteners: Sequence[Whitener],
+        coordinates: Coordinates,
+        cancel: Cancel,
+        search: Search,
+    ) -> None:
         self.problem, self.whiteners, self.cancel, self.search = problem, whiteners, cancel, search
-        self.scale = scales(problem.unknowns)
-        self.origin = np.array([u.start for u in problem.unknowns])
+        self.coordinates = coordinates
         self.precision = np.sqrt(prior_precision(problem.unknowns))
         self.expected = np.array([u.expected for u in problem.unknowns])
         self.claimed = np.flatnonzero(self.precision)
@@ -75,8 +83,8 @@ class _Objective:
         return len(self.whiteners) * sum(run.stop - run.start for runs in self.problem.runs for run in runs)
 
     def values(self, x: Floats) -> Floats:
-        """Values of the unknowns at scaled coordinates."""
-        return self.origin + self.scale * x
+        """Values of the unknowns at coordinates."""
+        return self.coordinates.values(x)
 
     def residual(self, x: Floats) -> Floats:
         return self._both(x, derivatives=False)[0]
@@ -98,14 +106,20 @@ class _Objective:
             self.evaluations += 1
             if self.search.tell is not None:
                 self.search.tell(self.evaluations, float(np.sqrt(np.mean(data.residual**2))))
-        rows = np.diag(self.precision * self.scale)[self.claimed]
-        flat = data.jacobian.reshape(data.residual.size, -1)
-        whole = np.concatenate([flat * self.scale, rows]) if derivatives else np.zeros((0, 0))
+        whole = np.zeros((0, 0))
+        if derivatives:
+            flat = data.jacobian.reshape(data.residual.size, -1)
+            whole = self.coordinates.chain(x, np.concatenate([flat, np.diag(self.precision)[self.claimed]]))
         return np.concatenate([data.residual.ravel(), prior]), whole
 
 
 def solve(
-    problem: Problem, whiteners: Sequence[Whitener], begin: Floats, cancel: Cancel, search: Search | None = None
+    problem: Problem,
+    whiteners: Sequence[Whitener],
+    begin: Floats,
+    cancel: Cancel,
+    search: Search | None = None,
+    coordinates: Coordinates | None = None,
 ) -> Solution:
     """The values that minimise Σ ρ(whitened residual²) + Σ ((value − expected)/deviation)², within the bounds.
 
@@ -115,15 +129,16 @@ def solve(
 
     Args:
         begin: (p,) values to begin from, moved inside the bounds where they lie on one.
+        coordinates: those in which to search; None: the unknowns themselves, scaled. Priors are on the unknowns.
 
     Raises:
         SpecError: when the model has no finite answer at the beginning. CancelledError: when asked to end.
     """
     search = search or Search()
-    objective = _Objective(problem, whiteners, cancel, search)
-    low = np.array([(u.low - u.start) / u.scale for u in problem.unknowns])
-    high = np.array([(u.high - u.start) / u.scale for u in problem.unknowns])
-    x = _inside((begin - objective.origin) / objective.scale, low, high)
+    coordinates = coordinates or Scaled(problem.unknowns)
+    objective = _Objective(problem, whiteners, coordinates, cancel, search)
+    low, high, reach = coordinates.low, coordinates.high, coordinates.reach
+    x = _inside(coordinates.of_values(begin), low, high)
     residual = objective.residual(x)
     cost, weights = _cost_and_weights(residual, objective.samples, search.robust)
     damping, fresh, message, reason = FIRST_DAMPING, False, "", "as many evaluations as allowed"
@@ -139,7 +154,7 @@ def solve(
         if damping > MOST_DAMPING or not np.isfinite(damped).all():
             reason = "no step helps, however short: do the records begin as the model does, and does it stay stable?"
             break
-        step = bounded_step(damped, -gradient, low - x, high - x)
+        step = bounded_step(damped, -gradient, np.maximum(low - x, -reach), np.minimum(high - x, reach))
         promised = -float(gradient @ step + 0.5 * step @ information @ step)
         if promised <= search.tolerance * cost:
             if fresh:
@@ -159,7 +174,7 @@ def solve(
     if jacobian.size == 0:
         jacobian = objective.jacobian(x)
         information = _information(jacobian, weights)
-    information = information / np.outer(objective.scale, objective.scale)
+    information = coordinates.information_of_values(x, information)
     ended, count = message or reason, objective.evaluations
     return Solution(objective.values(x), cost, count, bool(message), ended, information, steps)
 

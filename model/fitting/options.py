@@ -33,6 +33,7 @@ class FitOptions(FrozenRecord):
     bend_terms: of the sine series of each bend, at most 8.
     friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
     whiten: take out the correlation of the residual before weighing it.
+    consistent_inertias: find only bodies that can exist: of every link that is a body, if any of its numbers is fitted.
     """
 
     parameters: tuple[str, ...] | None = None
@@ -49,6 +50,7 @@ class FitOptions(FrozenRecord):
     bend_terms: Annotated[int, Field(ge=1, le=8)] = 4
     friction_form: bool = True
     whiten: bool = True
+    consistent_inertias: bool = False
     replicas: Annotated[int, Field(ge=0, le=1000)] = 16
     """Simulations with drawn noise that tell what the noise does on average; 0 for none."""
     longest_memory: Annotated[int, Field(ge=0, le=100)] = 12

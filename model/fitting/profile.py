@@ -111,10 +111,13 @@ def profile(
     Args:
         traces: those that were fitted to.
 
-    Raises SpecError for a parameter that was not fitted or other traces; CancelledError when asked to end.
+    Raises SpecError for a parameter that was not fitted, other traces, or a fit with consistent inertias, since a
+    profile holds one number of a body at a time; CancelledError when asked to end.
     """
     fitted.parameter(name)
     options, values = fitted.options, np.array(fitted.values)
+    if options.consistent_inertias:
+        raise SpecError(f"profile of {name}: takes no fit with consistent inertias; fit without them for a profile")
     problem = fit_problem(fitted.model, traces, options)
     if tuple(record.name for record in problem.records) != fitted.traces:
         raise SpecError(f"profile of {name}: needs the traces that were fitted to, {', '.join(fitted.traces)}")

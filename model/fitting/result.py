@@ -76,6 +76,8 @@ class FitResult(FrozenRecord):
     seconds: float
     converged: bool
     message: str
+    on_the_edge: tuple[str, ...] = ()
+    """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
 
     def __repr__(self) -> str:
         """One line; `print` shows the parameters, too."""

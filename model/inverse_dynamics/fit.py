@@ -13,6 +13,7 @@ from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import chosen_unknowns
+from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fitted_parameter
 from model.fitting.identifiability import IdentifiabilityReport, judged
@@ -63,6 +64,8 @@ class TorqueFit(FrozenRecord):
     cutoff: float
     evaluations: int
     converged: bool
+    on_the_edge: tuple[str, ...] = ()
+    """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
 
     def __repr__(self) -> str:
         """One line; `print` shows the parameters, too."""
@@ -117,6 +120,7 @@ def fit_torques(
     asked_for = {n: p for n, p in recorded_sizes(model, motions[: len(traces)]).items() if n not in options.priors}
     unknowns = with_recorded_sizes(unknowns, asked_for)
     problem = TorqueProblem(model, tuple(motions[: len(traces)]), unknowns, np.ones(model.joint_count))
+    coordinates = coordinates_of(model, unknowns, options)
     begin = np.array([u.start for u in unknowns])
     first = np.concatenate([e.residual for e in problem.evaluate(begin, derivatives=False)])
 
@@ -124,11 +128,11 @@ def fit_torques(
         progress(0.9 * (1 - float(np.exp(-count / 10))), f"{count} evaluations, residual {rms:.3g} of the first")
 
     search = Search(options.robust, options.tolerance, options.most_evaluations or 60, report_search)
-    found = solve(problem, [white(size) for size in _rms(first)], begin, cancel, search)
+    found = solve(problem, [white(size) for size in _rms(first)], begin, cancel, search, coordinates)
     # again, weighed by what is left: by the residual of the given model, priors would count too much
     left = np.concatenate([e.residual for e in problem.evaluate(found.values, derivatives=False)])
     sizes = np.maximum(_rms(left), LEAST_LEFT * np.array(_rms(first)))
-    found = solve(problem, [white(float(size)) for size in sizes], found.values, cancel, search)
+    found = solve(problem, [white(float(size)) for size in sizes], found.values, cancel, search, coordinates)
     parameters, report = _judge_parameters(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
     errors = [_error(fitted, motion, held_out=k >= len(traces)) for k, motion in enumerate(motions)]
@@ -148,6 +152,7 @@ def fit_torques(
         cutoff=cutoff,
         evaluations=found.evaluations,
         converged=found.converged,
+        on_the_edge=on_the_edge(model, fitted, options),
     )
 
 

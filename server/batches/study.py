@@ -179,6 +179,7 @@ def fit_options(study: FitStudy) -> FitOptions:
         starts=study.starts,
         seed=study.seed,
         loop=study.loop,
+        consistent_inertias=study.consistent_inertias,
     )
 
 

@@ -51,6 +51,8 @@ class FitStudy(Wire):
     starts: Annotated[int, Field(ge=1, le=20)] = 1
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     loop: Literal["closed", "open"] | None = None
+    consistent_inertias: StrictBool = False
+    """Find only bodies that can exist."""
 
 
 class ValidateStudy(Wire):

@@ -2953,6 +2953,11 @@ export interface components {
             converged: boolean;
             /** Message */
             message: string;
+            /**
+             * On The Edge
+             * @default []
+             */
+            on_the_edge?: string[];
             /** Models */
             models: components["schemas"]["ModelAgreement"][];
             /** Signals */
@@ -2993,6 +2998,7 @@ export interface components {
          *     bend_terms: of the sine series of each bend, at most 8.
          *     friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
          *     whiten: take out the correlation of the residual before weighing it.
+         *     consistent_inertias: find only bodies that can exist: of every link that is a body, if any of its numbers is fitted.
          */
         FitOptions: {
             /** Parameters */
@@ -3067,6 +3073,11 @@ export interface components {
              * @default true
              */
             whiten?: boolean;
+            /**
+             * Consistent Inertias
+             * @default false
+             */
+            consistent_inertias?: boolean;
             /**
              * Replicas
              * @default 16
@@ -3151,6 +3162,11 @@ export interface components {
             seed?: number;
             /** Loop */
             loop?: ("closed" | "open") | null;
+            /**
+             * Consistent Inertias
+             * @default false
+             */
+            consistent_inertias?: boolean;
             /** Traces */
             traces: string[];
             /**
@@ -3219,6 +3235,11 @@ export interface components {
             seed?: number;
             /** Loop */
             loop?: ("closed" | "open") | null;
+            /**
+             * Consistent Inertias
+             * @default false
+             */
+            consistent_inertias?: boolean;
         };
         /**
          * FittedNumber

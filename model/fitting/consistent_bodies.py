@@ -1,0 +1,308 @@
+"""Coordinates in which a search finds only bodies that can exist: log-Cholesky parameters for the bodies' numbers.
+
+The number of coordinates stays that of the unknowns, each in the place of the one that it stands for: α for a mass, d1,
+d2, d3 for the moments xx, yy, zz, and s12, s13, s23 for xy, xz, yz; a centre of mass is t itself. The change is smooth
+and can be undone, so a covariance is the same by either: D (Dᵀ A D)⁻¹ Dᵀ = A⁻¹ for an information A about the numbers
+and the derivatives D of the numbers by the coordinates. Fits therefore take it by the numbers, as without the option.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Body
+from model import layout as at
+from model.arrays import Floats
+from model.fitting.coordinates import Coordinates, Scaled
+from model.fitting.log_cholesky import body_of, log_cholesky, moments_of, second_moments
+from model.fitting.options import FitOptions
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+
+COLUMNS = (at.MASS, *range(at.CENTRE_X, at.CENTRE_Z + 1), *range(at.INERTIA_XX, at.INERTIA_YZ + 1))
+"""Columns of a body's ten numbers."""
+PARTS = ("mass", "centre_x", "centre_y", "centre_z", *(f"inertia_{e}" for e in ("xx", "yy", "zz", "xy", "xz", "yz")))
+MASS, MOMENTS, PRODUCTS = 0, slice(4, 10), slice(7, 10)
+"""Places among the ten."""
+THINNEST = 1e-3
+"""Least e^d, as a share of the body's root mean square radius as stated: no body comes out thinner, as long as the
+stated one is not. It keeps a fit that would rather leave what can exist away from its very edge."""
+WIDEST = 1e3
+"""Most e^d, as a multiple of that radius."""
+LIGHTEST = 1e-4
+"""Least mass, as a share of the stated one, and the inverse of the most; narrower bounds are the user's. Where nothing
+tells a mass from others, a search may go anywhere."""
+LONGEST_STEP = 1.0
+"""Farthest that one step changes a logarithm: beyond that, the derivatives of where it began say nothing."""
+LEAST_SHARE = 1e-12
+"""Least of the second moments, as a share of their sum, of a body of which log-Cholesky parameters are taken."""
+FLAT = 1e-4
+"""Share of the second moments of a body below which the least one is told: a hundredth of its size in thickness."""
+EDGE = 1e-9
+"""Share of the sum of second moments by which the least may be below 0: numbers of a file are rounded."""
+INSIDE = 1e-6
+"""Share of that sum which the least second moment has at the start: a plate without thickness lies on the edge."""
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A body of which numbers are fitted. numbers: (10,) as the search starts; places: which unknown each is, −1 for
+    none."""
+
+    name: str
+    numbers: Floats
+    places: tuple[int, ...]
+
+    @property
+    def has_fitted_moments(self) -> bool:
+        return any(place >= 0 for place in self.places[MOMENTS])
+
+    @property
+    def held_products(self) -> NDArray[np.bool_]:
+        return np.array([place < 0 for place in self.places[PRODUCTS]])
+
+    def with_values(self, values: Floats) -> Floats:
+        """The ten numbers (10,) with values of the unknowns."""
+        return np.array([n if p < 0 else values[p] for n, p in zip(self.numbers, self.places, strict=True)])
+
+    @property
+    def free(self) -> list[tuple[int, int]]:
+        """Number among the seven (α, d, s) and unknown, of all that are coordinates."""
+        seven = (self.places[MASS], *self.places[MOMENTS])
+        if not self.has_fitted_moments:
+            seven = seven[:1]
+        return [(k, place) for k, place in enumerate(seven) if place >= 0]
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Where a body's search begins: its moments (6,), and α, d, s (7,)."""
+
+    moments: Floats
+    seven: Floats
+
+
+class ConsistentBodies(Scaled):
+    """Coordinates of unknowns of a model for which every body of which a number is fitted can exist.
+
+    All other unknowns are scaled, as ever. Of a body with fitted moments, xx, yy and zz must be unknown; mass, centre
+    and products may each be unknown or held, and what is held keeps its value exactly.
+
+    Raises SpecError for a body that cannot exist as it is stated, for xx, yy and zz of which only some are unknown, for
+    bounds of moments, and for a number that bodies share with something else.
+    """
+
+    def __init__(self, model: Model, unknowns: tuple[Unknown, ...]) -> None:
+        super().__init__(unknowns)
+        self.unknowns = unknowns
+        self.bodies = tuple(_bodies(model, unknowns))
+        self._starts = [self._start(body) for body in self.bodies]
+        for body, start in zip(self.bodies, self._starts, strict=True):
+            self._bound(body, start)
+
+    def of_values(self, values: Floats) -> Floats:
+        """Coordinates (p,); of a body that cannot exist, those of the nearest on the way from the start that can."""
+        x = super().of_values(values)
+        for body, start in zip(self.bodies, self._starts, strict=True):
+            wanted, share = body.with_values(values), 1.0
+            begun = body.numbers.copy()
+            begun[MOMENTS] = start.moments
+            while True:
+                between = begun + share * (wanted - begun)
+                found = _seven(between, body) if _is_inside(between, body) else None
+                if found is not None:
+                    break
+                share = 0.5 * share if share > 1e-6 else 0.0
+            for number, place in body.free:
+                x[place] = (found[number] - start.seven[number]) / self.scale[place]
+        return x
+
+    def values(self, x: Floats) -> Floats:
+        """Values (p,) of the unknowns at coordinates (p,)."""
+        found = super().values(x)
+        for body, start in zip(self.bodies, self._starts, strict=True):
+            seven = self._seven_at(body, start, x)
+            if body.places[MASS] >= 0:
+                mass = self.unknowns[body.places[MASS]]
+                found[body.places[MASS]] = np.clip(np.exp(2 * seven[0]), mass.low, mass.high)  # for rounding alone
+            if body.has_fitted_moments:
+                moments, _ = body_of(seven, body.held_products, body.numbers[MOMENTS])
+                for moment, place in zip(moments, body.places[MOMENTS], strict=True):
+                    if place >= 0:
+                        found[place] = moment
+        return found
+
+    def chain(self, x: Floats, jacobian: Floats) -> Floats:
+        """Derivatives (k, p) by the coordinates at x, of derivatives (k, p) by the unknowns."""
+        return np.asarray(jacobian @ self.derivatives(x))
+
+    def derivatives(self, x: Floats) -> Floats:
+        """D (p, p): derivatives of the unknowns (rows) by the coordinates at x (p,)."""
+        found = np.diag(self.scale)
+        for body, start in zip(self.bodies, self._starts, strict=True):
+            seven = self._seven_at(body, start, x)
+            for _, place in body.free:
+                found[place, place] = 0.0
+            if body.places[MASS] >= 0:
+                mass = body.places[MASS]
+                found[mass, mass] = 2 * np.exp(2 * seven[0]) * self.scale[mass]
+            if body.has_fitted_moments:
+                _, slopes = body_of(seven, body.held_products, body.numbers[MOMENTS])
+                for moment, row in enumerate(body.places[MOMENTS]):
+                    if row >= 0:
+                        for number, place in body.free:
+                            found[row, place] = slopes[moment, number] * self.scale[place]
+        return found
+
+    def information_of_values(self, x: Floats, information: Floats) -> Floats:
+        """Information (p, p) about the unknowns, of information about the coordinates at x."""
+        derivatives = self.derivatives(x)
+        half = np.linalg.solve(derivatives.T, information)
+        return np.asarray(np.linalg.solve(derivatives.T, half.T))
+
+    def _seven_at(self, body: _Body, start: _Start, x: Floats) -> Floats:
+        seven = start.seven.copy()
+        for number, place in body.free:
+            seven[number] += self.scale[place] * x[place]
+        return seven
+
+    @staticmethod
+    def _start(body: _Body) -> _Start:
+        """Where the search begins: as stated, moved inside where the stated body lies on the edge."""
+        moments = body.numbers[MOMENTS].copy()
+        if body.has_fitted_moments:
+            second = second_moments(moments)
+            missing = INSIDE * float(np.trace(second)) - float(np.linalg.eigvalsh(second)[0])
+            if missing > 0.0:
+                moments += moments_of(missing * np.eye(3))
+        numbers = body.numbers.copy()
+        numbers[MOMENTS] = moments
+        seven = _seven(numbers, body)
+        return _Start(moments, seven)
+
+    def _bound(self, body: _Body, start: _Start) -> None:
+        """Sizes, bounds and reach of a body's coordinates."""
+        radius = np.sqrt(np.trace(second_moments(start.moments)) / np.exp(2 * start.seven[0]))
+        for number, place in body.free:
+            begun, low, high = start.seven[number], -np.inf, np.inf
+            self.scale[place] = 1.0
+            self.reach[place] = LONGEST_STEP
+            if number == 0:
+                given = self.unknowns[place]
+                low, high = begun + 0.5 * np.log(LIGHTEST), begun - 0.5 * np.log(LIGHTEST)
+                low = max(low, 0.5 * np.log(given.low)) if given.low > 0.0 else low
+                high = min(high, 0.5 * np.log(given.high)) if np.isfinite(given.high) else high
+            elif number <= 3:
+                low, high = min(np.log(THINNEST * radius), begun - 1.0), np.log(WIDEST * radius)
+            else:
+                self.scale[place], self.reach[place] = radius, np.inf
+            self.low[place] = (low - begun) / self.scale[place]
+            self.high[place] = (high - begun) / self.scale[place]
+
+
+def _bodies(model: Model, unknowns: Sequence[Unknown]) -> list[_Body]:
+    """The bodies of which any number is unknown. Raises SpecError as `ConsistentBodies` says."""
+    places = {slot: k for k, u in enumerate(unknowns) for slot in u.parameter.slots}
+    found = []
+    for number in model.machine.modelled_joints:
+        if not isinstance(model.machine.joint(number).link, Body):
+            continue
+        slots = [at.slot(number, column) for column in COLUMNS]
+        own = tuple(places.get(slot, -1) for slot in slots)
+        if all(place < 0 for place in own):
+            continue
+        for place in own:
+            if place >= 0 and len(unknowns[place].parameter.slots) > 1:
+                raise SpecError(
+                    f"{unknowns[place].name}: stands for several numbers at once; with consistent inertias each number "
+                    "of a body is fitted by itself: take the tie out of the model, or hold it"
+                )
+        numbers = np.array([model.vector[s] if p < 0 else unknowns[p].start for s, p in zip(slots, own, strict=True)])
+        body = _Body(f"link{number}", numbers, own)
+        _check_stated(body)
+        _check_choice(body, unknowns)
+        found.append(body)
+    return found
+
+
+def _check_choice(body: _Body, unknowns: Sequence[Unknown]) -> None:
+    if not body.has_fitted_moments:
+        return
+    names = [f"{body.name}.{part}" for part in PARTS]
+    if held := [names[k] for k in range(4, 7) if body.places[k] < 0]:
+        fitted = [names[k] for k in range(4, 10) if body.places[k] >= 0]
+        raise SpecError(
+            f"{', '.join(fitted)}: with consistent inertias xx, yy and zz of a body are fitted together: free "
+            f"{' and '.join(held)} as well, or hold {body.name}.inertia_*"
+        )
+    for number, place in enumerate(body.places[MOMENTS]):
+        u = unknowns[place]
+        if place >= 0 and (u.low, u.high) != (0.0 if number < 3 else -np.inf, np.inf):
+            raise SpecError(
+                f"{u.name}: bounds {u.low:g} to {u.high:g} {u.unit}: with consistent inertias a moment has none but "
+                "those of its body; take them out, or state an expected deviation"
+            )
+
+
+def _check_stated(body: _Body) -> None:
+    mass, moments = float(body.numbers[MASS]), body.numbers[MOMENTS]
+    second = second_moments(moments)
+    least, whole = float(np.linalg.eigvalsh(second)[0]), float(np.trace(second))
+    principal = ", ".join(f"{m:.4g}" for m in sorted(whole - np.linalg.eigvalsh(second)))
+    stated = f"{body.name}: {mass:.4g} kg with the principal moments {principal} kg·m²"
+    if mass < 0.0 or least < -EDGE * abs(whole):
+        raise SpecError(
+            f"{stated} is no body that can exist (mass above 0, no moment above the sum of the others): consistent "
+            "inertias start from one that can"
+        )
+    if mass == 0.0 or (whole == 0.0 and body.has_fitted_moments):
+        raise SpecError(f"{stated}: consistent inertias start from a mass and moments above 0; state some, or hold it")
+
+
+def _is_inside(numbers: Floats, body: _Body) -> bool:
+    if not numbers[MASS] > 0.0:
+        return False
+    if not body.has_fitted_moments:
+        return True
+    second = np.linalg.eigvalsh(second_moments(numbers[MOMENTS]))
+    return bool(second[0] > LEAST_SHARE * second.sum())
+
+
+def _seven(numbers: Floats, body: _Body) -> Floats:
+    """α, d, s (7,) of ten numbers; α alone where no moment is fitted."""
+    if body.has_fitted_moments:
+        return log_cholesky(float(numbers[MASS]), numbers[MOMENTS])
+    return np.array([0.5 * np.log(numbers[MASS]), *np.zeros(6)])
+
+
+def on_the_edge(before: Model, fitted: Model, options: FitOptions) -> tuple[str, ...]:
+    """Links whose fitted body is flat or thin as their stated one is not: the records ask for one that cannot exist.
+
+    Empty without consistent inertias.
+    """
+    if not options.consistent_inertias:
+        return ()
+    found = []
+    for number in fitted.machine.modelled_joints:
+        if isinstance(fitted.machine.joint(number).link, Body):
+            slots = [at.slot(number, column) for column in COLUMNS[MOMENTS]]
+            least = [np.linalg.eigvalsh(second_moments(model.vector[slots])) for model in (before, fitted)]
+            stated, now = (float(s[0] / s.sum()) if s.sum() > 0.0 else 0.0 for s in least)
+            if now < FLAT and now < 0.1 * stated:
+                found.append(f"link{number}")
+    return tuple(found)
+
+
+def coordinates_of(model: Model, unknowns: tuple[Unknown, ...], options: FitOptions) -> Coordinates | None:
+    """The coordinates that the options ask for; None: the unknowns themselves. Raises SpecError as `ConsistentBodies`
+    does, and for a method that has no coordinates but these."""
+    if not options.consistent_inertias:
+        return None
+    if options.method != "least_squares":
+        raise SpecError(f"consistent_inertias: not with the method {options.method}; it takes least_squares")
+    return ConsistentBodies(model, unknowns)
