@@ -109,18 +109,8 @@ REPORTED: dict[str, Kind] = {
         body=True,
         motions=("sines",),
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-cascade": replace(
         _AXIS, controller=CASCADE, rate=(400.0,), bits=(17,), contacts=(BRISTLE,), motions=("via points", "steps")
-    ),
-    "planar-cascade": replace(
-        _PLANAR, controller=CASCADE, rate=(500.0,), bits=(18, 20), rounding=0.001, motions=("sweep", "via points")
-    ),
-    "six-volts": replace(
-        _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
     ),
     "axis-steps": replace(
         _AXIS, rate=(250.0,), bits=(15,), contacts=(TANH, BRISTLE), motions=("steps", "random steps"), body=True
@@ -144,6 +134,39 @@ REPORTING: dict[str, Kind] = {
         contacts=(SWITCH,),
         motions=("sines", "via points"),
         recorded=("set_point", "drive", "velocity"),
+        known_loop=False,
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "planar-cascade": replace(
+        _PLANAR, controller=CASCADE, rate=(500.0,), bits=(18, 20), rounding=0.001, motions=("sweep", "via points")
+    ),
+    "six-volts": replace(
+        _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
+    ),
+    "axis-volts-table": replace(
+        _AXIS, rate=(125.0,), bits=(16,), contacts=(SWITCH, BRISTLE), horizontal=True, motions=("sweep", "sines")
+    ),
+    "planar-steps": replace(_PLANAR, contacts=(TANH, SWITCH), motions=("steps", "random steps"), body=True),
+    "planar-current-table": replace(
+        _PLANAR,
+        drive=CURRENT,
+        rate=(300.0,),
+        bits=(15,),
+        contacts=(BRISTLE,),
+        horizontal=True,
+        motions=("random steps", "sines"),
+        known_loop=False,
+    ),
+    "arm-current-ramps": replace(
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(17,),
+        contacts=(TANH,),
+        motions=("ramps", "via points"),
         known_loop=False,
     ),
 }
