@@ -77,6 +77,15 @@ def ours(url: str) -> Iterator[Through]:
         yield lambda work, jobs: [answer.result() for _, answer in done_in_any_order(workers, work, range(jobs))]
 
 
+@contextmanager
+def one_by_one(url: str) -> Iterator[Through]:
+    """An executor of a URL that is given every job by itself, as a batch gives those of more than half a second."""
+    with ending(open_workers(url)) as workers:
+        yield lambda work, jobs: [
+            answer.result() for answer in [workers.submit(work, number) for number in range(jobs)]
+        ]
+
+
 @dataclass(frozen=True)
 class Measured:
     """So many jobs through so many workers: wall time, processor time of all processes, and of the jobs alone, s."""
@@ -177,19 +186,22 @@ def figures_of(name: str, found: Measured, rival: Measured | None) -> list[Figur
     ]
 
 
-def extrapolated(found: Rate) -> list[Figure]:
-    """What the rate means for many workers."""
+def extrapolated(found: Rate, alone: Rate) -> list[Figure]:
+    """What the rates mean for many workers: of short jobs, several as one, and of long ones, one by one."""
     name, most = found.bottleneck
+    limit, fewest = alone.bottleneck
+    beside = [f"one by one {alone.a_second:.0f} a second"]
+    beside += [f"one by one {ms:.2f} ms" for ms in (alone.scheduler_ms, alone.client_ms)]
     return [
-        Figure("dask, empty jobs", f"{found.a_second:.0f} a second"),
-        Figure("dask, scheduler a job", f"{found.scheduler_ms:.2f} ms"),
-        Figure("dask, client a job", f"{found.client_ms:.2f} ms"),
+        Figure("dask, empty jobs", f"{found.a_second:.0f} a second", beside=beside[0]),
+        Figure("dask, scheduler a job", f"{found.scheduler_ms:.2f} ms", beside=beside[1]),
+        Figure("dask, client a job", f"{found.client_ms:.2f} ms", beside=beside[2]),
         Figure(f"{MANY} workers, by extrapolation", f"{most:.0f} jobs a second", beside=f"the {name} is busy then"),
         Figure(f"{MANY} workers, shortest job", f"{MANY / most:.2g} s", beside="shorter ones leave workers idle"),
         Figure(
             f"{MANY} workers, diagnoses of {DIAGNOSIS_S:g} s",
-            f"{MANY / DIAGNOSIS_S / most:.0%} busy",
-            beside=f"the {name}, at {MANY / DIAGNOSIS_S:g} jobs a second",
+            f"{MANY / DIAGNOSIS_S / fewest:.0%} busy",
+            beside=f"the {limit}, at {MANY / DIAGNOSIS_S:g} jobs a second, one by one",
         ),
     ]
 
@@ -211,7 +223,9 @@ def main() -> int:
         with cluster(workers) as made, ours(made.url) as through:
             found += figures_of("dask", measured(through, work, workers, JOBS // share), rival)
             if workers == WORKERS[-1]:
-                found += extrapolated(rate(made, through, EMPTY // share, work.text))
+                several = rate(made, through, EMPTY // share, work.text)
+                with one_by_one(made.url) as alone:
+                    found += extrapolated(several, rate(made, alone, EMPTY // share, work.text))
     title = f"{JOBS // share} jobs of {rival.computed / rival.jobs:.2f} s, each with {len(work.text) >> 10} KiB of text"
     return show(title, f"python -m benchmarks executors{' --quick' if given.quick else ''}", found)
 
