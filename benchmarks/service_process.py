@@ -7,6 +7,7 @@ import random
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,8 @@ from tests.server.postgresql import programs, running_postgresql
 ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0
 END_WITHIN = 15.0
+LONGEST_START = 90.0
+"""Time (s) within which a queued experiment is being recorded, with its move to the start."""
 ENDS = ("done", "failed", "cancelled", "interrupted")
 DATABASES = ("sqlite", "postgresql")
 COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
@@ -53,9 +56,12 @@ class RunningService:
                 return found
 
     def until_recording(self, number: str) -> None:
-        """Waits until the record of an experiment has begun. Raises RuntimeError when it ends before."""
+        """Waits until the record of an experiment has begun. Raises RuntimeError when it ends before, or never does."""
+        give_up = time.monotonic() + LONGEST_START
         while True:
             found = self.ask("GET", f"/experiments/{number}", params={"wait": 0.1})
+            if time.monotonic() > give_up:
+                raise RuntimeError(f"experiment {number} does not begin: {found}, queue {self.ask('GET', '/queue')}")
             if found["state"] == "running" and " of " in found["progress_text"]:
                 return
             if found["state"] in ENDS:
