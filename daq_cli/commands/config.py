@@ -35,33 +35,61 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
 
 @app.command()
 def copy(
-    what: Annotated[str, typer.Argument(help="memory-map, or machine.")],
+    what: Annotated[str, typer.Argument(help="memory-map, machine, or examples.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write (default: its own name).")
+        Path | None,
+        typer.Option("--output", "-o", help="File to write, for examples a folder (default: its own name)."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Copy a file that ships, the memory map or the machine file, in order to change the copy."""
+    """Copy what ships, in order to change the copy: the memory map, the machine file, or the documents' examples."""
     from importlib import resources
-
-    from daq_cli.app.output_file import check_folder, replacing
 
     files = {
         "memory-map": resources.files("firmware_protocol") / "memory_map.toml",
         "machine": resources.files("daq.contracts") / "machines" / "ma2000.toml",
     }
-    if what not in files:
-        raise SpecError(f"config copy {what!r}: allowed are {', '.join(files)}")
-    path = output or Path("memory_map.toml" if what == "memory-map" else "ma2000.toml")
-    check_folder(path, what)
-    if path.exists():
-        raise SpecError(f"{path}: is there already; name another file with -o")
-    with replacing(path) as part:
-        part.write_text(files[what].read_text("utf-8"), "utf-8")
+    if what == "examples":
+        path = output or Path("examples")
+        _copy_examples(path)
+    elif what in files:
+        path = output or Path("memory_map.toml" if what == "memory-map" else "ma2000.toml")
+        _copy_file(files[what].read_text("utf-8"), path, what)
+    else:
+        raise SpecError(f"config copy {what!r}: allowed are {', '.join(files)}, examples")
     if json:
         print_json({"file": path})
     else:
         print(path)
+
+
+def _copy_file(text: str, path: Path, what: str) -> None:
+    from daq_cli.app.output_file import check_folder, replacing
+
+    check_folder(path, what)
+    if path.exists():
+        raise SpecError(f"{path}: is there already; name another file with -o")
+    with replacing(path) as part:
+        part.write_text(text, "utf-8")
+
+
+def _copy_examples(folder: Path) -> None:
+    """Copies the examples into a new folder."""
+    import shutil
+
+    from daq.config.examples import example_files
+
+    files = example_files()
+    if not files:
+        raise SpecError("the examples are not in this installation: they are in the source distribution")
+    if folder.exists():
+        raise SpecError(f"{folder}: is there already; name another folder with -o")
+    try:
+        folder.mkdir()
+        for file in files:
+            shutil.copyfile(file, folder / file.name)
+    except OSError as error:
+        raise SpecError(f"{folder}: cannot be written: {error.strerror}") from error
 
 
 @app.command()

@@ -36,6 +36,7 @@ from firmware_protocol.memory_map import default_memory_map
 from model.reports.page import Text
 from tests.daq_cli.invoke import CommandLine
 
+ROOT = Path(__file__).parents[2]
 MOCK = "mock://?lock_step=1&seed=3"
 
 
@@ -113,7 +114,16 @@ def test_files_that_ship_are_copied_and_never_over_another(daq: CommandLine, tmp
     assert daq("config", "copy", "memory-map", "-o", target).code == 0
     assert load_memory_map(target) == default_memory_map()
     daq("config", "copy", "memory-map", "-o", target).complains(2, "is there already")
-    daq("config", "copy", "gripper").complains(2, "memory-map, machine")
+    daq("config", "copy", "gripper").complains(2, "memory-map, machine, examples")
+
+
+def test_the_examples_are_copied_whole_and_never_over_a_folder(daq: CommandLine, tmp_path: Path) -> None:
+    target = tmp_path / "copied"
+    assert daq("config", "copy", "examples", "-o", target).code == 0
+    ours = {path.name: path.read_bytes() for path in (ROOT / "examples").iterdir() if path.is_file()}
+    assert {path.name: path.read_bytes() for path in target.iterdir()} == ours
+    daq("config", "copy", "examples", "-o", target).complains(2, "is there already; name another folder")
+    daq("config", "copy", "examples", "-o", tmp_path / "none" / "here").complains(2, "cannot be written")
 
 
 def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place_of_a_table(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.compile_ahead import compile_simulation
 from tests.gallery.notebooks import NAMES, ROOT, executed, notebook, outputs_of, printed
 
 MACHINE = ROOT / "examples" / "double_pendulum.toml"
@@ -26,8 +27,15 @@ FIGURES = {
 """Of each notebook: how many pictures it shows at least, and a line that it prints. Its own cells check more."""
 
 
+@pytest.fixture(scope="module")
+def compiled() -> None:
+    """The machine code of the simulations is there, as at every run of a notebook but a reader's first."""
+    compile_simulation()
+
+
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_runs_and_shows_figures_and_no_noise(name: str, tmp_path: Path) -> None:
     done = executed(notebook(name), tmp_path)
@@ -49,7 +57,7 @@ def test_a_notebook_runs_and_shows_figures_and_no_noise(name: str, tmp_path: Pat
 
 @pytest.mark.slow
 @pytest.mark.lab_data
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_the_real_rig_s_notebook_analyses_records_that_are_there(lab_data: Path, tmp_path: Path) -> None:
     """The published shares of torque, which a linear fit made elsewhere bears out: its own cells hold them."""
     pd = pytest.importorskip("pandas")

@@ -54,7 +54,7 @@ def test_the_index_lists_every_notebook_in_its_table_and_in_its_tree() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_the_notebooks_programs_pass_a_strict_check_of_types(tmp_path: Path) -> None:
     for name in NAMES:
         text = "\n\n".join(code_of(notebook(name)))
