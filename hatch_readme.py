@@ -1,6 +1,8 @@
-"""Makes the description that a package index shows of README.md, without what only a checkout has.
+"""Makes the description that a package index shows of README.md.
 
-An index shows one page: pictures and links of the repository, which are relative, would lead nowhere there.
+An index shows one page: pictures and links of the repository, which are relative, would lead nowhere there. Where the
+project has an address, `Repository` among its URLs, they become absolute, as of the version's tag; else they are left
+out.
 """
 
 from __future__ import annotations
@@ -18,6 +20,10 @@ PICTURE = re.compile(rf"^!\[[^\]]*\]{RELATIVE}\n+(?:\*[^*\n]+\*\n+)?", re.MULTIL
 PAGES = re.compile(r"^\| page \|.*\n(?:\|.*\n)+", re.MULTILINE)
 """The table of the documents."""
 LINK = re.compile(rf"\[([^\]]*)\]{RELATIVE}")
+PICTURE_TARGET = re.compile(r"(?P<before>!\[[^\]]*\])\((?![a-z][a-z+.-]*:)(?P<path>[^)]*)\)")
+"""A relative picture, and its file."""
+LINK_TARGET = re.compile(r"(?P<before>(?<!!)\[[^\]]*\])\((?![a-z][a-z+.-]*:)(?P<path>[^)#][^)]*)\)")
+"""A relative link, and the file and heading that it names."""
 
 
 class ReadmeHook(MetadataHookInterface):
@@ -26,7 +32,16 @@ class ReadmeHook(MetadataHookInterface):
     def update(self, metadata: dict[str, Any]) -> None:
         """Sets `readme`."""
         text = (Path(self.root) / "README.md").read_text("utf-8")
-        metadata["readme"] = {"content-type": "text/markdown", "text": description(text)}
+        repository = metadata.get("urls", {}).get("Repository")
+        text = absolute(text, repository, metadata["version"]) if repository else description(text)
+        metadata["readme"] = {"content-type": "text/markdown", "text": text}
+
+
+def absolute(readme: str, repository: str, version: str) -> str:
+    """The text with the addresses of relative pictures and links at the tag of a version, in the form of GitHub."""
+    place = repository.rstrip("/")
+    pictured = PICTURE_TARGET.sub(rf"\g<before>({place}/raw/v{version}/\g<path>)", readme)
+    return LINK_TARGET.sub(rf"\g<before>({place}/blob/v{version}/\g<path>)", pictured)
 
 
 def description(readme: str) -> str:

@@ -19,6 +19,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "extensions.pages",
+    "extensions.downloads",
     "extensions.public_api",
     "extensions.snippets",
     "extensions.policy",

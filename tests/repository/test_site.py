@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.access.headers import secure
 from server.site import serve_site
+from tests.gallery.notebooks import NAMES, notebook
 from tests.repository.tracked import ROOT
 from tests.server.dashboard.browser import WITHOUT_3D, chromium, playwright
 
@@ -115,6 +117,18 @@ def test_the_site_is_built_without_a_warning_and_no_page_needs_the_network(site:
         page.relative_to(site) for page in pages
     }
     assert not (ROOT / "docs" / "jupyter_execute").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+def test_each_notebook_can_be_downloaded_from_its_page_without_outputs(site: Path) -> None:
+    for name in NAMES:
+        (target,) = re.findall(r'<a href="([^"]+)" download', (site / "gallery" / f"{name}.html").read_text("utf-8"))
+        found = json.loads((site / "gallery" / target).read_text("utf-8"))
+        own = notebook(name)
+        assert [cell["cell_type"] for cell in found["cells"]] == [cell.cell_type for cell in own.cells]
+        assert ["".join(cell["source"]) for cell in found["cells"]] == [cell.source for cell in own.cells]
+        assert not any(cell.get("outputs") for cell in found["cells"])
 
 
 @pytest.fixture

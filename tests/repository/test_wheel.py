@@ -7,6 +7,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+from hatch_readme import absolute
 from tests.repository.tracked import ROOT, tracked_files
 
 PAGE = "server/dashboard/"
@@ -28,6 +29,8 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     expected -= {name for name in expected if name.startswith(NOT_INSTALLED)}
     assert {Path(name).suffix for name in expected} >= {".py", ".toml", ".msg"}
     assert expected - packed == set()
+    examples = {f"ma2000/{name}" for name in tracked if name.startswith("examples/")}
+    assert {name for name in packed if name.startswith("ma2000/examples/")} == examples != set()
     assert not any(name.startswith("tests/") for name in packed)
     page = {name.removeprefix(PAGE) for name in packed if name.startswith(PAGE)}
     assert "dist/index.html" in page
@@ -39,3 +42,16 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     assert re.findall(r"\]\((?!https?:)[^)]*\)|<img", description) == [], "an index shows no file of the repository"
     built = (ROOT / "docs" / "_site" / "index.html").is_file()
     assert ("ma2000/docs_site/index.html" in packed) == built
+
+
+def test_where_the_project_has_an_address_the_description_keeps_its_pictures_and_pages() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    text = absolute(readme, "https://example.org/us/arm/", "9.8.7")
+    targets = re.findall(r"\]\(([^)]*)\)", text)
+    assert len(targets) == len(re.findall(r"\]\(([^)]*)\)", readme))
+    assert [target for target in targets if not target.startswith("https://")] == []
+    own = [target for target in targets if target.startswith("https://example.org/us/arm/")]
+    assert "https://example.org/us/arm/raw/v9.8.7/docs/images/ramp.png" in own
+    assert "https://example.org/us/arm/blob/v9.8.7/docs/trial.md#results" in own
+    for target in own:
+        assert (ROOT / re.sub(r".*?/v9\.8\.7/", "", target).partition("#")[0]).exists(), target
