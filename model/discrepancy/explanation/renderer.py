@@ -41,6 +41,10 @@ NOTICEABLE = 0.98
 """Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
 ALL = 0.95
 """Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
+NO_NOISE = 1e6
+"""Ratio of a residual to its noise, above which that noise is none: the machine file takes positions for exact, as one
+made of a URDF does, and what rounding leaves is no measure."""
+NO_NOISE_STATED = "and the machine file states no noise of the sensors to compare it with"
 PHASES: Mapping[Phase, str] = {
     "ramp_start": "as motion starts",
     "steady_ramp": "in steady motion",
@@ -294,8 +298,8 @@ def _place(where: Where) -> str:
             f"{worst.ratio:.2f} times its noise {phase}"
         )
     if worst.whole_record or worst.floor is None:
-        times = plain(worst.ratio)
-        seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times} times its noise"
+        times = f"{plain(worst.ratio)} times its noise" if worst.ratio < NO_NOISE else NO_NOISE_STATED
+        seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times}"
         largest = where.largest
         if largest is None or largest.rms is None:
             return seen

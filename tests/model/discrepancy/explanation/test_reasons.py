@@ -394,3 +394,6 @@ def test_the_joint_with_the_largest_torque_left_is_told_beside_the_one_furthest_
     assert where_with_summary(where).summary == "Joint 6, mostly in slow motion: 8 N·m rms, 40 times its noise."
     both = where_with_summary(where.model_copy(update={"largest": largest}))
     assert both.summary.endswith("40 times its noise; more is left of joint 2, 2000 N·m rms.")
+    exact = where.model_copy(update={"worst": worst.model_copy(update={"ratio": 3.8e8})})
+    said = where_with_summary(exact).summary
+    assert said.endswith("8 N·m rms, and the machine file states no noise of the sensors to compare it with.")
