@@ -3,6 +3,7 @@
     python -m benchmarks feedforward --folder FOLDER              resumes where it was; one line of JSON an arm
     python -m benchmarks feedforward --first 101 --arms 8 …       seeds 101 to 108
     python -m benchmarks feedforward --folder FOLDER --plot FILE  a picture of what the folder has
+    python -m benchmarks feedforward --friction 2 …               hidden frictions of twice the size; another FOLDER
     python -m benchmarks feedforward --quick                      one arm
 
 Every seed is an arm of its own: its parameters are drawn from what the machine file expects (value ± deviation), it
@@ -92,13 +93,13 @@ MOTIONS = {
 """The source's ramp, sines that reverse, and a smooth motion through other postures."""
 
 
-def hidden_effects(seed: int) -> tuple[str, ...]:
-    """The mock's modifications for a seed: a friction at a joint, and a load."""
+def hidden_effects(seed: int, times: float = 1.0) -> tuple[str, ...]:
+    """The mock's modifications for a seed: a friction at a joint, `times` its size, and a load."""
     rng = np.random.default_rng([8, seed])
     kind = str(rng.choice(list(FRICTION)))
     joint = int(rng.integers(1, 4))
     low, high = FRICTION[kind][joint - 1]
-    size = low * (high / low) ** rng.random()
+    size = times * low * (high / low) ** rng.random()
     sign = -1 if kind == "direction_dependent_friction" and rng.random() < 0.5 else 1
     mass = rng.uniform(*PAYLOAD)
     extra = {"stribeck_friction": ",speed=0.2", "stiction": ",speed=0.02"}.get(kind, "")
@@ -106,9 +107,9 @@ def hidden_effects(seed: int) -> tuple[str, ...]:
     return friction, f"payload:mass={mass:.3f}"
 
 
-def study(seed: int) -> dict[str, Any]:
-    """Errors of every method on one arm."""
-    effects, plant = hidden_effects(seed), plant_text(hidden_parameters(MACHINE, seed))
+def study(seed: int, times: float) -> dict[str, Any]:
+    """Errors of every method on one arm, whose hidden friction is `times` as large."""
+    effects, plant = hidden_effects(seed, times), plant_text(hidden_parameters(MACHINE, seed))
     noise = iter(range(1000 * seed, 1000 * seed + 1000))
 
     def run(specs: Sequence[ExperimentSpec]) -> list[Trace]:
@@ -171,14 +172,14 @@ def _together(source: Feedforward) -> float:
     return float(np.degrees(np.sqrt(np.mean([error.rms**2 for error in source.expected.values()]))))
 
 
-def studied(seeds: Sequence[int], folder: Path) -> list[dict[str, Any]]:
+def studied(seeds: Sequence[int], folder: Path, times: float) -> list[dict[str, Any]]:
     """Every seed once; those that the folder has are not done again."""
     path = folder / "arms.jsonl"
     lines = path.read_text("utf-8").splitlines() if path.exists() else []
     done = {entry["seed"]: entry for entry in map(json.loads, lines)}
     for seed in seeds:
         if seed not in done:
-            done[seed] = study(seed)
+            done[seed] = study(seed, times)
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(done[seed]) + "\n")
             print(_line(done[seed]), file=sys.stderr, flush=True)
@@ -244,18 +245,21 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--arms", type=int, default=6, help="number of arms")
     parser.add_argument("--folder", type=Path, help="where results are kept, and found again")
     parser.add_argument("--plot", type=Path, help="a picture to write (.png, .svg)")
+    parser.add_argument("--friction", type=float, default=1.0, help="factor of the hidden frictions' sizes")
     parser.add_argument("--quick", action="store_true", help="one arm")
     chosen = parser.parse_args(arguments)
     seeds = range(chosen.first, chosen.first + (1 if chosen.quick else chosen.arms))
     with tempfile.TemporaryDirectory() as name:
         folder = chosen.folder or Path(name)
         folder.mkdir(parents=True, exist_ok=True)
-        entries = studied(seeds, folder)
+        entries = studied(seeds, folder, chosen.friction)
     if chosen.plot is not None:
         from benchmarks.feedforward_plot import plot
 
         plot(entries, chosen.plot)
     command = f"python -m benchmarks feedforward --first {chosen.first} --arms {len(entries)}"
+    if chosen.friction != 1.0:
+        command += f" --friction {chosen.friction:g}"
     return show(f"Following a motion: {len(entries)} arms, {len(MOTIONS)} motions each", command, figures(entries))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,9 @@ def test_arms_that_follow_badly_miss_the_targets_of_following_a_motion() -> None
         return sum(figure.met is False for figure in figures(arms))
 
     assert hidden_effects(1) == hidden_effects(1) != hidden_effects(2)
+    size, doubled = (float(re.findall(r",\w+=(-?[\d.]+)", hidden_effects(1, t)[0])[0]) for t in (1.0, 2.0))
+    assert doubled == pytest.approx(2 * size, abs=2e-3)
+    assert hidden_effects(1, 2.0)[1:] == hidden_effects(1)[1:], "the load is the same"
     assert missed(arm(0.06, 0.1)) == 0
     assert missed(arm(0.06, 0.1), arm(0.4, 0.1)) == 1, "a third of the plain error is exceeded"
     assert missed(arm(0.06, 0.1), arm(0.06, 0.2)) == 1, "the last attempt is worse than the one before"
