@@ -17,7 +17,7 @@ BLOCK = re.compile(r"<(script|style)((?:\s[^>]*)?)>(.*?)</\1>", re.DOTALL)
 """A script or style sheet; up to its end tag, browsers take everything as its content, too."""
 TAG = re.compile(r"<[a-zA-Z][\w:-]*(?:\s+[^\s\"'<>/=]+(?:\s*=\s*(?:\"[^\"]*\"|'[^']*'|[^\s\"'=<>`]+))?)*\s*/?>")
 STYLE = re.compile(r"\sstyle=(?:\"([^\"]*)\"|'([^']*)')")
-CLASS = re.compile(r"(\sclass=\")")
+CLASS = re.compile(r"(\sclass=[\"'])")
 FOLDER, SHEET = "_static/inline", "styles.css"
 NOT_RUN = re.compile(r"type=\"(?:application/(?!javascript)|text/(?!javascript))")
 """Types of data that a browser does not run."""
