@@ -14,7 +14,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import islice, pairwise
 
 from sqlalchemy import ARRAY, DateTime, Select, column, func, insert, literal, select, true
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
 
 from server.store.tables import TraceRow, TraceStretchRow
 
@@ -28,8 +28,9 @@ MOST_TERMS = 8
 PARTS = (8, 64, 512, None)
 """Number of stretches that are looked for, and read, one part after the other; None for all that are left. A text that
 many traces have is in the first ones."""
-MOST = 32
-"""Number of ranges that PostgreSQL is asked for at once: one first, then four times as many each time."""
+FIRST, MOST = 8, 64
+"""Number of ranges that PostgreSQL is asked for at once at first, and at most: four times as many each time. What many
+traces have is in one range, since its stretches are neighbours."""
 AT_A_TIME = 500
 """Number of terms that one statement asks for: SQLite takes 32 766 values, and older ones 999."""
 Range = tuple[datetime, datetime]
@@ -100,24 +101,33 @@ def ranges_of(stretches: Iterable[int]) -> Iterator[Range]:
         yield _time_of(oldest), _time_of(newest + 1)
 
 
-def read_within(session: Session, query: Select[TraceRow], ranges: Iterable[Range], count: int) -> list[TraceRow]:
-    """Returns the first `count` rows of a query that lie in ranges of time; rows and ranges have the list's order."""
+def read_within(
+    session: Session,
+    query: Select[TraceRow],
+    moment: InstrumentedAttribute[datetime],
+    ranges: Iterable[Range],
+    count: int,
+) -> list[TraceRow]:
+    """Returns the first `count` rows of a query whose column `moment` lies in ranges of time; rows and ranges have the
+    list's order."""
     rows: list[TraceRow] = []
-    left, at_once = iter(ranges), 1
     together = session.get_bind().dialect.name == "postgresql"
+    left, at_once = iter(ranges), FIRST if together else 1
     while len(rows) < count and (part := list(islice(left, at_once))):
         wanted = query.limit(count - len(rows))
-        found = session.scalars(_each(wanted, part) if len(part) > 1 else _one(wanted, part[0]))
+        found = session.scalars(_each(wanted, moment, part) if len(part) > 1 else _one(wanted, moment, part[0]))
         rows += islice(found, count - len(rows))
         at_once = min(4 * at_once, MOST) if together else 1
     return rows
 
 
-def _one(query: Select[TraceRow], within: Range) -> Select[TraceRow]:
-    return query.where(TraceRow.created >= within[0], TraceRow.created < within[1])
+def _one(query: Select[TraceRow], moment: InstrumentedAttribute[datetime], within: Range) -> Select[TraceRow]:
+    return query.where(moment >= within[0], moment < within[1])
 
 
-def _each(query: Select[TraceRow], ranges: Sequence[Range]) -> Select[TraceRow]:
+def _each(
+    query: Select[TraceRow], moment: InstrumentedAttribute[datetime], ranges: Sequence[Range]
+) -> Select[TraceRow]:
     """Asks PostgreSQL for several ranges at once, each through the list's index: an answer takes longer to come than
     to find. (`OR` leaves it to the planner, which may read the whole list.)"""
     begins, beyonds = (
@@ -125,7 +135,7 @@ def _each(query: Select[TraceRow], ranges: Sequence[Range]) -> Select[TraceRow]:
         for moments in zip(*ranges, strict=True)
     )
     times = func.unnest(begins, beyonds).table_valued(column("begin"), column("beyond"), name="times").render_derived()
-    within = query.where(TraceRow.created >= times.c.begin, TraceRow.created < times.c.beyond)
+    within = query.where(moment >= times.c.begin, moment < times.c.beyond)
     found = aliased(TraceRow, within.lateral())
     joined = select(found).select_from(times).join(found, true())
     return joined.order_by(found.created.desc(), found.id.desc())
