@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -90,7 +91,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
             traces_size=room.size,
             traces=count,
             database=make_url(services.store.url).get_backend_name(),
-            database_size=file.stat().st_size if file is not None and file.is_file() else None,
+            database_size=None if file is None else _size_of(file),
         ),
         warnings=tuple(services.warnings()),
         live_clients=sum(rig.hub.clients for rig in services.robots()),
@@ -100,6 +101,15 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         unattended=any(rig.unattended for rig in services.robots()),
         stop_port=services.stop_port,
     )
+
+
+def _size_of(file: Path) -> int | None:
+    """Returns the size (bytes) of SQLite's file and of the log beside it, which holds what was written last."""
+    sizes = []
+    for path in (file, file.with_name(f"{file.name}-wal")):
+        with suppress(FileNotFoundError):
+            sizes.append(path.stat().st_size)
+    return sum(sizes) if sizes else None
 
 
 def _checks(services: Services) -> dict[str, str]:

@@ -11,10 +11,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 from itertools import islice, pairwise
 
-from sqlalchemy import ARRAY, DateTime, Select, column, func, insert, literal, select, true
-from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
+from sqlalchemy import (
+    ARRAY,
+    DateTime,
+    Executable,
+    Integer,
+    Select,
+    bindparam,
+    column,
+    func,
+    insert,
+    inspect,
+    literal,
+    select,
+    true,
+)
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from server.store.tables import TraceRow, TraceStretchRow
 
@@ -78,13 +93,27 @@ def stretches_with(
     session: Session, robot: str, terms: Sequence[str], within: tuple[int, int], most: int | None = None
 ) -> list[int]:
     """Returns the stretches from one to another that have all these terms, the newest first: `most` of them at most."""
-    rows = [aliased(TraceStretchRow) for _ in terms]
-    of_each = [(one.robot == robot) & (one.term == term) for one, term in zip(rows, terms, strict=True)]
-    stretch = rows[0].stretch
-    query = select(stretch).where(of_each[0], stretch >= within[0], stretch <= within[1])
+    values: dict[str, object] = {f"term{number}": term for number, term in enumerate(terms)}
+    values.update(robot=robot, oldest=within[0], newest=within[1])
+    if most is not None:
+        values["most"] = most
+    return list(session.scalars(_stretches(len(terms), limited=most is not None), values))
+
+
+@lru_cache
+def _stretches(count: int, *, limited: bool) -> Select[int]:
+    """The query for so many terms. To put it together takes the client longer than PostgreSQL needs to answer it."""
+    table = inspect(TraceStretchRow).local_table
+    rows = [table.alias() for _ in range(count)]
+    of_each = [
+        (row.c.robot == bindparam("robot")) & (row.c.term == bindparam(f"term{n}")) for n, row in enumerate(rows)
+    ]
+    stretch = rows[0].c.stretch
+    query = select(stretch).where(of_each[0], stretch.between(bindparam("oldest"), bindparam("newest")))
     for row, of_term in zip(rows[1:], of_each[1:], strict=True):
-        query = query.where(select(row.stretch).where(of_term, row.stretch == stretch).exists())
-    return list(session.scalars(query.order_by(stretch.desc()).limit(most)))
+        query = query.where(select(row.c.stretch).where(of_term, row.c.stretch == stretch).exists())
+    query = query.order_by(stretch.desc())
+    return query.limit(bindparam("most", type_=Integer)) if limited else query
 
 
 def ranges_of(stretches: Iterable[int]) -> Iterator[Range]:
@@ -125,9 +154,7 @@ def _one(query: Select[TraceRow], moment: InstrumentedAttribute[datetime], withi
     return query.where(moment >= within[0], moment < within[1])
 
 
-def _each(
-    query: Select[TraceRow], moment: InstrumentedAttribute[datetime], ranges: Sequence[Range]
-) -> Select[TraceRow]:
+def _each(query: Select[TraceRow], moment: InstrumentedAttribute[datetime], ranges: Sequence[Range]) -> Executable:
     """Asks PostgreSQL for several ranges at once, each through the list's index: an answer takes longer to come than
     to find. (`OR` leaves it to the planner, which may read the whole list.)"""
     begins, beyonds = (
@@ -135,10 +162,9 @@ def _each(
         for moments in zip(*ranges, strict=True)
     )
     times = func.unnest(begins, beyonds).table_valued(column("begin"), column("beyond"), name="times").render_derived()
-    within = query.where(moment >= times.c.begin, moment < times.c.beyond)
-    found = aliased(TraceRow, within.lateral())
+    found = query.where(moment >= times.c.begin, moment < times.c.beyond).lateral()
     joined = select(found).select_from(times).join(found, true())
-    return joined.order_by(found.created.desc(), found.id.desc())
+    return select(TraceRow).from_statement(joined.order_by(found.c.created.desc(), found.c.id.desc()))
 
 
 def _time_of(stretch: int) -> datetime:
