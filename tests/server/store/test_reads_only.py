@@ -27,6 +27,11 @@ RAMP = {
 }
 
 
+def _daq(url: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """What a command says at a service."""
+    return subprocess.run([*DAQ, "--server", url, *words], capture_output=True, text=True, check=False)
+
+
 @contextmanager
 def _beside(folder: Path, database: str) -> Iterator[tuple[Service, Service]]:
     """The service that owns the arm, and one that only reads, with the same folders."""
@@ -60,6 +65,12 @@ def test_one_service_owns_the_arm_and_the_other_reads(postgresql: PostgresServer
         assert "first" in reader.robot.get(f"/traces/{trace}").text
         assert reader.client.get("/audit").json() == owner.client.get("/audit").json()
 
+        (robot,) = reader.client.get("/robots").json()  # by which clients learn its name
+        assert (robot["robot"], robot["connection"], robot["arm"]) == ("ma2000", "elsewhere", None)
+        by_command = _daq(reader.url, "traces", "ls")
+        assert by_command.returncode == 0, by_command.stderr
+        assert trace[:6] in by_command.stdout
+
         # It changes nothing, shows nothing of the arm, and says who does.
         for answer in (
             reader.robot.post("/experiments", json=RAMP),
@@ -74,6 +85,9 @@ def test_one_service_owns_the_arm_and_the_other_reads(postgresql: PostgresServer
             assert answer.status_code == 409, answer.request.url
             assert answer.json()["type"] == "docs/service.md#reads-only"
             assert owner.url in answer.json()["advice"]
+        stop = _daq(reader.url, "stop")
+        assert (stop.returncode, "NOT DELIVERED" in stop.stderr + stop.stdout) == (3, True)
+        assert owner.url in stop.stderr + stop.stdout
         assert owner.url in reader.client.get("/system").json()["warnings"][0]
         assert reader.client.get(f"{reader.url}/readyz").json()["status"] == "ok"
         assert owner.status()["arm"] == "idle"  # the stop that was refused has stopped nothing
