@@ -103,7 +103,7 @@ def fill(folder: Path, database: str, count: int) -> None:
     made = list(rows(count, random_))
     for first in range(0, count, BATCH):
         part = made[first : first + BATCH]
-        tags = [{"trace": row["id"], "tag": random_.choice(TAGS)} for row in part]
+        tags = [{"trace": row["id"], "tag": random_.choice(TAGS), "created": row["created"]} for row in part]
         for row, tag in zip(part, tags, strict=True):
             row["searched"] += f"\n{tag['tag']}"
         with store.writing() as session:

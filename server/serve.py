@@ -6,9 +6,11 @@ import signal
 import socket
 from collections.abc import Callable
 from contextlib import closing, suppress
+from dataclasses import replace
 from types import FrameType
 
 import uvicorn
+from fastapi import FastAPI
 
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
@@ -41,8 +43,11 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal comes. Calls `ready` with the address. Raises ListenError, InUseError, StoreError,
     SpecError, StopDoorError."""
     section = settings.server
+    if section.reads_only:
+        _serve_reading(settings, ready)
+        return
     with (
-        sole_use(section.database_url),
+        sole_use(section.database_url) as tell_name,
         listening(section) as (listener, beside),
         # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
@@ -55,23 +60,9 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             raise
         door.set_tokens(services.tokens.callers(services.clock.utc()))
         _tell_sessions(services, gate, door)
-        app = make_app(services, gate)
-        config = uvicorn.Config(
-            app,
-            log_config=None,
-            access_log=False,
-            lifespan="on",
-            timeout_graceful_shutdown=GRACE,
-            timeout_keep_alive=KEEP_ALIVE,
-            http=Connection,
-            ws="websockets-sansio",
-            ws_per_message_deflate=False,
-            ws_max_size=65536,
-            server_header=False,
-        )
-        host, port = listener.getsockname()[:2]
-        address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+        config, address = _configuration(make_app(services, gate)), _address_of(listener)
         _connect(services, door, beside)
+        tell_name(f"{address} at {socket.gethostname()}")
 
         def ending() -> None:
             for rig in services.robots():
@@ -84,6 +75,44 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         door.wait_ready()
         with suppress(KeyboardInterrupt):  # by then the web server has ended in order
             _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
+
+
+def _serve_reading(settings: Settings, ready: Callable[[str], None]) -> None:
+    """Does the same for a service that only reads: without lock, stop listener and audit log."""
+    with listening(settings.server) as (listener, beside):
+        beside.close()  # no stop listener: it has no arm to stop
+        services = Services(settings)
+        try:
+            gate = replace(_gate(services, settings.server, 0), stop_port=None, audit=None)
+        except SpecError:
+            services.close()
+            raise
+        config, address = _configuration(make_app(services, gate)), _address_of(listener)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with suppress(KeyboardInterrupt):
+            ending = EndInTime(services.end_processes).arm
+            _Server(config, lambda: ready(address), services.end_processes, ending).run([listener])
+
+
+def _configuration(app: FastAPI) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        log_config=None,
+        access_log=False,
+        lifespan="on",
+        timeout_graceful_shutdown=GRACE,
+        timeout_keep_alive=KEEP_ALIVE,
+        http=Connection,
+        ws="websockets-sansio",
+        ws_per_message_deflate=False,
+        ws_max_size=65536,
+        server_header=False,
+    )
+
+
+def _address_of(listener: socket.socket) -> str:
+    host, port = listener.getsockname()[:2]
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}"
 
 
 def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:

@@ -20,7 +20,11 @@ ANSWER_WITHIN = 3.0
 """Time-out (s) for one address; the service itself answers within 1.1 s, whatever the link does."""
 
 
-class NoSuchRobot(StopResult):
+class RefusedStop(StopResult):
+    """The service has answered, and says why it does not stop."""
+
+
+class NoSuchRobot(RefusedStop):
     """The service has answered, and has no robot of this name."""
 
 
@@ -57,9 +61,10 @@ def stop(addresses: Sequence[str], path: str, token: str | None, kind: type[Stop
     return max(answers, key=_tells)
 
 
-def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool]:
-    """Rank of an answer: the higher, the more it confirms."""
-    return answer.confirmed, answer.delivered, answer.seconds > 0, isinstance(answer, NoSuchRobot)
+def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool, bool]:
+    """Rank of an answer: the higher, the more it confirms, or says of why it does not."""
+    refused, is_unknown = isinstance(answer, RefusedStop), isinstance(answer, NoSuchRobot)
+    return answer.confirmed, answer.delivered, answer.seconds > 0, is_unknown, refused
 
 
 def _ask(url: str, headers: dict[str, str], kind: type[StopResult]) -> StopResult:
@@ -73,7 +78,7 @@ def _ask(url: str, headers: dict[str, str], kind: type[StopResult]) -> StopResul
             return kind.model_validate_json(response.content, extra="ignore")
         problem = ProblemDetails.model_validate_json(response.content)
         why = f"{problem.detail}; {problem.advice}".strip("; ")
-        return _undelivered(why, NoSuchRobot if problem.status == 404 else StopResult)
+        return _undelivered(why, NoSuchRobot if problem.status == 404 else RefusedStop)
     except ValidationError:
         return _undelivered(f"{url}: answers {response.status_code}, but is no such service")
 

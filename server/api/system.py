@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
 from server.services import Services
+from server.store.address import StoreError
 from server.store.tables import TraceRow
 
 plain = APIRouter(tags=["system"])
@@ -89,7 +91,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
             traces_size=room.size,
             traces=count,
             database=make_url(services.store.url).get_backend_name(),
-            database_size=file.stat().st_size if file is not None and file.is_file() else None,
+            database_size=None if file is None else _size_of(file),
         ),
         warnings=tuple(services.warnings()),
         live_clients=sum(rig.hub.clients for rig in services.robots()),
@@ -101,7 +103,18 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     )
 
 
+def _size_of(file: Path) -> int | None:
+    """Returns the size (bytes) of SQLite's file and of the log beside it, which holds what was written last."""
+    sizes = []
+    for path in (file, file.with_name(f"{file.name}-wal")):
+        with suppress(FileNotFoundError):
+            sizes.append(path.stat().st_size)
+    return sum(sizes) if sizes else None
+
+
 def _checks(services: Services) -> dict[str, str]:
+    if services.reads_only:
+        return _checks_of_reading(services)
     checks = {"database": ""}
     file = _database_file(services)
     try:
@@ -118,6 +131,19 @@ def _checks(services: Services) -> dict[str, str]:
         if rig.archive is not None:
             checks[f"archive of {rig.robot.name}"] = "; ".join(rig.archive.warnings(services.settings.traces.warn_at))
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
+    return checks
+
+
+def _checks_of_reading(services: Services) -> dict[str, str]:
+    """What a service that only reads needs: tables of its version, and the folders. It writes neither."""
+    checks = {"database": ""}
+    try:
+        services.store.require_version()
+    except StoreError as error:
+        checks["database"] = one_line(error)
+    for rig in services.robots():
+        name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
+        checks[name] = "" if rig.catalogue.folder.is_dir() else f"{rig.catalogue.folder}: there is no such folder"
     return checks
 
 

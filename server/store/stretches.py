@@ -11,10 +11,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 from itertools import islice, pairwise
 
-from sqlalchemy import ARRAY, DateTime, Select, column, func, insert, literal, select, true
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy import (
+    ARRAY,
+    DateTime,
+    Executable,
+    Integer,
+    Select,
+    bindparam,
+    column,
+    func,
+    insert,
+    inspect,
+    literal,
+    select,
+    true,
+)
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from server.store.tables import TraceRow, TraceStretchRow
 
@@ -28,8 +43,9 @@ MOST_TERMS = 8
 PARTS = (8, 64, 512, None)
 """Number of stretches that are looked for, and read, one part after the other; None for all that are left. A text that
 many traces have is in the first ones."""
-MOST = 32
-"""Number of ranges that PostgreSQL is asked for at once: one first, then four times as many each time."""
+FIRST, MOST = 8, 64
+"""Number of ranges that PostgreSQL is asked for at once at first, and at most: four times as many each time. What many
+traces have is in one range, since its stretches are neighbours."""
 AT_A_TIME = 500
 """Number of terms that one statement asks for: SQLite takes 32 766 values, and older ones 999."""
 Range = tuple[datetime, datetime]
@@ -77,13 +93,27 @@ def stretches_with(
     session: Session, robot: str, terms: Sequence[str], within: tuple[int, int], most: int | None = None
 ) -> list[int]:
     """Returns the stretches from one to another that have all these terms, the newest first: `most` of them at most."""
-    rows = [aliased(TraceStretchRow) for _ in terms]
-    of_each = [(one.robot == robot) & (one.term == term) for one, term in zip(rows, terms, strict=True)]
-    stretch = rows[0].stretch
-    query = select(stretch).where(of_each[0], stretch >= within[0], stretch <= within[1])
+    values: dict[str, object] = {f"term{number}": term for number, term in enumerate(terms)}
+    values.update(robot=robot, oldest=within[0], newest=within[1])
+    if most is not None:
+        values["most"] = most
+    return list(session.scalars(_stretches(len(terms), limited=most is not None), values))
+
+
+@lru_cache
+def _stretches(count: int, *, limited: bool) -> Select[int]:
+    """The query for so many terms. To put it together takes the client longer than PostgreSQL needs to answer it."""
+    table = inspect(TraceStretchRow).local_table
+    rows = [table.alias() for _ in range(count)]
+    of_each = [
+        (row.c.robot == bindparam("robot")) & (row.c.term == bindparam(f"term{n}")) for n, row in enumerate(rows)
+    ]
+    stretch = rows[0].c.stretch
+    query = select(stretch).where(of_each[0], stretch.between(bindparam("oldest"), bindparam("newest")))
     for row, of_term in zip(rows[1:], of_each[1:], strict=True):
-        query = query.where(select(row.stretch).where(of_term, row.stretch == stretch).exists())
-    return list(session.scalars(query.order_by(stretch.desc()).limit(most)))
+        query = query.where(select(row.c.stretch).where(of_term, row.c.stretch == stretch).exists())
+    query = query.order_by(stretch.desc())
+    return query.limit(bindparam("most", type_=Integer)) if limited else query
 
 
 def ranges_of(stretches: Iterable[int]) -> Iterator[Range]:
@@ -100,24 +130,31 @@ def ranges_of(stretches: Iterable[int]) -> Iterator[Range]:
         yield _time_of(oldest), _time_of(newest + 1)
 
 
-def read_within(session: Session, query: Select[TraceRow], ranges: Iterable[Range], count: int) -> list[TraceRow]:
-    """Returns the first `count` rows of a query that lie in ranges of time; rows and ranges have the list's order."""
+def read_within(
+    session: Session,
+    query: Select[TraceRow],
+    moment: InstrumentedAttribute[datetime],
+    ranges: Iterable[Range],
+    count: int,
+) -> list[TraceRow]:
+    """Returns the first `count` rows of a query whose column `moment` lies in ranges of time; rows and ranges have the
+    list's order."""
     rows: list[TraceRow] = []
-    left, at_once = iter(ranges), 1
     together = session.get_bind().dialect.name == "postgresql"
+    left, at_once = iter(ranges), FIRST if together else 1
     while len(rows) < count and (part := list(islice(left, at_once))):
         wanted = query.limit(count - len(rows))
-        found = session.scalars(_each(wanted, part) if len(part) > 1 else _one(wanted, part[0]))
+        found = session.scalars(_each(wanted, moment, part) if len(part) > 1 else _one(wanted, moment, part[0]))
         rows += islice(found, count - len(rows))
         at_once = min(4 * at_once, MOST) if together else 1
     return rows
 
 
-def _one(query: Select[TraceRow], within: Range) -> Select[TraceRow]:
-    return query.where(TraceRow.created >= within[0], TraceRow.created < within[1])
+def _one(query: Select[TraceRow], moment: InstrumentedAttribute[datetime], within: Range) -> Select[TraceRow]:
+    return query.where(moment >= within[0], moment < within[1])
 
 
-def _each(query: Select[TraceRow], ranges: Sequence[Range]) -> Select[TraceRow]:
+def _each(query: Select[TraceRow], moment: InstrumentedAttribute[datetime], ranges: Sequence[Range]) -> Executable:
     """Asks PostgreSQL for several ranges at once, each through the list's index: an answer takes longer to come than
     to find. (`OR` leaves it to the planner, which may read the whole list.)"""
     begins, beyonds = (
@@ -125,10 +162,9 @@ def _each(query: Select[TraceRow], ranges: Sequence[Range]) -> Select[TraceRow]:
         for moments in zip(*ranges, strict=True)
     )
     times = func.unnest(begins, beyonds).table_valued(column("begin"), column("beyond"), name="times").render_derived()
-    within = query.where(TraceRow.created >= times.c.begin, TraceRow.created < times.c.beyond)
-    found = aliased(TraceRow, within.lateral())
+    found = query.where(moment >= times.c.begin, moment < times.c.beyond).lateral()
     joined = select(found).select_from(times).join(found, true())
-    return joined.order_by(found.created.desc(), found.id.desc())
+    return select(TraceRow).from_statement(joined.order_by(found.c.created.desc(), found.c.id.desc()))
 
 
 def _time_of(stretch: int) -> datetime:

@@ -178,9 +178,12 @@ class TraceTagRow(Table):
     """One tag of a trace."""
 
     __tablename__ = "trace_tags"
+    __table_args__ = (Index("trace_tags_listed", "tag", "created", "trace"),)
 
     trace: Mapped[str] = mapped_column(ForeignKey("traces.id", ondelete="CASCADE"), primary_key=True)
-    tag: Mapped[str] = mapped_column(String(40), primary_key=True, index=True)
+    tag: Mapped[str] = mapped_column(String(40), primary_key=True)
+    created: Mapped[datetime] = mapped_column(server_default="1970-01-01 00:00:00")
+    """When its trace was recorded: traces with a tag are read in the order of the list."""
 
 
 class TraceStretchRow(Table):

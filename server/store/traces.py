@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import Select, delete, func, or_, select, text, update
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Page
@@ -34,6 +34,9 @@ TRIGRAM = 3
 """Number of characters of the shortest text that an index of trigrams finds."""
 FEW = 2000
 """Number of traces up to which a search fetches all that match, and sorts them."""
+FULL_BY = 8
+"""A search of a tag whose first part fills an eighth of the page reads on: the trigrams of a text that so many have
+take longer."""
 _FEW_OF_SQLITE = text(
     "SELECT trace FROM trace_numbers JOIN trace_words ON number = trace_words.rowid"
     " WHERE trace_words MATCH :phrase LIMIT :most"
@@ -100,6 +103,7 @@ class TraceStore:
                 tags = _tags(session, [row.id]).get(row.id, ())
                 for name in columns.keys() - {"notes", "experiment"}:
                     setattr(row, name, columns[name])
+                session.execute(update(TraceTagRow).filter_by(trace=row.id).values(created=row.created))
             else:
                 line = f"{new.label} is in the catalogue already, as {row.file}"
                 raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
@@ -180,7 +184,8 @@ class TraceStore:
         self, session: Session, robot: str, search: TraceSearch, place: Cursor | None, count: int
     ) -> list[TraceRow]:
         """Returns the first rows that a search finds after a place of the list, the newest first."""
-        query = _query(search, place, session.get_bind().dialect.name)
+        dialect = session.get_bind().dialect.name
+        query, listed = _query(search, place, dialect), _listed(search, dialect)
         of_robot = query.where(TraceRow.robot == robot)
         terms = terms_asked(_texts(search))
         if not terms:
@@ -188,13 +193,16 @@ class TraceStore:
         until = min(search.until or LATEST, LATEST if place is None else place.moment)
         oldest, newest = stretch_of(search.since or EARLIEST), stretch_of(until)
         rows: list[TraceRow] = []
-        for at_once in PARTS:
+        of_tags = _reads_tags(search, dialect)
+        parts = PARTS[1:] if of_tags else PARTS  # a tag leaves few rows of each stretch
+        for at_once in parts:
             stretches = stretches_with(session, robot, terms, (oldest, newest), at_once)
-            rows += read_within(session, of_robot, ranges_of(stretches), count - len(rows))
+            rows += read_within(session, of_robot, listed[0], ranges_of(stretches), count - len(rows))
             if len(rows) == count or at_once is None or len(stretches) < at_once:
                 return rows
             newest = stretches[-1] - 1
-            few = self._few_of(session, search) if at_once == PARTS[0] else None
+            goes_on = at_once != parts[0] or (of_tags and len(rows) * FULL_BY >= count)
+            few = None if goes_on else self._few_of(session, search)
             if few is not None:
                 # Not `robot = …`: without statistics SQLite takes that for the narrower choice, and reads all of it.
                 of_few = query.where(TraceRow.id.in_(few), func.coalesce(TraceRow.robot, "") == robot)
@@ -203,7 +211,7 @@ class TraceStore:
 
     def _few_of(self, session: Session, search: TraceSearch) -> list[str] | None:
         """Returns the identities of all traces with the text, or with the tag, of a search, if they are FEW at most."""
-        if search.tag is not None:
+        if search.tag is not None and not _reads_tags(search, session.get_bind().dialect.name):
             tagged = select(TraceTagRow.trace).filter_by(tag=search.tag).limit(FEW + 1)
             found = list(session.scalars(tagged))
             if len(found) <= FEW:
@@ -236,7 +244,7 @@ class TraceStore:
             if change.tags is not None:
                 session.execute(delete(TraceTagRow).filter_by(trace=row.id))
                 for tag in dict.fromkeys(change.tags):
-                    session.add(TraceTagRow(trace=row.id, tag=tag))
+                    session.add(TraceTagRow(trace=row.id, tag=tag, created=row.created))
             session.flush()
             tags = _tags(session, [row.id]).get(row.id, ())
             _write_searched(session, row, tags)
@@ -281,9 +289,29 @@ def _archived(session: Session, identities: list[str]) -> set[str]:
     return set(session.scalars(query))
 
 
+Listed = tuple[InstrumentedAttribute[datetime], InstrumentedAttribute[str]]
+"""The columns of the list's order: when a trace was recorded, and its number."""
+
+
+def _reads_tags(search: TraceSearch, dialect: str) -> bool:
+    """Whether a search reads the table of tags in the list's order, and of the traces those with the tag alone."""
+    return search.tag is not None and dialect == "postgresql"
+
+
+def _listed(search: TraceSearch, dialect: str) -> Listed:
+    """Returns the columns by which a search reads the list."""
+    if _reads_tags(search, dialect):
+        return TraceTagRow.created, TraceTagRow.trace
+    return TraceRow.created, TraceRow.id
+
+
 def _query(search: TraceSearch, place: Cursor | None, dialect: str) -> Select[TraceRow]:
     """The traces of all robots that a search finds after a place of the list, the newest first."""
     query = select(TraceRow)
+    created, identity = _listed(search, dialect)
+    if _reads_tags(search, dialect):
+        query = query.select_from(TraceTagRow).join(TraceRow, TraceRow.id == TraceTagRow.trace)
+        query = query.where(TraceTagRow.tag == search.tag)
     for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
         if wanted is not None:
             query = query.where(getattr(TraceRow, column) == wanted)
@@ -291,20 +319,19 @@ def _query(search: TraceSearch, place: Cursor | None, dialect: str) -> Select[Tr
     searched = TraceRow.searched.collate("C") if dialect == "postgresql" else TraceRow.searched
     if search.text:
         query = query.where(searched.contains(search.text.lower(), autoescape=True))
-    if search.tag is not None:
-        # The text holds each tag in a line of its own, so the table of tags is asked of hardly any other trace. OFFSET:
-        # else PostgreSQL reads all traces with the tag first, for each stretch anew.
+    if search.tag is not None and not _reads_tags(search, dialect):
+        # The text holds each tag in a line of its own, so the table of tags is asked of hardly any other trace.
         tagged = select(TraceTagRow.tag).where(TraceTagRow.trace == TraceRow.id, TraceTagRow.tag == search.tag)
-        query = query.where(searched.contains(f"\n{search.tag.lower()}", autoescape=True), tagged.offset(0).exists())
+        query = query.where(searched.contains(f"\n{search.tag.lower()}", autoescape=True), tagged.exists())
     if search.since is not None:
-        query = query.where(TraceRow.created >= search.since)
+        query = query.where(created >= search.since)
     if search.until is not None:
-        query = query.where(TraceRow.created < search.until)
+        query = query.where(created < search.until)
     if place is not None:
         # No comparison of pairs: PostgreSQL would begin to read there, though a stretch begins much later.
-        query = query.where(TraceRow.created <= place.moment)
-        query = query.where(or_(TraceRow.created < place.moment, TraceRow.id < place.identity))
-    return query.order_by(TraceRow.created.desc(), TraceRow.id.desc())
+        query = query.where(created <= place.moment)
+        query = query.where(or_(created < place.moment, identity < place.identity))
+    return query.order_by(created.desc(), identity.desc())
 
 
 def _texts(search: TraceSearch) -> list[str]:

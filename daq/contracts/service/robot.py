@@ -104,8 +104,10 @@ class RobotSummary(Wire):
 
     robot: str
     machine: str
-    connection: ConnectionState
-    arm: ArmState
+    connection: ConnectionState | Literal["elsewhere"]
+    """`elsewhere`: this service only reads, and another one owns the arm."""
+    arm: ArmState | None
+    """None where that is not known here."""
 
 
 class StopResult(Wire):

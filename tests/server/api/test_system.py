@@ -128,3 +128,12 @@ def test_a_calibration_is_checked_and_queued_as_any_experiment(
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: full)
     assert asked().json()["type"] == "docs/service.md#no-room"
     assert [one["id"] for one in api.get("queue/experiments").json()] == [first.json()["id"]]
+
+
+def test_the_size_of_the_database_counts_what_was_written_last(api: httpx.Client, tmp_path: Path) -> None:
+    for _ in range(20):
+        api.post("/experiments", json={}).raise_for_status()  # SQLite writes them to its log first
+    log = tmp_path / "service" / "service.sqlite-wal"
+    assert log.stat().st_size > 0
+    told = api.get(api.base_url.join("/api/v1/system")).json()["storage"]["database_size"]
+    assert told >= log.stat().st_size

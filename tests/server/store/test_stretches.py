@@ -40,10 +40,12 @@ def _found(traces: TraceStore, search: TraceSearch, limit: int) -> list[int]:
     return seen
 
 
-def _matches(trace: NewTrace, search: TraceSearch) -> bool:
-    text = "\n".join((trace.id, trace.file, trace.kind or "", trace.notes, trace.source, str(trace.outcome))).lower()
+def _matches(trace: NewTrace, tag: str, search: TraceSearch) -> bool:
+    texts = (trace.id, trace.file, trace.kind or "", trace.notes, trace.source, str(trace.outcome), tag)
+    text = "\n".join(texts).lower()
     return (
-        (search.text or "").lower() in text
+        search.tag in (None, tag)
+        and (search.text or "").lower() in text
         and search.kind in (None, trace.kind)
         and search.outcome in (None, trace.outcome)
         and (search.since is None or trace.created >= search.since)
@@ -55,8 +57,10 @@ def test_a_search_finds_what_reading_all_traces_finds(store: Store, monkeypatch:
     monkeypatch.setattr("server.store.traces.FEW", 7)
     random_ = random.Random(11)
     traces, made = TraceStore(store), _made(120, random_)
+    tags = {trace.id: random_.choice(("good", "Week 3")) for trace in made}
     for trace in made:
         traces.insert(trace)
+        traces.change("ma2000", trace.id, TraceChange(tags=(tags[trace.id],)))
     newest_first = sorted(made, key=lambda one: (one.created, one.id), reverse=True)
     for text in (None, "b", "7", "ü", "%", "_", "zz", "q", "lt", "0 ", "a_", "elb", "belt", "ünit 7 x", "nothing"):
         since = random_.choice((None, NOW + timedelta(days=100)))
@@ -65,10 +69,11 @@ def test_a_search_finds_what_reading_all_traces_finds(store: Store, monkeypatch:
             text=text,
             kind=random_.choice((None, "sine", "none")),
             outcome=random_.choice((None, "fault")),
+            tag=random_.choice((None, "Week 3", "week 3", "good")),
             since=since,
             until=until,
         )
-        expected = [int(one.id, 16) for one in newest_first if _matches(one, search)]
+        expected = [int(one.id, 16) for one in newest_first if _matches(one, tags[one.id], search)]
         assert _found(traces, search, random_.choice((3, 10, 200))) == expected, search
 
 
@@ -83,6 +88,9 @@ def test_a_short_text_follows_every_change(store: Store) -> None:
     traces.mark_missing("ma2000", ["1.mcap"], missing=True)
     traces.insert(new_trace(1, notes="", name="wx", created=NOW + timedelta(days=900)), lambda _file: False)
     assert _found(traces, TraceSearch(text="wx"), 10) == [1]
+    later = NOW + timedelta(days=800)
+    assert _found(traces, TraceSearch(tag="Q7", since=later), 10) == [1]
+    assert _found(traces, TraceSearch(tag="Q7", until=later), 10) == []
 
 
 def test_a_trace_of_another_robot_is_not_found(store: Store) -> None:

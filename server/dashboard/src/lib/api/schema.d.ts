@@ -5426,16 +5426,10 @@ export interface components {
             robot: string;
             /** Machine */
             machine: string;
-            /**
-             * Connection
-             * @enum {string}
-             */
-            connection: "disconnected" | "connecting" | "connected" | "lost";
-            /**
-             * Arm
-             * @enum {string}
-             */
-            arm: "disconnected" | "idle" | "armed" | "running" | "stopped" | "fault";
+            /** Connection */
+            connection: ("disconnected" | "connecting" | "connected" | "lost") | "elsewhere";
+            /** Arm */
+            arm: ("disconnected" | "idle" | "armed" | "running" | "stopped" | "fault") | null;
         };
         /**
          * Rod

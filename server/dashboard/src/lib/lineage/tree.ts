@@ -72,7 +72,7 @@ export function lineageTree(found: ModelLineage, machineName: string): LineageNo
       key: `job ${job.id}`,
       kind: 'job',
       id: job.id,
-      label: JOB_NAMES[job.request.kind],
+      label: jobName(job),
       job,
       traces: job.request.traces,
       held: 'held_out' in job.request ? job.request.held_out : [],
@@ -127,6 +127,21 @@ export const JOB_NAMES: Record<Job['request']['kind'], string> = {
   diagnose: 'Diagnosis',
   batch: 'Batch',
 };
+
+const STUDIES = {
+  fit: 'fits',
+  validate: 'validations',
+  simulate: 'simulations',
+  diagnose: 'diagnoses',
+} as const;
+
+/** What a job is: `Fit`, `Batch of fits`. */
+export function jobName(job: Job): string {
+  const { request } = job;
+  return request.kind === 'batch'
+    ? `${JOB_NAMES.batch} of ${STUDIES[request.study.kind]}`
+    : JOB_NAMES[request.kind];
+}
 
 /** The lines that are shown: children of what is closed are not. */
 export function shownRows(
