@@ -118,6 +118,7 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
                     const double p[N][PER_JOINT], const double *body, const long *flags) {
   const double h = duration / steps, reaches[4] = {0, 0.5 * h, 0.5 * h, h}, weights[4] = {1, 2, 2, 1};
   const int tilted = body[17] != 0 || body[18] != 0, is_special = (flags[0] | flags[1] | flags[2]) != 0;
+  const int rubs = p[0][GRAVITY_SHARE] != 0 || p[1][GRAVITY_SHARE] != 0 || p[2][GRAVITY_SHARE] != 0;
   double drive[N], damping[N], soft[N], q[N], v[N], z[N];
   for (int j = 0; j < N; j++) {
     drive[j] = motor_gain(p[j], s[j][RISE]) * volts[j];
@@ -137,6 +138,11 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
       level[0] = p[0][COULOMB] + p[0][COULOMB_ARM] * fabs(along2 * cos(t2) + along3 * cos(t2 + t3));
       level[1] = p[1][COULOMB] + p[1][COULOMB_ARM] * fabs(along2 + along3 * cos(t3));
       level[2] = p[2][COULOMB] + p[2][COULOMB_ARM] * fabs(along3);
+      if (rubs) {
+        double weight[3];
+        gravity_torques(q[0] + dq[0] + p[0][THETA], t2, t3, body, weight);
+        for (int j = 0; j < N; j++) level[j] += p[j][GRAVITY_SHARE] * fabs(weight[j]);
+      }
       double torque[N], y[N], m[9];
       for (int j = 0; j < N; j++) {
         y[j] = deflection(z[j], dq[j], soft[j], p[j][PRESLIDING_SHAPE]);

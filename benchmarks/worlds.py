@@ -76,7 +76,7 @@ def score(truth: Json, answer: Json | None) -> Score:
     if case == "open":
         named = any(len(names) == 1 for names in steps) and verdict != "suspected"
         return Score(honest=verdict in HONEST and not named)
-    known = [{hidden["name"]} for hidden in truth["hidden"]]
+    known = [{_known_as(hidden)} for hidden in truth["hidden"]]
     if case == "pair":
         single = [names for names in steps if len(names) == 1]
         found = [any(names & right for names in single) for right in known]
@@ -90,6 +90,11 @@ def score(truth: Json, answer: Json | None) -> Score:
     return Score(strict, answered, _as_sharp(truth, steps, strict, answered), _same(places, wanted))
 
 
+def _known_as(hidden: Json) -> str:
+    """What the library calls a hidden effect; folders of earlier versions have the name by which it was drawn alone."""
+    return str(hidden.get("known_as") or hidden["name"])
+
+
 def _same(places: Sequence[list[int]], wanted: list[int]) -> bool | None:
     return all(place == wanted for place in places) if places else None
 
@@ -101,7 +106,7 @@ def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) 
     if not rivals or any(rival["name"] == "none" and rival["d_prime"] < TOLD_APART for rival in rivals):
         return None
     untold = {rival["name"] for rival in rivals if rival["d_prime"] < TOLD_APART}
-    right = {truth["hidden"][0]["name"]}
+    right = {_known_as(truth["hidden"][0])}
     if not untold - right:
         return strict
     return strict or (answered and all(names <= untold | right for names in steps))
@@ -187,7 +192,7 @@ def main() -> int:
         for kind in chosen:
             truth, answer, seconds = judged(folder, kind, seed, asked.case, sharp=asked.sharpness)
             scores[kind].append(score(truth, answer))
-            hidden = ", ".join(f"{one['name']} {one['joint'] or ''}" for one in truth["hidden"]) or truth["case"]
+            hidden = ", ".join(f"{_known_as(one)} {one['joint'] or ''}" for one in truth["hidden"]) or truth["case"]
             said = answer["verdict"] if answer else "failed"
             names = "; ".join(" | ".join(sorted(names)) for names in names_of(answer or {"steps": []}))
             print(f"{kind} {seed}: {hidden} -> {said}: {names} ({seconds:.0f} s)", flush=True)

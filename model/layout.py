@@ -53,6 +53,7 @@ SHARED = 10
     VISCOUS,  # N·m·s/rad, motor side
     COULOMB,  # N·m at the joint
     COULOMB_ARM,  # m
+    GRAVITY_SHARE,  # of the gravity torque
     PRESLIDING,  # rad
     PRESLIDING_SHAPE,  # 0 Prandtl, 1 Dahl
     STRIBECK,  # N·m
@@ -92,7 +93,7 @@ SHARED = 10
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(71)
+) = range(72)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS

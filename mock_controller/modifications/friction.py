@@ -63,6 +63,25 @@ class LoadDependentFriction:
 
 
 @dataclass
+class GravityTorqueFriction:
+    """At `joint`, a `share` of the torque with which gravity loads it is Coulomb friction more.
+
+    Gravity's torque is taken of the rigid bodies as they are, with payload, shifted masses and a base that leans; the
+    arm's own bristle carries the friction.
+    """
+
+    name: ClassVar[str] = "gravity_torque_friction"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "level + μ |gravity's torque|"
+    source: ClassVar[str] = "load torque in Bittencourt and Gunnarsson (2012), J. Dyn. Sys. Meas. Control 134(5)"
+    joint: int = joint_parameter()
+    share: float = parameter(0.0, 1.0, null=0.0)
+
+    def friction_under_gravity(self, level: float, weight: float) -> float:
+        return level + self.share * abs(weight)
+
+
+@dataclass
 class StribeckFriction:
     """At `joint`, `torque` more at rest, which fades as the joint gets faster than `speed`."""
 
@@ -139,6 +158,7 @@ SHARED: tuple[type[Any], ...] = (
     ViscousFriction,
     CoulombFriction,
     LoadDependentFriction,
+    GravityTorqueFriction,
     StribeckFriction,
     Stiction,
     DirectionDependentFriction,

@@ -37,6 +37,12 @@ FRICTION = (
         parameters=(EffectParameter("arm", at.COULOMB_ARM, "m", low=0.0, high=1.0, deviation=0.043),),
     ),
     Effect(
+        "gravity_torque_friction",
+        physics="τ = −μ |G(q)| z: friction in proportion to the torque that gravity asks of the joint",
+        source="Bittencourt and Gunnarsson 2012, J. Dyn. Sys. Meas. Control 134(5): friction by load torque",
+        parameters=(EffectParameter("share", at.GRAVITY_SHARE, "1", low=0.0, high=1.0, deviation=0.1),),
+    ),
+    Effect(
         "stribeck_friction",
         physics="τ = −F_s exp(−|q̇|/V) z: friction F_s above its value at speed, falling over V",
         source="(7.31)",

@@ -34,7 +34,7 @@ CONTACT_SHARE = 0.02
 """Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
 SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
-FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM)
+FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM, at.GRAVITY_SHARE)
 
 
 @dataclass(frozen=True)

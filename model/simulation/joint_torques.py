@@ -16,7 +16,7 @@ from model import layout as at
 from model.arrays import Array
 from model.drives.magnet import back_emf_constant, torque_constant
 from model.drives.piecewise import clamped, magnitude, outside
-from model.dynamics.compilation import inlined, internal
+from model.dynamics.compilation import borrowing, inlined, internal
 from model.dynamics.dual import sin_cos
 
 RESTICK_SPEED = 1e-3
@@ -47,6 +47,15 @@ def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
     kept = 1.0 / (1.0 + y * rise)
     gain = x * rise * kept
     return clamped(z * kept + (gain if displacement.real >= 0.0 else -gain), 1.0 + 0.0 * z)
+
+
+@borrowing
+def rubs_under_gravity(joints: Array) -> bool:
+    """Whether the friction of any joint goes with its gravity torque."""
+    found = False
+    for j in range(joints.shape[0]):
+        found = found or joints[j, at.GRAVITY_SHARE] != 0.0
+    return found
 
 
 @inlined

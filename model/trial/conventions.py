@@ -55,6 +55,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "viscous_friction": _viscous,
     "coulomb_friction": _same(torque="torque"),
     "load_dependent_friction": _load_dependent,
+    "gravity_torque_friction": _same(share="share"),
     "stribeck_friction": _same(torque="torque", speed="speed"),
     "direction_dependent_friction": _same(difference="torque"),
     "weakened_magnet": _same(loss="loss"),

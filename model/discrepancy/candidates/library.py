@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
+import numpy as np
+
 from model import layout as at
 from model.effects.effect import JointScale, Tone
 from model.effects.library import effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.simulation.chain_of_model import gravity_loads
 
 TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
@@ -41,6 +44,12 @@ STICTION_SPEED = 0.045
 ms and 12 bits the joint moves there by less than a count per sample, so that no reading shows the fall."""
 STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
 """Trial values of the speed over which friction falls, rad/s."""
+
+
+GRAVITY_FRICTION = "gravity_torque_friction"
+"""Friction in proportion to a gravity torque."""
+POSTURES, LEAST_CHANGE = 16, 1e-6
+"""Number of postures at which gravity torques are compared, and the relative change that counts as one."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +106,19 @@ def hypotheses(
         for place in places:
             if place and not suits_drive(model.machine, name, place[0]):
                 continue
+            if place and name == GRAVITY_FRICTION and not _gravity_varies(model, place[0]):
+                continue
             found.extend(_variants(_Place(model, name, place, name, scales)))
     return tuple(found)
+
+
+def _gravity_varies(model: Model, joint: int) -> bool:
+    """Whether a joint's gravity torque depends on the posture. Friction that goes with it does nothing where there is
+    none, and is Coulomb friction by a longer name where it is constant."""
+    column = model.machine.modelled_joints.index(joint)
+    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (POSTURES, model.joint_count))
+    torque = np.abs(gravity_loads(model, postures)[:, column])
+    return bool(np.ptp(torque) > LEAST_CHANGE * float(torque.max(initial=0.0)) + 1e-12)
 
 
 def tone(

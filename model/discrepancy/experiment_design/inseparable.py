@@ -29,6 +29,7 @@ _FRICTION = frozenset(
     {
         "coulomb_friction",
         "load_dependent_friction",
+        "gravity_torque_friction",
         "direction_dependent_friction",
         "stribeck_friction",
         "stiction",

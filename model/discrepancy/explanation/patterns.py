@@ -248,6 +248,7 @@ PATTERNS: dict[str, tuple[FindPattern, ...]] = {
     "viscous_friction": (lags_with_speed,),
     "coulomb_friction": (lags_alike,),
     "load_dependent_friction": (lags_under_load, lags_alike),
+    "gravity_torque_friction": (lags_under_load, lags_alike),
     "stribeck_friction": (lags_when_slow, lags_alike),
     "stiction": (sticks, stops_short, lags_when_slow),
     "direction_dependent_friction": (lags_one_way,),

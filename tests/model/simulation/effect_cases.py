@@ -44,6 +44,7 @@ CASES = (
     _of("viscous_friction", "coefficient", (2e-5, 1.2e-4, 1.2e-4), 3),
     _of("coulomb_friction", "torque", (1.2, 2.5, 0.5), 1),
     _of("load_dependent_friction", "arm", (0.4, 0.4, 0.4), 2),
+    _of("gravity_torque_friction", "share", (0.2, 0.2, 0.2), 2),
     _of("stribeck_friction", "torque", (1.4, 2.4, 0.6), 2, speed=0.2),
     _of("stiction", "breakaway", (3.0, 3.6, 1.7), 2),
     _of("direction_dependent_friction", "difference", (0.6, 2.7, 0.7), 3),

@@ -29,6 +29,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "viscous_friction": (2, {"coefficient": 80.0}),
     "coulomb_friction": (3, {"torque": 1.8}),
     "load_dependent_friction": (2, {"arm": 0.6}),
+    "gravity_torque_friction": (2, {"share": 0.4}),
     "stribeck_friction": (1, {"torque": 5.0, "speed": 0.2}),
     "direction_dependent_friction": (3, {"torque": -3.0}),
     "weakened_magnet": (2, {"loss": 0.3}),

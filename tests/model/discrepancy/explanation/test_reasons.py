@@ -45,6 +45,7 @@ SIZES: dict[str, dict[str, float]] = {
     "viscous_friction": {"coefficient": 4e-4},
     "coulomb_friction": {"torque": 4.0},
     "load_dependent_friction": {"arm": 0.6},
+    "gravity_torque_friction": {"share": 0.3},
     "stribeck_friction": {"torque": 4.0, "speed": 0.05},
     "stiction": {"breakaway": 4.0},
     "direction_dependent_friction": {"difference": 4.0},
