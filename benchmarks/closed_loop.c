@@ -72,7 +72,9 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   if (flags & HAS_STICTION) torque -= z * stuck * j[BREAKAWAY];
   if (j[STRIBECK] != 0) torque -= z * j[STRIBECK] * exp(-fabs(v) / j[STRIBECK_SPEED]);
   if (j[DIRECTION] * z > 0) torque -= fabs(j[DIRECTION]) * z;
+  if (j[VISCOUS_DIRECTION] * v > 0) torque -= j[GEAR] * j[GEAR] * fabs(j[VISCOUS_DIRECTION]) * v;
   if (j[GEAR_LOSS] != 0) torque -= z * j[GEAR_LOSS] * fabs(motor);
+  if (j[GEAR_LOSS_DIRECTION] * motor * z > 0) torque -= z * fabs(j[GEAR_LOSS_DIRECTION]) * fabs(motor);
   if (j[RIPPLE_SINE] != 0 || j[RIPPLE_COSINE] != 0)
     torque += j[RIPPLE_SINE] * sin(j[RIPPLE_CYCLES] * q) + j[RIPPLE_COSINE] * cos(j[RIPPLE_CYCLES] * q);
   if (j[SPRING] != 0) torque -= j[SPRING] * (q - j[SPRING_REST]);
@@ -208,7 +210,7 @@ void run(long periods, const double *set_points, const double *noise, const doub
     for (; i > 0 && times[order[i - 1]] > times[j]; i--) order[i] = order[i - 1];
     order[i] = j;
     flags[j] = modes[j];
-    const int extras[] = {STRIBECK, DIRECTION, GEAR_LOSS, RIPPLE_SINE, RIPPLE_COSINE, SPRING, DISTURBANCE_SINE, DISTURBANCE_COSINE};
+    const int extras[] = {STRIBECK, DIRECTION, VISCOUS_DIRECTION, GEAR_LOSS, GEAR_LOSS_DIRECTION, RIPPLE_SINE, RIPPLE_COSINE, SPRING, DISTURBANCE_SINE, DISTURBANCE_COSINE};
     for (unsigned e = 0; e < sizeof extras / sizeof *extras; e++)
       if (p[j][extras[e]] != 0) flags[j] |= HAS_EXTRA_TORQUE;
     for (int k = 0; k < QUEUE; k++) queue[k][j] = first_drive[j];

@@ -83,7 +83,9 @@ def score(truth: Json, answer: Json | None) -> Score:
         no_other = all(any(names & right for right in known) for names in steps)
         return Score(both=verdict == "named" and all(found) and no_other)
     right, joint = known[0], truth["hidden"][0]["joint"]
-    strict = verdict == "named" and bool(steps) and all(len(names) == 1 and names & right for names in steps)
+    part = right | set(truth["hidden"][0].get("beside", ()))
+    strict = verdict == "named" and all(len(names) == 1 and names <= part for names in steps)
+    strict = strict and any(names == right for names in steps)
     answered = any(names & right for names in steps)
     places = [step["joints"] for step in (answer or {}).get("steps", []) if step["adopted"] and step["effect"] in right]
     wanted = [] if joint is None else [joint]

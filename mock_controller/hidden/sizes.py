@@ -121,7 +121,11 @@ SHARED_SIZES: tuple[SizeRange, ...] = (
 """Sizes of the effects whose names are shared, those of `LATER_SIZES` apart. Where a joint is left out, its readings do
 not depend on the effect."""
 
-LATER_SIZES: tuple[SizeRange, ...] = (SizeRange("gravity_torque_friction", "share", _alike(0.06, 0.6), joints=(2, 3)),)
+LATER_SIZES: tuple[SizeRange, ...] = (
+    SizeRange("gravity_torque_friction", "share", _alike(0.06, 0.6), joints=(2, 3)),
+    SizeRange("direction_dependent_viscous_friction", "coefficient", ((12, 60), (30, 80), (5, 30)), signed=True),
+    SizeRange("direction_dependent_gear_loss", "difference", ((0.03, 0.45), (0.07, 0.5), (0.03, 0.4)), signed=True),
+)
 """Sizes of effects whose names are shared and that came after eight trials had been registered. They are arms of a kind
 of their own, so that every seed of those trials hides what it always hid."""
 

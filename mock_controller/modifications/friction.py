@@ -154,6 +154,21 @@ class DirectionDependentFriction:
         return -abs(self.torque) * bent if bent * self.torque > 0.0 else 0.0
 
 
+@dataclass
+class DirectionDependentViscousFriction:
+    """At `joint`, |`coefficient`| more of viscous friction in one direction only: that of the sign of `coefficient`."""
+
+    name: ClassVar[str] = "direction_dependent_viscous_friction"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque = −|c| q̇ in the direction of c only"
+    source: ClassVar[str] = "Canudas de Wit, Åström and Braun (1987), IEEE J. Robotics and Automation 3(6)"
+    joint: int = joint_parameter()
+    coefficient: float = parameter(-1000.0, 1000.0, unit="N·m·s/rad", null=0.0)
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        return -abs(self.coefficient) * rate if self.coefficient * rate > 0.0 else 0.0
+
+
 SHARED: tuple[type[Any], ...] = (
     ViscousFriction,
     CoulombFriction,
@@ -162,4 +177,5 @@ SHARED: tuple[type[Any], ...] = (
     StribeckFriction,
     Stiction,
     DirectionDependentFriction,
+    DirectionDependentViscousFriction,
 )

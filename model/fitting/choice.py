@@ -28,6 +28,7 @@ SLIDING_FRICTION = (
     "stribeck_friction",
     "direction_dependent_friction",
     "gear_loss",
+    "direction_dependent_gear_loss",
     "stiction",
 )
 """Effects whose torque builds up over the presliding distance."""

@@ -137,8 +137,12 @@ def extra_torque(
         torque -= z * joint[at.STRIBECK] * np.exp(-magnitude(speed) / joint[at.STRIBECK_SPEED])
     if joint[at.DIRECTION].real * z.real > 0.0:
         torque -= magnitude(joint[at.DIRECTION]) * z
+    if joint[at.VISCOUS_DIRECTION].real * speed.real > 0.0:
+        torque -= joint[at.GEAR] * joint[at.GEAR] * magnitude(joint[at.VISCOUS_DIRECTION]) * speed
     if joint[at.GEAR_LOSS] != 0.0:
         torque -= z * joint[at.GEAR_LOSS] * magnitude(through)
+    if joint[at.GEAR_LOSS_DIRECTION].real * through.real * z.real > 0.0:
+        torque -= z * magnitude(joint[at.GEAR_LOSS_DIRECTION]) * magnitude(through)
     if joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0:
         s, c = sin_cos(joint[at.RIPPLE_CYCLES] * q)
         torque += joint[at.RIPPLE_SINE] * s + joint[at.RIPPLE_COSINE] * c

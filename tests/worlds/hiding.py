@@ -32,6 +32,8 @@ OPEN = ("tight_spot", "quadratic_drag")
 
 OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
     "load_dependent_friction": dict.fromkeys((1, 2), ("gravity_torque_friction", ())),
+    # it is larger one way and smaller the other than what the file states: a coefficient and a difference
+    "viscous_friction": dict.fromkeys((1, 2), ("direction_dependent_viscous_friction", ("viscous_friction",))),
 }
 """By name and law: the library's name, and what is part of it, of effects that are another one of the library."""
 

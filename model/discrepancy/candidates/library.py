@@ -11,7 +11,7 @@ import numpy as np
 
 from model import layout as at
 from model.effects.effect import JointScale, Tone
-from model.effects.library import effect, library
+from model.effects.library import BESIDE, effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -28,6 +28,8 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "stribeck_friction": (0.4, 1.5, 5.0),
     "lost_set_points": (0.1, 0.5, 1.5),
     "direction_dependent_friction": (0.3, 2.0),
+    "direction_dependent_viscous_friction": (0.3, 2.0),
+    "direction_dependent_gear_loss": (0.3, 2.0),
 }
 """Trial sizes, in expected deviations, of effects whose response is not proportional to their parameter."""
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
@@ -106,10 +108,18 @@ def hypotheses(
         for place in places:
             if place and not suits_drive(model.machine, name, place[0]):
                 continue
+            if place and effects is None and not is_beside(model, name, place):
+                continue
             if place and name == GRAVITY_FRICTION and not _gravity_varies(model, place[0]):
                 continue
             found.extend(_variants(_Place(model, name, place, name, scales)))
     return tuple(found)
+
+
+def is_beside(model: Model, name: str, joints: Sequence[int]) -> bool:
+    """Whether the model has, on the joints, the effect beside which this one is tried, if there is such a one."""
+    first = BESIDE.get(name)
+    return first is None or any(use.name == first and set(joints) <= set(use.joints) for use in model.effects)
 
 
 def _gravity_varies(model: Model, joint: int) -> bool:

@@ -27,6 +27,7 @@ WORDS: dict[str, EffectWords] = {
     "stribeck_friction": EffectWords("Stribeck friction", "torque"),
     "stiction": EffectWords("stiction", "breakaway"),
     "direction_dependent_friction": EffectWords("friction that depends on the direction", "difference"),
+    "direction_dependent_viscous_friction": EffectWords("viscous friction that depends on the direction", "difference"),
     "weakened_magnet": EffectWords("a motor whose magnet has weakened", "loss"),
     "resistance_drift": EffectWords("a winding that warms", "heating"),
     "motor_inductance": EffectWords("motor inductance", "inductance"),
@@ -34,6 +35,9 @@ WORDS: dict[str, EffectWords] = {
     "supply_limit": EffectWords("a supply limit below the nominal one", "voltage"),
     "torque_ripple": EffectWords("torque ripple", None),
     "gear_loss": EffectWords("a loss in the gear", "loss"),
+    "direction_dependent_gear_loss": EffectWords(
+        "a loss in the gear that depends on whether the motor drives", "difference"
+    ),
     "backlash": EffectWords("backlash", "gap"),
     "joint_compliance": EffectWords("a compliant joint", "compliance"),
     "payload": EffectWords("a load other than the model's", "mass"),
@@ -59,6 +63,7 @@ IN_TORQUES = {
     "stribeck_friction": "a {torque} against slow motion fades as the joint gets faster",
     "stiction": "more {torque} is needed to set the joint in motion than to keep it moving",
     "direction_dependent_friction": "motion one way takes more {torque} than the other way",
+    "direction_dependent_viscous_friction": "a {torque} against the motion grows in proportion to speed, one way only",
     "weakened_magnet": "the drive gives less {torque} for the same volts, and brakes less with speed",
     "resistance_drift": "the drive gives less {torque} the longer and harder it has worked",
     "motor_inductance": "{torque} follows the drive with a lag that dies out exponentially",
@@ -66,6 +71,8 @@ IN_TORQUES = {
     "supply_limit": "above a certain drive the {torque} does not rise any more",
     "torque_ripple": "the {torque} goes up and down with the {angle}, at a fixed number of cycles a {turn}",
     "gear_loss": "a share of the driving {torque} is missing whenever the motor drives, and comes back when it brakes",
+    "direction_dependent_gear_loss": "a share of the {torque} is missing only while the motor drives, or only while "
+    "it is driven",
     "backlash": "{torque} is missing or in excess each time the load on the gear changes sides",
     "joint_compliance": "{torque} is missing in proportion to how its own rate changes: the rotor winds up a spring",
     "payload": "{torque}s are missing as with a mass at the end of the arm, on all joints that carry it",

@@ -10,6 +10,7 @@ import numpy as np
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
+from model.discrepancy.candidates.library import is_beside
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -33,6 +34,12 @@ FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
 """Terms of a bent sensor that a trial frees; the shorter waves keep the priors of a sound one."""
 UNDER_LOAD = {"load_dependent_friction": "arm", "gravity_torque_friction": "share"}
 """Effects whose friction goes with a load that the posture decides, and the parameter that multiplies it."""
+EITHER_WAY = (
+    "direction_dependent_friction",
+    "direction_dependent_viscous_friction",
+    "direction_dependent_gear_loss",
+)
+"""Effects that act one way by their sign: they have no slope from one sign to the other, and are begun with both."""
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
@@ -136,7 +143,7 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
                 if (again := _stated_trial(model, name, joints, now)) is not None:
                     yield again
                 continue
-            if not _possible(model, effect, joints):
+            if not _possible(model, effect, joints) or (names is None and not is_beside(model, name, joints)):
                 continue
             if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
@@ -206,6 +213,8 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
     search = _SEARCHED.get(name)
     if search is None:
         yield {p.name: _typical(p) for p in own}
+        if name in EITHER_WAY:
+            yield {p.name: -_typical(p) for p in own}
         return
     by_part = {p.part: p for p in own}
     for start in search(place):

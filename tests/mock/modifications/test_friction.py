@@ -119,6 +119,18 @@ def test_direction_dependent_friction_resists_one_direction_only(torque: float) 
     assert against[-1] == 0.0
 
 
+@pytest.mark.parametrize("coefficient", [7.0, -7.0])
+def test_direction_dependent_viscous_friction_grows_with_the_rate_in_one_direction(coefficient: float) -> None:
+    one_way = effect("direction_dependent_viscous_friction", joint=2, coefficient=coefficient)
+    ahead = math.copysign(1.0, coefficient)
+    assert [one_way.joint_torque(0.0, 0.0, ahead * rate) for rate in (0.0, 0.5, 1.0)] == [
+        0.0,
+        -3.5 * ahead,
+        -7.0 * ahead,
+    ]
+    assert one_way.joint_torque(0.0, 0.0, -ahead) == 0.0
+
+
 def test_a_tight_spot_damps_only_near_its_place() -> None:
     spot = effect("tight_spot", joint=1, coefficient=10.0, centre=0.5, width=0.1)
     assert spot.joint_torque(0.0, 0.5, 0.3) == pytest.approx(-3.0)

@@ -46,7 +46,9 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     STRIBECK_SPEED,
     BREAKAWAY,
     DIRECTION,
+    VISCOUS_DIRECTION,
     LOSS,
+    LOSS_DIRECTION,
     GIVE,
     DAMPING,
     GAP,
@@ -61,7 +63,7 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     LAGS,
     GIVES,
     STICKS,
-) = range(32)
+) = range(34)
 # Columns of the state. X is the relative rise of the resistance.
 Q, V, Z, I, M, W, X, STUCK = range(8)  # noqa: E741 (a current)
 
@@ -134,6 +136,9 @@ def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Fl
         link -= z * a[STRIBECK] * exp(-abs(v) / a[STRIBECK_SPEED])
         if a[DIRECTION] * z > 0:
             link -= abs(a[DIRECTION]) * z
+        link -= a[GEAR] ** 2 * max(a[VISCOUS_DIRECTION] * v, 0.0) * (1.0 if v > 0 else -1.0)
+        if a[LOSS_DIRECTION] * motor * z > 0:
+            link -= abs(a[LOSS_DIRECTION] * motor) * z
         link += a[RIPPLE_S] * sin(a[RIPPLE_N] * q) + a[RIPPLE_C] * cos(a[RIPPLE_N] * q) - a[SPRING] * (q - a[REST])
         turn = 2 * np.pi * a[SHAKE_F] * t
         link += a[SHAKE_S] * sin(turn) + a[SHAKE_C] * cos(turn)
@@ -272,7 +277,7 @@ class _Joint:
 
 
 def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
-    """(3, 32), in the order of the columns above."""
+    """(3, 34), in the order of the columns above."""
     rows = []
     for j in (1, 2, 3):
         drive, sensor = model.machine.joint(j).dc_motor, model.machine.joint(j).sensor
@@ -304,7 +309,9 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
                 of("stribeck_friction.speed", 1.0),
                 of("stiction.breakaway"),
                 of("direction_dependent_friction.difference"),
+                of("direction_dependent_viscous_friction.difference"),
                 of("gear_loss.loss"),
+                of("direction_dependent_gear_loss.difference"),
                 of("joint_compliance.compliance") + contact,
                 damping,
                 of("backlash.gap"),
