@@ -72,7 +72,9 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   if (flags & HAS_STICTION) torque -= z * stuck * j[BREAKAWAY];
   if (j[STRIBECK] != 0) torque -= z * j[STRIBECK] * exp(-fabs(v) / j[STRIBECK_SPEED]);
   if (j[DIRECTION] * z > 0) torque -= fabs(j[DIRECTION]) * z;
+  if (j[VISCOUS_DIRECTION] * v > 0) torque -= j[GEAR] * j[GEAR] * fabs(j[VISCOUS_DIRECTION]) * v;
   if (j[GEAR_LOSS] != 0) torque -= z * j[GEAR_LOSS] * fabs(motor);
+  if (j[GEAR_LOSS_DIRECTION] * motor * z > 0) torque -= z * fabs(j[GEAR_LOSS_DIRECTION]) * fabs(motor);
   if (j[RIPPLE_SINE] != 0 || j[RIPPLE_COSINE] != 0)
     torque += j[RIPPLE_SINE] * sin(j[RIPPLE_CYCLES] * q) + j[RIPPLE_COSINE] * cos(j[RIPPLE_CYCLES] * q);
   if (j[SPRING] != 0) torque -= j[SPRING] * (q - j[SPRING_REST]);
@@ -118,6 +120,7 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
                     const double p[N][PER_JOINT], const double *body, const long *flags) {
   const double h = duration / steps, reaches[4] = {0, 0.5 * h, 0.5 * h, h}, weights[4] = {1, 2, 2, 1};
   const int tilted = body[17] != 0 || body[18] != 0, is_special = (flags[0] | flags[1] | flags[2]) != 0;
+  const int rubs = p[0][GRAVITY_SHARE] != 0 || p[1][GRAVITY_SHARE] != 0 || p[2][GRAVITY_SHARE] != 0;
   double drive[N], damping[N], soft[N], q[N], v[N], z[N];
   for (int j = 0; j < N; j++) {
     drive[j] = motor_gain(p[j], s[j][RISE]) * volts[j];
@@ -137,6 +140,11 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
       level[0] = p[0][COULOMB] + p[0][COULOMB_ARM] * fabs(along2 * cos(t2) + along3 * cos(t2 + t3));
       level[1] = p[1][COULOMB] + p[1][COULOMB_ARM] * fabs(along2 + along3 * cos(t3));
       level[2] = p[2][COULOMB] + p[2][COULOMB_ARM] * fabs(along3);
+      if (rubs) {
+        double weight[3];
+        gravity_torques(q[0] + dq[0] + p[0][THETA], t2, t3, body, weight);
+        for (int j = 0; j < N; j++) level[j] += p[j][GRAVITY_SHARE] * fabs(weight[j]);
+      }
       double torque[N], y[N], m[9];
       for (int j = 0; j < N; j++) {
         y[j] = deflection(z[j], dq[j], soft[j], p[j][PRESLIDING_SHAPE]);
@@ -202,7 +210,7 @@ void run(long periods, const double *set_points, const double *noise, const doub
     for (; i > 0 && times[order[i - 1]] > times[j]; i--) order[i] = order[i - 1];
     order[i] = j;
     flags[j] = modes[j];
-    const int extras[] = {STRIBECK, DIRECTION, GEAR_LOSS, RIPPLE_SINE, RIPPLE_COSINE, SPRING, DISTURBANCE_SINE, DISTURBANCE_COSINE};
+    const int extras[] = {STRIBECK, DIRECTION, VISCOUS_DIRECTION, GEAR_LOSS, GEAR_LOSS_DIRECTION, RIPPLE_SINE, RIPPLE_COSINE, SPRING, DISTURBANCE_SINE, DISTURBANCE_COSINE};
     for (unsigned e = 0; e < sizeof extras / sizeof *extras; e++)
       if (p[j][extras[e]] != 0) flags[j] |= HAS_EXTRA_TORQUE;
     for (int k = 0; k < QUEUE; k++) queue[k][j] = first_drive[j];

@@ -35,6 +35,8 @@ def main() -> int:
                 continue  # along the waist's own axis a centre of mass has no arm
             model = case.model(bench.base, joint)
             size, errors, differences = bench.measure(model, (STEP_OF_FITS, STEP, step_of_derivatives(model)))
+            if size == 0.0:
+                continue  # gravity asks nothing of an upright waist
             found = (errors[STEP_OF_FITS], errors[STEP], differences[step_of_derivatives(model)])
             cells = [f"{e:.4f} ({100 * e / size:.2f} %)" for e in found]
             where = "–" if library()[case.effect].whole_machine else str(joint)

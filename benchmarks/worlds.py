@@ -76,18 +76,25 @@ def score(truth: Json, answer: Json | None) -> Score:
     if case == "open":
         named = any(len(names) == 1 for names in steps) and verdict != "suspected"
         return Score(honest=verdict in HONEST and not named)
-    known = [{hidden["name"]} for hidden in truth["hidden"]]
+    known = [{_known_as(hidden)} for hidden in truth["hidden"]]
     if case == "pair":
         single = [names for names in steps if len(names) == 1]
         found = [any(names & right for names in single) for right in known]
         no_other = all(any(names & right for right in known) for names in steps)
         return Score(both=verdict == "named" and all(found) and no_other)
     right, joint = known[0], truth["hidden"][0]["joint"]
-    strict = verdict == "named" and bool(steps) and all(len(names) == 1 and names & right for names in steps)
+    part = right | set(truth["hidden"][0].get("beside", ()))
+    strict = verdict == "named" and all(len(names) == 1 and names <= part for names in steps)
+    strict = strict and any(names == right for names in steps)
     answered = any(names & right for names in steps)
     places = [step["joints"] for step in (answer or {}).get("steps", []) if step["adopted"] and step["effect"] in right]
     wanted = [] if joint is None else [joint]
     return Score(strict, answered, _as_sharp(truth, steps, strict, answered), _same(places, wanted))
+
+
+def _known_as(hidden: Json) -> str:
+    """What the library calls a hidden effect; folders of earlier versions have the name by which it was drawn alone."""
+    return str(hidden.get("known_as") or hidden["name"])
 
 
 def _same(places: Sequence[list[int]], wanted: list[int]) -> bool | None:
@@ -101,7 +108,7 @@ def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) 
     if not rivals or any(rival["name"] == "none" and rival["d_prime"] < TOLD_APART for rival in rivals):
         return None
     untold = {rival["name"] for rival in rivals if rival["d_prime"] < TOLD_APART}
-    right = {truth["hidden"][0]["name"]}
+    right = {_known_as(truth["hidden"][0])}
     if not untold - right:
         return strict
     return strict or (answered and all(names <= untold | right for names in steps))
@@ -187,7 +194,7 @@ def main() -> int:
         for kind in chosen:
             truth, answer, seconds = judged(folder, kind, seed, asked.case, sharp=asked.sharpness)
             scores[kind].append(score(truth, answer))
-            hidden = ", ".join(f"{one['name']} {one['joint'] or ''}" for one in truth["hidden"]) or truth["case"]
+            hidden = ", ".join(f"{_known_as(one)} {one['joint'] or ''}" for one in truth["hidden"]) or truth["case"]
             said = answer["verdict"] if answer else "failed"
             names = "; ".join(" | ".join(sorted(names)) for names in names_of(answer or {"steps": []}))
             print(f"{kind} {seed}: {hidden} -> {said}: {names} ({seconds:.0f} s)", flush=True)

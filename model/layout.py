@@ -53,13 +53,16 @@ SHARED = 10
     VISCOUS,  # N·m·s/rad, motor side
     COULOMB,  # N·m at the joint
     COULOMB_ARM,  # m
+    GRAVITY_SHARE,  # of the gravity torque
     PRESLIDING,  # rad
     PRESLIDING_SHAPE,  # 0 Prandtl, 1 Dahl
     STRIBECK,  # N·m
     STRIBECK_SPEED,  # rad/s
     BREAKAWAY,  # N·m above Coulomb friction
     DIRECTION,  # N·m, forward less backward
+    VISCOUS_DIRECTION,  # N·m·s/rad, motor side, forward less backward
     GEAR_LOSS,  # share of the motor's torque
+    GEAR_LOSS_DIRECTION,  # share of the motor's torque, driving less driven
     COMPLIANCE,  # rad/(N·m)
     TRANSMISSION_DAMPING,  # N·m·s/rad
     GAP,  # rad, the whole free play
@@ -92,7 +95,7 @@ SHARED = 10
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(71)
+) = range(74)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS

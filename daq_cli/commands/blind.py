@@ -27,7 +27,7 @@ def blind(
     seeds: Annotated[str | None, typer.Option(help="Numbers of the arms: FIRST:LAST, or a list with commas.")] = None,
     cases: Annotated[int | None, typer.Option(min=1, help="Take this number of arms at most, of mixed kinds.")] = None,
     kinds: Annotated[
-        str, typer.Option(help="Kinds of arms: clean, single, open-set, pair, shared, wrong-priors.")
+        str, typer.Option(help="Kinds of arms: clean, single, open-set, pair, shared, wrong-priors, later.")
     ] = "clean,single,open-set",
     loads: Annotated[
         str, typer.Option(help="Loads that the arms carry, in turn: nominal, light, heavy.")

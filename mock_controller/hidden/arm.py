@@ -14,7 +14,7 @@ from typing import Any
 
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.hidden.closed_loop import LoopParts
-from mock_controller.hidden.sizes import OPEN_SIZES, SHARED_SIZES, SizeRange, draw_values
+from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange, draw_values
 from mock_controller.hidden.tolerances import deviating_board, deviating_plant, draw_deviations, tolerances
 from mock_controller.modifications import Modification, build_modifications
 from mock_controller.modifications.changes import change_body
@@ -44,6 +44,12 @@ class Kind(IntEnum):
     PAIR = 4
     SHARED_BY_JOINTS = 5
     WRONG_PRIORS = 6
+    LATER_SINGLE = 7
+
+
+OF_ANY = tuple(kind for kind in Kind if Kind.ANY < kind <= Kind.WRONG_PRIORS)
+"""Kinds that `ANY` draws. Later kinds, and effects that came to the library later, are no part of it: a seed keeps its
+arm."""
 
 
 class Load(IntEnum):
@@ -149,7 +155,7 @@ def draw_arm(seed: int) -> HiddenArm:
     random = Random(f"hidden arm {seed}")
     kind, load = Kind(kind_digit), Load(load_digit)
     if kind is Kind.ANY:
-        kind = random.choice([kind for kind in Kind if kind is not Kind.ANY])
+        kind = random.choice(OF_ANY)
     deviations = draw_deviations(random)
     if kind is Kind.WRONG_PRIORS:
         _put_outside(random, deviations)
@@ -168,6 +174,8 @@ def _effects(random: Random, kind: Kind) -> tuple[HiddenEffect, ...]:
         return ()
     if kind is Kind.OPEN_SET:
         return (_one(random, random.choice(OPEN_SIZES)),)
+    if kind is Kind.LATER_SINGLE:
+        return (_one(random, random.choice(LATER_SIZES)),)
     if kind is Kind.PAIR:
         return _pair(random)
     if kind is Kind.SHARED_BY_JOINTS:

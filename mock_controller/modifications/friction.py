@@ -63,6 +63,25 @@ class LoadDependentFriction:
 
 
 @dataclass
+class GravityTorqueFriction:
+    """At `joint`, a `share` of the torque with which gravity loads it is Coulomb friction more.
+
+    Gravity's torque is taken of the rigid bodies as they are, with payload, shifted masses and a base that leans; the
+    arm's own bristle carries the friction.
+    """
+
+    name: ClassVar[str] = "gravity_torque_friction"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "level + μ |gravity's torque|"
+    source: ClassVar[str] = "load torque in Bittencourt and Gunnarsson (2012), J. Dyn. Sys. Meas. Control 134(5)"
+    joint: int = joint_parameter()
+    share: float = parameter(0.0, 1.0, null=0.0)
+
+    def friction_under_gravity(self, level: float, weight: float) -> float:
+        return level + self.share * abs(weight)
+
+
+@dataclass
 class StribeckFriction:
     """At `joint`, `torque` more at rest, which fades as the joint gets faster than `speed`."""
 
@@ -135,11 +154,28 @@ class DirectionDependentFriction:
         return -abs(self.torque) * bent if bent * self.torque > 0.0 else 0.0
 
 
+@dataclass
+class DirectionDependentViscousFriction:
+    """At `joint`, |`coefficient`| more of viscous friction in one direction only: that of the sign of `coefficient`."""
+
+    name: ClassVar[str] = "direction_dependent_viscous_friction"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque = −|c| q̇ in the direction of c only"
+    source: ClassVar[str] = "Canudas de Wit, Åström and Braun (1987), IEEE J. Robotics and Automation 3(6)"
+    joint: int = joint_parameter()
+    coefficient: float = parameter(-1000.0, 1000.0, unit="N·m·s/rad", null=0.0)
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        return -abs(self.coefficient) * rate if self.coefficient * rate > 0.0 else 0.0
+
+
 SHARED: tuple[type[Any], ...] = (
     ViscousFriction,
     CoulombFriction,
     LoadDependentFriction,
+    GravityTorqueFriction,
     StribeckFriction,
     Stiction,
     DirectionDependentFriction,
+    DirectionDependentViscousFriction,
 )

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from math import sin
 from typing import Any, ClassVar
 
+from mock_controller.modifications.bristle import Bristle
 from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.plant.parameters import PlantParameters
 from mock_controller.plant.transmission import Transmission
 
 
@@ -105,5 +107,38 @@ class GearLoss:
         return level + self.loss * abs(self._through)
 
 
-SHARED: tuple[type[Any], ...] = (TorqueRipple, GearLoss, Backlash, JointCompliance)
+@dataclass
+class DirectionDependentGearLoss:
+    """`joint`'s gear loses a share |`difference`| only while its motor drives, or, if negative, only while driven.
+
+    Which of the two it is depends on the torque through the gear and on the way in which its teeth slide, which a
+    bristle of its own remembers at rest.
+    """
+
+    name: ClassVar[str] = "direction_dependent_gear_loss"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "|Δ| |torque through the gear| against the motion, only where power flows as Δ's sign says"
+    source: ClassVar[str] = "load-dependent friction of four quadrants, Hamon, Gautier and Garrec (2010), IROS"
+    joint: int = joint_parameter()
+    difference: float = parameter(-0.95, 0.95, null=0.0)
+
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:
+        self._bristle = Bristle(parameters.friction.presliding, step_s)
+        self.restart()
+
+    def restart(self) -> None:
+        self._bristle.restart()
+        self._through = 0.0
+
+    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002
+        self._through = torque
+        return 0.0
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        bent = self._bristle.advance(rate)
+        flows = self._through * bent * self.difference > 0.0
+        return -abs(self.difference * self._through) * bent if flows else 0.0
+
+
+SHARED: tuple[type[Any], ...] = (TorqueRipple, GearLoss, DirectionDependentGearLoss, Backlash, JointCompliance)
 OPEN_SET: tuple[type[Any], ...] = (DetentCogging,)

@@ -68,6 +68,15 @@ class ChangesFriction(Modification, Protocol):
 
 
 @runtime_checkable
+class RubsUnderGravity(Modification, Protocol):
+    """Changes that level by the torque with which gravity loads the joint. Called every step."""
+
+    joint: int
+
+    def friction_under_gravity(self, level: float, weight: float) -> float: ...
+
+
+@runtime_checkable
 class ChangesTransmission(Modification, Protocol):
     """Replaces one joint's rigid gear by one that yields: rotor and link move apart."""
 

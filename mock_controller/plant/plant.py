@@ -27,6 +27,7 @@ from mock_controller.plant.extension_points import (
     ChangesTransmission,
     CouplesDrives,
     KnowsPlant,
+    RubsUnderGravity,
 )
 from mock_controller.plant.friction import CoulombLevel, deflect
 from mock_controller.plant.parameters import JOINTS, PlantParameters
@@ -87,6 +88,9 @@ class Plant:
         self._voltage_effects: list[ChangesDriveVoltage] = of_kind(self._modifications, ChangesDriveVoltage)
         self._torque_effects: list[ChangesMotorTorque] = of_kind(self._modifications, ChangesMotorTorque)
         self._friction_effects: list[ChangesFriction] = of_kind(self._modifications, ChangesFriction)
+        self._gravity_effects: list[RubsUnderGravity] = of_kind(self._modifications, RubsUnderGravity)
+        self._still = mujoco.MjData(self._model)
+        """The arm at rest, of which gravity's torques are asked."""
         self._joint_effects: list[AddsJointTorque] = of_kind(self._modifications, AddsJointTorque)
         self._outside_effects: list[AddsTorque] = of_kind(self._modifications, AddsTorque)
         self._is_modified = any(
@@ -96,6 +100,7 @@ class Plant:
                 self._supply_effects,
                 self._torque_effects,
                 self._friction_effects,
+                self._gravity_effects,
                 self._joint_effects,
                 self._outside_effects,
             )
@@ -250,6 +255,11 @@ class Plant:
             damping = self._drives[i].damping * (self._rotors[i].rate if i in self._rotors else v[i])
             motor[i] += effect.torque_change(motor[i] - damping, time_s, q[i], v[i])
         level = self._coulomb.at(q)
+        if self._gravity_effects:
+            weights = self._weights(q)
+            for rubbing in self._gravity_effects:
+                i = rubbing.joint - 1
+                level[i] = rubbing.friction_under_gravity(level[i], weights[i])
         for friction in self._friction_effects:
             i = friction.joint - 1
             level[i] = friction.friction_level(level[i], q[i], v[i])
@@ -269,6 +279,16 @@ class Plant:
         mujoco.mj_step(self._model, self._data)
         self._advance_currents(speed_before)
         self._steps += 1
+
+    def _weights(self, q: list[float]) -> list[float]:
+        """Torques (N·m) with which gravity loads the joints at six angles (rad)."""
+        self._still.qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._still)
+        mujoco.mj_comPos(self._model, self._still)
+        found = np.zeros(JOINTS)
+        mujoco.mj_rne(self._model, self._still, 0, found)
+        weights: list[float] = found.tolist()
+        return weights
 
     def _deflect(self, v: list[float]) -> list[float]:
         """Bristles after the displacement h·v that brought each joint to where it is now."""

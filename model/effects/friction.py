@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter
+from model.effects.effect import Effect, EffectParameter, JointScale
+
+
+def noticeable_damping(scale: JointScale) -> float:
+    """Viscous friction (N·m·s/rad, motor side) of another size than stated, or of a fiftieth of the joint's torque."""
+    return max(scale.viscous / 3, 0.02 * scale.torque / scale.speed / scale.gear**2)
+
 
 FRICTION = (
     Effect(
@@ -16,7 +22,7 @@ FRICTION = (
                 at.VISCOUS,
                 "N·m·s/rad",
                 low=0.0,
-                deviation=lambda s: max(s.viscous / 3, 0.02 * s.torque / s.speed / s.gear**2),
+                deviation=noticeable_damping,
             ),
         ),
     ),
@@ -35,6 +41,12 @@ FRICTION = (
         physics="τ = −μ̃ N(q) z with N the gravity force that presses on the joint; μ̃ is an arm",
         source="(7.32) to (7.34) in magnitude; on other machines N is the weight beyond the joint across its axis",
         parameters=(EffectParameter("arm", at.COULOMB_ARM, "m", low=0.0, high=1.0, deviation=0.043),),
+    ),
+    Effect(
+        "gravity_torque_friction",
+        physics="τ = −μ |G(q)| z: friction in proportion to the torque that gravity asks of the joint",
+        source="Bittencourt and Gunnarsson 2012, J. Dyn. Sys. Meas. Control 134(5): friction by load torque",
+        parameters=(EffectParameter("share", at.GRAVITY_SHARE, "1", low=0.0, high=1.0, deviation=0.1),),
     ),
     Effect(
         "stribeck_friction",
@@ -86,6 +98,12 @@ FRICTION = (
                 deviation=lambda s: 0.02 * s.torque,
             ),
         ),
+    ),
+    Effect(
+        "direction_dependent_viscous_friction",
+        physics="τ = −n² |Δv| q̇ where Δv q̇ > 0: v_eff is Δv higher forwards, or |Δv| backwards where Δv is negative",
+        source="Canudas de Wit, Åström and Braun 1987, IEEE J. Robotics and Automation 3(6)",
+        parameters=(EffectParameter("difference", at.VISCOUS_DIRECTION, "N·m·s/rad", deviation=noticeable_damping),),
     ),
 )
 """Effects of the friction family."""

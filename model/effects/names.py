@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "emf": "EMF"}
-_HYPHENATED = {"back_emf": "back-EMF", "load_dependent": "load-dependent", "direction_dependent": "direction-dependent"}
+_HYPHENATED = {
+    "back_emf": "back-EMF",
+    "load_dependent": "load-dependent",
+    "gravity_torque": "gravity-torque",
+    "direction_dependent": "direction-dependent",
+}
 
 
 def effect_name(effect: str) -> str:

@@ -62,6 +62,13 @@ TRANSMISSION = (
         parameters=(EffectParameter("loss", at.GEAR_LOSS, "1", low=0.0, high=0.95, deviation=0.1),),
     ),
     Effect(
+        "direction_dependent_gear_loss",
+        physics="τ = −|Δκ| |T| z where Δκ T z > 0, T the torque through the gear: lost while the motor drives, or, "
+        "where Δκ < 0, while it is driven",
+        source="Hamon, Gautier and Garrec 2010, IROS: friction by load, another while the motor brakes",
+        parameters=(EffectParameter("difference", at.GEAR_LOSS_DIRECTION, "1", low=-0.95, high=0.95, deviation=0.1),),
+    ),
+    Effect(
         "backlash",
         physics="no torque while |q_m − q| < g/2, an elastic contact beyond; rotor and link move apart",
         source="Nordin and Gutman 2002, dead-zone model",

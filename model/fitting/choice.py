@@ -24,9 +24,11 @@ number, which makes the whole curve stay within the linearity in about nine of t
 SLIDING_FRICTION = (
     "coulomb_friction",
     "load_dependent_friction",
+    "gravity_torque_friction",
     "stribeck_friction",
     "direction_dependent_friction",
     "gear_loss",
+    "direction_dependent_gear_loss",
     "stiction",
 )
 """Effects whose torque builds up over the presliding distance."""

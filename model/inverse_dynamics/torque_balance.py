@@ -32,9 +32,11 @@ DIFFERENCE = 1e-3
 """Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear."""
 CONTACT_SHARE = 0.02
 """Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
+LEAST_KEPT = 0.05
+"""Least share of a torque that gears are taken to pass on: two losses together may exceed one."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
 SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
-FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM)
+FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM, at.GRAVITY_SHARE)
 
 
 @dataclass(frozen=True)
@@ -166,9 +168,7 @@ class TorqueBalance:
                 needed[:, j] += inertia * (acceleration[:, j] + np.gradient(extra, time))
             kernel.supplied_torque(driven._replace(rotor_speed=rotor_speed), numbers, motor, other)
             asked = needed - other
-        loss = joints[:, at.GEAR_LOSS]
-        if loss.any():
-            asked = asked / (1 - loss * driven.contact * np.sign(asked))
+        asked = _before_losses(asked, driven.contact, joints)
         return asked - motor + _lost_in_dead_zone(asked, speed, joints)
 
 
@@ -239,6 +239,17 @@ def _held_by_friction(left: Floats, level: Floats, contact: Floats, record: Reco
     """
     without = record.mean_in_turn(left - contact * level)
     return np.where(record.turns, without + np.clip(-without, -level, level), left)
+
+
+def _before_losses(asked: Floats, contact: Floats, joints: Floats) -> Floats:
+    """Torque (k, n) into gears that give `asked` (k, n): they lose a share, or take it from a link that drives."""
+    loss, difference = joints[:, at.GEAR_LOSS], joints[:, at.GEAR_LOSS_DIRECTION]
+    if not (loss.any() or difference.any()):
+        return asked
+    along = contact * np.sign(asked)
+    # where motion turns, contact is a mean of both directions: so is what is lost one way only
+    share = loss * along + 0.5 * difference * (1 + np.sign(difference) * along)
+    return np.asarray(asked / np.maximum(1 - share, LEAST_KEPT))
 
 
 def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:

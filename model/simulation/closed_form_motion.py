@@ -11,7 +11,7 @@ from model.dynamics import effective_inertia as lumped
 from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.linear_solve import solve_3
-from model.dynamics.three_joint import horizontal_gravity_torques, mass_matrix_and_bias
+from model.dynamics.three_joint import gravity_torques, horizontal_gravity_torques, mass_matrix_and_bias
 from model.simulation.joint_torques import (
     DEFLECTION,
     POSITION,
@@ -21,6 +21,7 @@ from model.simulation.joint_torques import (
     deflection,
     motor_damping,
     motor_gain,
+    rubs_under_gravity,
     special_torque,
 )
 from model.simulation.run_arrays import Arm
@@ -76,6 +77,8 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
     )
     arms = (joints[0, at.COULOMB_ARM], joints[1, at.COULOMB_ARM], joints[2, at.COULOMB_ARM])
     plain = (joints[0, at.COULOMB], joints[1, at.COULOMB], joints[2, at.COULOMB])
+    shares = (joints[0, at.GRAVITY_SHARE], joints[1, at.GRAVITY_SHARE], joints[2, at.GRAVITY_SHARE])
+    rubs = rubs_under_gravity(joints)
     offset_1, offset_2, offset_3 = joints[0, at.THETA], joints[1, at.THETA], joints[2, at.THETA]
     weight_2, weight_3 = body[lumped.SIZE], body[lumped.SIZE + 1]
     tilted = body[lumped.GRAVITY_X] != 0.0 or body[lumped.GRAVITY_Y] != 0.0
@@ -101,6 +104,11 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
             y3 = deflection(z3, dq3, soft_3, form_3)
             p2, p3 = q2 + dq2, q3 + dq3
             l1, l2, l3 = friction_levels(p2 + offset_2, p3 + offset_3, arms, plain, weight_2, weight_3)
+            if rubs:
+                b1, b2, b3 = gravity_torques(q1 + dq1 + offset_1, p2 + offset_2, p3 + offset_3, body)
+                l1 += shares[0] * magnitude(b1)
+                l2 += shares[1] * magnitude(b2)
+                l3 += shares[2] * magnitude(b3)
             t1 = drive_1 - damping_1 * u1 - y1 * l1
             t2 = drive_2 - damping_2 * u2 - y2 * l2
             t3 = drive_3 - damping_3 * u3 - y3 * l3

@@ -11,6 +11,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from model import layout as at
+from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
 from model.dynamics.compilation import compiled, internal
@@ -19,6 +20,7 @@ from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
 from model.simulation.bodies import chain_body, rod_arm_body
 from model.simulation.closed_form_motion import friction_levels
+from model.simulation.joint_torques import rubs_under_gravity
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, uncompiled
 
 
@@ -34,12 +36,11 @@ def rod_arm_accelerations(
     )
 
 
-@compiled
-def rod_arm_levels(
-    q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], _settings: NDArray[Any], out: NDArray[Any]
-) -> None:
-    """(7.32) to (7.34) from the closed form's parameters."""
-    _published_levels(q, joints, body[lumped.SIZE], body[lumped.SIZE + 1], out)
+@internal
+def _add_shares(joints: NDArray[Any], gravity: NDArray[Any], out: NDArray[Any]) -> None:
+    """Adds to the levels `out` each joint's share of its gravity torque, N·m."""
+    for j in range(joints.shape[0]):
+        out[j] += joints[j, at.GRAVITY_SHARE] * magnitude(gravity[j])
 
 
 @compiled
@@ -52,6 +53,16 @@ def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -
     return result
 
 
+@compiled
+def rod_arm_levels(
+    q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], _settings: NDArray[Any], out: NDArray[Any]
+) -> None:
+    """(7.32) to (7.34) from the closed form's parameters, and shares of the gravity torques."""
+    _published_levels(q, joints, body[lumped.SIZE], body[lumped.SIZE + 1], out)
+    if rubs_under_gravity(joints):
+        _add_shares(joints, rod_arm_gravity(q, joints, body), out)
+
+
 @internal
 def chain_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], _joints: NDArray[Any], body: ChainArrays, a: NDArray[Any]
@@ -62,17 +73,10 @@ def chain_accelerations(
         a[j] = found[j]
 
 
-@compiled
-def chain_levels(
-    q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, settings: NDArray[Any], out: NDArray[Any]
-) -> None:
-    """Levels of Coulomb friction, N·m: (7.32) to (7.34) where set, else an arm times the weight across each axis."""
+@internal
+def _pressing_levels(q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, out: NDArray[Any]) -> None:
+    """An arm times the weight across each axis, and a constant."""
     n = joints.shape[0]
-    if settings[at.PUBLISHED_LOADS] != 0:
-        _published_levels(
-            q, joints, -body.gravity[2] * body.inertial[1, 0], -body.gravity[2] * body.inertial[2, 0], out
-        )
-        return
     x, y, z = body.gravity[0], body.gravity[1], body.gravity[2]
     beyond = 0.0 * x
     for j in range(n):
@@ -86,6 +90,22 @@ def chain_levels(
         sa, ca = sin_cos(body.geometry[j, 3])
         x, y = c * x + s * y, c * y - s * x
         y, z = ca * y + sa * z, ca * z - sa * y
+
+
+@compiled
+def chain_levels(
+    q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, settings: NDArray[Any], out: NDArray[Any]
+) -> None:
+    """Levels of Coulomb friction, N·m: (7.32) to (7.34) where set, else an arm times the weight across each axis; and
+    shares of the gravity torques."""
+    if settings[at.PUBLISHED_LOADS] != 0:
+        _published_levels(
+            q, joints, -body.gravity[2] * body.inertial[1, 0], -body.gravity[2] * body.inertial[2, 0], out
+        )
+    else:
+        _pressing_levels(q, joints, body, out)
+    if rubs_under_gravity(joints):
+        _add_shares(joints, recursive.gravity_torques(body, q), out)
 
 
 @compiled

@@ -16,7 +16,7 @@ from model import layout as at
 from model.arrays import Array
 from model.drives.magnet import back_emf_constant, torque_constant
 from model.drives.piecewise import clamped, magnitude, outside
-from model.dynamics.compilation import inlined, internal
+from model.dynamics.compilation import borrowing, inlined, internal
 from model.dynamics.dual import sin_cos
 
 RESTICK_SPEED = 1e-3
@@ -47,6 +47,15 @@ def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
     kept = 1.0 / (1.0 + y * rise)
     gain = x * rise * kept
     return clamped(z * kept + (gain if displacement.real >= 0.0 else -gain), 1.0 + 0.0 * z)
+
+
+@borrowing
+def rubs_under_gravity(joints: Array) -> bool:
+    """Whether the friction of any joint goes with its gravity torque."""
+    found = False
+    for j in range(joints.shape[0]):
+        found = found or joints[j, at.GRAVITY_SHARE] != 0.0
+    return found
 
 
 @inlined
@@ -128,8 +137,12 @@ def extra_torque(
         torque -= z * joint[at.STRIBECK] * np.exp(-magnitude(speed) / joint[at.STRIBECK_SPEED])
     if joint[at.DIRECTION].real * z.real > 0.0:
         torque -= magnitude(joint[at.DIRECTION]) * z
+    if joint[at.VISCOUS_DIRECTION].real * speed.real > 0.0:
+        torque -= joint[at.GEAR] * joint[at.GEAR] * magnitude(joint[at.VISCOUS_DIRECTION]) * speed
     if joint[at.GEAR_LOSS] != 0.0:
         torque -= z * joint[at.GEAR_LOSS] * magnitude(through)
+    if joint[at.GEAR_LOSS_DIRECTION].real * through.real * z.real > 0.0:
+        torque -= z * magnitude(joint[at.GEAR_LOSS_DIRECTION]) * magnitude(through)
     if joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0:
         s, c = sin_cos(joint[at.RIPPLE_CYCLES] * q)
         torque += joint[at.RIPPLE_SINE] * s + joint[at.RIPPLE_COSINE] * c

@@ -8,7 +8,7 @@ from hashlib import sha256
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 
-KINDS: dict[str, int] = {"clean": 1, "single": 2, "open-set": 3, "pair": 4, "shared": 5, "wrong-priors": 6}
+KINDS: dict[str, int] = {"clean": 1, "single": 2, "open-set": 3, "pair": 4, "shared": 5, "wrong-priors": 6, "later": 7}
 """Kinds of arms, and the digit of each in a secret."""
 LOADS: dict[str, int] = {"nominal": 0, "light": 1, "heavy": 2}
 """Announced loads, and the digit of each in a secret."""

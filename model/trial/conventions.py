@@ -28,6 +28,11 @@ def _viscous(values: Values, joint: int, truth: Truth, machine: Machine) -> dict
     return {"coefficient": present + values["coefficient"] / _gear(machine, joint) ** 2}
 
 
+def _viscous_difference(values: Values, joint: int, _truth: Truth, machine: Machine) -> dict[str, float]:
+    """The difference of the two directions on the motor's side, c/n²."""
+    return {"difference": values["coefficient"] / _gear(machine, joint) ** 2}
+
+
 def _load_dependent(values: Values, joint: int, truth: Truth, machine: Machine) -> dict[str, float]:
     """The whole arm μ̃ of the joint: the machine's with its deviation, and what was added."""
     stated = machine.joint(joint).friction.coulomb_arm
@@ -55,14 +60,17 @@ TRANSLATIONS: dict[str, Translation] = {
     "viscous_friction": _viscous,
     "coulomb_friction": _same(torque="torque"),
     "load_dependent_friction": _load_dependent,
+    "gravity_torque_friction": _same(share="share"),
     "stribeck_friction": _same(torque="torque", speed="speed"),
     "direction_dependent_friction": _same(difference="torque"),
+    "direction_dependent_viscous_friction": _viscous_difference,
     "weakened_magnet": _same(loss="loss"),
     "motor_inductance": _same(inductance="inductance"),
     "dead_zone": _same(width="width"),
     "supply_limit": _supply,
     "torque_ripple": _same(cycles="periods"),
     "gear_loss": _same(loss="loss"),
+    "direction_dependent_gear_loss": _same(difference="difference"),
     "backlash": _same(gap="play"),
     "joint_compliance": _same(compliance="compliance"),
     "link_mass": _same(added="mass"),

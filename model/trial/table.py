@@ -12,6 +12,9 @@ from model.trial.rates import Rate, rate
 from model.trial.score import Score
 from model.trial.truth import is_mock_friction
 
+SINGLE = ("single", "later_single")
+"""Kinds of arms with one effect of the library and nothing else."""
+
 
 class Line(FrozenRecord):
     """One line of the table: what it counts, the rate, and the rate to be reached (None: only reported)."""
@@ -65,10 +68,11 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
     every = sorted(scores, key=lambda s: s.seed)
     seen = [s for s in every if s.detectable]
 
-    def of(kind: str) -> list[Score]:
-        return [s for s in seen if s.kind == kind]
+    def of(*kinds: str) -> list[Score]:
+        return [s for s in seen if s.kind in kinds]
 
-    single, shared, pairs, strange, wrong = map(of, ("single", "shared_by_joints", "pair", "open_set", "wrong_priors"))
+    single = of(*SINGLE)
+    shared, pairs, strange, wrong = map(of, ("shared_by_joints", "pair", "open_set", "wrong_priors"))
     clean = [s for s in every if s.kind == "clean"]
     intervals = [covered.inside for s in single for covered in s.covered]
     lines = (
@@ -101,7 +105,7 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
         excess_removed=quantiles(s.excess_removed for s in single),
         excess_removed_whole=quantiles(s.excess_removed_whole for s in single),
         seconds=quantiles(s.seconds for s in single),
-        by_effect=_effects([s for s in every if s.kind == "single"], lambda s: s.named_right),
+        by_effect=_effects([s for s in every if s.kind in SINGLE], lambda s: s.named_right),
         by_open_effect=_effects([s for s in every if s.kind == "open_set"], lambda s: s.honest),
         confusion=_confusion(single),
     )

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.effects import effect_names
 
-Kind = Literal["clean", "single", "open_set", "pair", "shared_by_joints", "wrong_priors"]
+Kind = Literal["clean", "single", "open_set", "pair", "shared_by_joints", "wrong_priors", "later_single"]
 
 DETECTABLE = 5.0
 """Least d′ at which an effect counts as detectable."""

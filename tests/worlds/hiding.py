@@ -30,6 +30,13 @@ OPEN = ("tight_spot", "quadratic_drag")
 """Effects that are in no library."""
 
 
+OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
+    "load_dependent_friction": dict.fromkeys((1, 2), ("gravity_torque_friction", ())),
+    # it is larger one way and smaller the other than what the file states: a coefficient and a difference
+    "viscous_friction": dict.fromkeys((1, 2), ("direction_dependent_viscous_friction", ("viscous_friction",))),
+}
+"""By name and law: the library's name, and what is part of it, of effects that are another one of the library."""
+
 PRESSING_ARM = 0.3
 """m at which a pressing weight rubs, for a share of 1."""
 
@@ -95,7 +102,8 @@ def joints_of(rig: Rig, name: str) -> tuple[int | None, ...]:
 
 def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float]) -> Rig:
     """The rig with an effect in it; sizes are fields of `parameters.JOINT`, or of the bodies."""
-    hidden = Hidden(name, joint, law, size, name not in OPEN)
+    known_as, beside = known(name, law)
+    hidden = Hidden(name, joint, law, size, name not in OPEN, known_as, beside)
     changed, bodies = rig.joints.copy(), rig.bodies
     if joint is None:
         bodies = _changed_bodies(bodies, name, 0, size)
@@ -103,6 +111,15 @@ def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float
         _change(changed[joint - 1 : joint], name, law, size)
         bodies = _changed_bodies(bodies, name, joint - 1, size)
     return replace(rig, joints=changed, bodies=bodies, hidden=(*rig.hidden, hidden))
+
+
+def known(name: str, law: int) -> tuple[str, tuple[str, ...]]:
+    """What the library calls an effect that was given a law, and which other effects of the library it is as well.
+
+    An effect that was drawn by one name may be another of the library's, by its law; draws keep their own names, so
+    that a seed gives the rig that it always gave.
+    """
+    return OTHER_NAMES.get(name, {}).get(law, (name, ()))
 
 
 def drawn(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Generator) -> tuple[int, dict[str, float]]:

@@ -37,13 +37,19 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect that the file says nothing of. `name` is the library's, `joint` counts from 1, None for the machine."""
+    """An effect that the file says nothing of. `joint` counts from 1, None for the machine.
+
+    `name` is what was drawn. `known_as` is what the library calls the law that it was given; `beside` are the library's
+    other effects that are part of it.
+    """
 
     name: str
     joint: int | None
     law: int
     sizes: dict[str, float]
     in_library: bool = True
+    known_as: str = ""
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
+import numpy as np
+
 from model import layout as at
 from model.effects.effect import JointScale, Tone
-from model.effects.library import effect, library
+from model.effects.library import BESIDE, effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.simulation.chain_of_model import gravity_loads
 
 TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
@@ -25,6 +28,8 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "stribeck_friction": (0.4, 1.5, 5.0),
     "lost_set_points": (0.1, 0.5, 1.5),
     "direction_dependent_friction": (0.3, 2.0),
+    "direction_dependent_viscous_friction": (0.3, 2.0),
+    "direction_dependent_gear_loss": (0.3, 2.0),
 }
 """Trial sizes, in expected deviations, of effects whose response is not proportional to their parameter."""
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
@@ -41,6 +46,12 @@ STICTION_SPEED = 0.045
 ms and 12 bits the joint moves there by less than a count per sample, so that no reading shows the fall."""
 STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
 """Trial values of the speed over which friction falls, rad/s."""
+
+
+GRAVITY_FRICTION = "gravity_torque_friction"
+"""Friction in proportion to a gravity torque."""
+POSTURES, LEAST_CHANGE = 16, 1e-6
+"""Number of postures at which gravity torques are compared, and the relative change that counts as one."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +108,27 @@ def hypotheses(
         for place in places:
             if place and not suits_drive(model.machine, name, place[0]):
                 continue
+            if place and effects is None and not is_beside(model, name, place):
+                continue
+            if place and name == GRAVITY_FRICTION and not _gravity_varies(model, place[0]):
+                continue
             found.extend(_variants(_Place(model, name, place, name, scales)))
     return tuple(found)
+
+
+def is_beside(model: Model, name: str, joints: Sequence[int]) -> bool:
+    """Whether the model has, on the joints, the effect beside which this one is tried, if there is such a one."""
+    first = BESIDE.get(name)
+    return first is None or any(use.name == first and set(joints) <= set(use.joints) for use in model.effects)
+
+
+def _gravity_varies(model: Model, joint: int) -> bool:
+    """Whether a joint's gravity torque depends on the posture. Friction that goes with it does nothing where there is
+    none, and is Coulomb friction by a longer name where it is constant."""
+    column = model.machine.modelled_joints.index(joint)
+    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (POSTURES, model.joint_count))
+    torque = np.abs(gravity_loads(model, postures)[:, column])
+    return bool(np.ptp(torque) > LEAST_CHANGE * float(torque.max(initial=0.0)) + 1e-12)
 
 
 def tone(

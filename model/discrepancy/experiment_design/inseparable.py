@@ -29,10 +29,12 @@ _FRICTION = frozenset(
     {
         "coulomb_friction",
         "load_dependent_friction",
+        "gravity_torque_friction",
         "direction_dependent_friction",
         "stribeck_friction",
         "stiction",
         "gear_loss",
+        "direction_dependent_gear_loss",
     }
 )
 _READING = frozenset({"potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity"})
@@ -41,7 +43,8 @@ _WEIGHT = frozenset({"payload", "link_mass", "centre_of_mass"})
 LAWS: Mapping[SharedLaw, _Law] = {
     # n² K_T K_b/R and B act on the speed alone; only the first needs a current in the winding.
     "torque-with-speed": _Law(
-        frozenset({"viscous_friction", "weakened_magnet"}), ("current-clamp", "coast-with-drive-open")
+        frozenset({"viscous_friction", "direction_dependent_viscous_friction", "weakened_magnet"}),
+        ("current-clamp", "coast-with-drive-open"),
     ),
     "late-drive": _Law(frozenset({"input_delay", "motor_inductance"}), ("oscilloscope",)),
     "play-and-give": _Law(frozenset({"backlash", "joint_compliance"}), ("dial-gauge",)),
@@ -51,7 +54,16 @@ LAWS: Mapping[SharedLaw, _Law] = {
     # A sliding joint's dry friction at one load; a dead zone takes its width off the drive in the same direction.
     "torque-against-motion": _Law(_FRICTION | {"dead_zone"}, ("force-gauge", "current-clamp")),
     "torque-per-volt": _Law(
-        frozenset({"weakened_magnet", "resistance_drift", "gear_loss", "wrong_gain", "supply_limit"}),
+        frozenset(
+            {
+                "weakened_magnet",
+                "resistance_drift",
+                "gear_loss",
+                "direction_dependent_gear_loss",
+                "wrong_gain",
+                "supply_limit",
+            }
+        ),
         ("current-clamp", "force-gauge"),
     ),
     "torque-at-one-rate": _Law(frozenset({"torque_ripple", "periodic_disturbance"}), ("stopped-arm",)),
@@ -66,7 +78,7 @@ SHOWS: Mapping[Measurement, frozenset[str]] = {
     # The current is (u − K_b n q̇)/R as the model has it, unless something electrical is another.
     "current-clamp": frozenset({"weakened_magnet", "resistance_drift", "wrong_gain", "supply_limit", "dead_zone"}),
     # Without a current, friction alone slows the joint.
-    "coast-with-drive-open": frozenset({"viscous_friction"}),
+    "coast-with-drive-open": frozenset({"viscous_friction", "direction_dependent_viscous_friction"}),
     "force-gauge": _FRICTION,
     "weighed-parts": _WEIGHT,
     "spirit-level": frozenset({"base_tilt"}),

@@ -10,6 +10,7 @@ import numpy as np
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
+from model.discrepancy.candidates.library import is_beside
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -31,6 +32,14 @@ SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_n
 BENT = "potentiometer_nonlinearity"
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
 """Terms of a bent sensor that a trial frees; the shorter waves keep the priors of a sound one."""
+UNDER_LOAD = {"load_dependent_friction": "arm", "gravity_torque_friction": "share"}
+"""Effects whose friction goes with a load that the posture decides, and the parameter that multiplies it."""
+EITHER_WAY = (
+    "direction_dependent_friction",
+    "direction_dependent_viscous_friction",
+    "direction_dependent_gear_loss",
+)
+"""Effects that act one way by their sign: they have no slope from one sign to the other, and are begun with both."""
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
@@ -134,9 +143,9 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
                 if (again := _stated_trial(model, name, joints, now)) is not None:
                     yield again
                 continue
-            if not _possible(model, effect, joints):
+            if not _possible(model, effect, joints) or (names is None and not is_beside(model, name, joints)):
                 continue
-            if name == "load_dependent_friction" and _constant_load(model, joints[0] - 1, case.records):
+            if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
             trial = _trial(model, name, joints, now)
             if trial.starts:
@@ -167,10 +176,10 @@ def _stated_trial(model: Model, name: str, joints: tuple[int, ...], now: Balance
     return Trial(name, joints, model, own, tuple(origin), (start,), stated, origin)
 
 
-def _constant_load(model: Model, column: int, records: Sequence[RecordedMotion]) -> bool:
-    """Whether the load that presses on a joint is the same everywhere along the records."""
-    arm = model.with_effect("load_dependent_friction", (column + 1,), {"arm": 1.0})
-    levels = np.concatenate([levels_along(arm, r)[r.rows, column] for r in records])
+def _constant_load(model: Model, name: str, column: int, records: Sequence[RecordedMotion]) -> bool:
+    """Whether the load that friction goes with is the same everywhere along the records."""
+    rubbing = model.with_effect(name, (column + 1,), {UNDER_LOAD[name]: 1.0})
+    levels = np.concatenate([levels_along(rubbing, r)[r.rows, column] for r in records])
     return bool(np.ptp(levels) < CONSTANT_LOAD * np.abs(levels).max() + 1e-12)
 
 
@@ -188,7 +197,7 @@ def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
     joint, row = model.machine.joint(joints[0]), at.slot(joints[0], 0)
     needs = {
         "centre_of_mass": model.vector[row + at.A] != 0.0,
-        "load_dependent_friction": falls,
+        **dict.fromkeys(UNDER_LOAD, falls),
         **dict.fromkeys(
             SENSOR_EFFECTS,
             joint.sensor is not None and joint.sensor.measures == "position",
@@ -204,6 +213,8 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
     search = _SEARCHED.get(name)
     if search is None:
         yield {p.name: _typical(p) for p in own}
+        if name in EITHER_WAY:
+            yield {p.name: -_typical(p) for p in own}
         return
     by_part = {p.part: p for p in own}
     for start in search(place):

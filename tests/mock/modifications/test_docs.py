@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from mock_controller.hidden.sizes import OPEN_SIZES, SHARED_SIZES, SizeRange
+from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange
 from mock_controller.modifications.parameter import fields_of
 from mock_controller.modifications.registry import known_modifications
 
 PAGE = (Path(__file__).parents[3] / "docs" / "mock.md").read_text("utf-8")
 
 
-@pytest.mark.parametrize("size", SHARED_SIZES + OPEN_SIZES, ids=lambda size: size.effect)
+@pytest.mark.parametrize("size", SHARED_SIZES + LATER_SIZES + OPEN_SIZES, ids=lambda size: size.effect)
 def test_the_page_has_the_effect_as_it_is(size: SizeRange) -> None:
     (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `{size.effect}` |")]
     for key, field in fields_of(known_modifications()[size.effect]).items():

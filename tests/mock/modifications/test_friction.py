@@ -54,6 +54,27 @@ def test_load_dependent_friction_follows_the_weight_of_its_joint() -> None:
         assert difference == pytest.approx([0.0, 0.0, 0.1 * weight, 0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("payload", [0.0, 1.0])
+def test_friction_under_gravity_is_a_share_of_what_the_joint_has_to_hold(payload: float) -> None:
+    """The mock asks its engine; here the weights are those of rods, of lines from the axes, written out."""
+    rubbing = effect("gravity_torque_friction", joint=2, share=0.3)
+    heavier = [effect("payload", mass=payload)] if payload else []
+    plant = plant_with(rubbing, *heavier)
+    body = plant.parameters.rigid_body
+    for shoulder, elbow in ((0.3, 0.4), (1.2, -0.9), (2.6, 0.2)):
+        posture = [math.pi, shoulder, elbow, 0.0, 0.0, 0.0]
+        load = body.m3 * body.a3 / 2 + body.m_load * body.a3
+        upper = body.m2 * body.a2 / 2 + (body.m3 + body.m_load) * body.a2
+        elbow_weight = G * load * math.cos(shoulder + elbow)
+        shoulder_weight = G * upper * math.cos(shoulder) + elbow_weight
+        found = plant._weights(posture)
+        assert found[1:3] == pytest.approx([shoulder_weight, elbow_weight], rel=1e-4)
+        assert found[0] == pytest.approx(0.0, abs=1e-9)
+        assert rubbing.friction_under_gravity(1.0, found[1]) == pytest.approx(
+            1.0 + 0.3 * abs(shoulder_weight), rel=1e-4
+        )
+
+
 def test_stribeck_friction_falls_to_its_eth_part_at_its_speed() -> None:
     stribeck = effect("stribeck_friction", joint=1, torque=3.0, speed=0.1)
     assert stribeck.friction_level(1.0, 0.0, 0.0) == 4.0
@@ -96,6 +117,18 @@ def test_direction_dependent_friction_resists_one_direction_only(torque: float) 
     against = [one_way.joint_torque(0.0, 0.0, -math.copysign(0.5, torque)) for _ in range(50)]
     assert along[-1] == pytest.approx(-torque)
     assert against[-1] == 0.0
+
+
+@pytest.mark.parametrize("coefficient", [7.0, -7.0])
+def test_direction_dependent_viscous_friction_grows_with_the_rate_in_one_direction(coefficient: float) -> None:
+    one_way = effect("direction_dependent_viscous_friction", joint=2, coefficient=coefficient)
+    ahead = math.copysign(1.0, coefficient)
+    assert [one_way.joint_torque(0.0, 0.0, ahead * rate) for rate in (0.0, 0.5, 1.0)] == [
+        0.0,
+        -3.5 * ahead,
+        -7.0 * ahead,
+    ]
+    assert one_way.joint_torque(0.0, 0.0, -ahead) == 0.0
 
 
 def test_a_tight_spot_damps_only_near_its_place() -> None:

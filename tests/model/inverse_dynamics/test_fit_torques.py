@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,6 +14,7 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace, TraceRecord
 from daq.traces.csv_table import import_csv
+from model.arrays import Floats
 from model.effects.library import library
 from model.fitting.options import FitOptions
 from model.inverse_dynamics.fit import fit_torques, torque_curves
@@ -25,8 +27,14 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 LENGTH, MASS, ROTOR, VISCOUS, COULOMB = 0.3, 0.93, 0.0043, 0.03, 0.05
 
 
-def swinging(seed: int, *, torque: bool = True) -> Trace:
-    """A hanging rod driven along a sum of sines: τ = (mL²/3 + J) q̈ + mgL/2 sin q + b q̇ + T sign q̇, written out."""
+Law = Callable[[Floats, Floats, Floats], Floats]
+
+
+def swinging(seed: int, *, torque: bool = True, law: Law | None = None) -> Trace:
+    """A hanging rod driven along a sum of sines: τ = (mL²/3 + J) q̈ + mgL/2 sin q + b q̇ + T sign q̇, written out.
+
+    law: the torque of the motor for that torque, angle and speed, where there is another law beside these.
+    """
     time = 0.004 * np.arange(2500)
     angle, speed, acceleration = (np.zeros_like(time) for _ in range(3))
     for k, rate in enumerate((2.1, 3.7, 6.0)):
@@ -36,6 +44,8 @@ def swinging(seed: int, *, torque: bool = True) -> Trace:
         acceleration -= 0.4 * rate**2 * np.sin(rate * time + phase)
     needed = (MASS * LENGTH**2 / 3 + ROTOR) * acceleration + MASS * 9.81 * LENGTH / 2 * np.sin(angle)
     needed += VISCOUS * speed + COULOMB * np.sign(speed)
+    if law is not None:
+        needed = law(needed, angle, speed)
     drive = np.interp(time + 0.003, time, needed) / 0.5  # it acts after 1 ms and is held for 4 ms
     record = TraceRecord(
         trace_id=f"swing{seed}",
@@ -60,7 +70,10 @@ def rod() -> Model:
     return base_model(load_machine(str(EXAMPLES / "single_axis.toml")))
 
 
-OPTIONS = FitOptions(parameters=("link1.mass", "*friction*", "joint1.drive.inertia"), use_priors=False)
+OPTIONS = FitOptions(
+    parameters=("link1.mass", "joint1.viscous_friction.*", "joint1.coulomb_friction.*", "joint1.drive.inertia"),
+    use_priors=False,
+)
 
 
 def test_the_parameters_of_the_motion_are_found() -> None:
@@ -188,3 +201,30 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
     assert left["none"] == pytest.approx(0.679, abs=0.02)
     assert left["friction"] == pytest.approx(0.454, abs=0.02)
     assert left["gear"] == pytest.approx(0.45, abs=0.02)
+
+
+LAWS: dict[str, tuple[str, float, Law]] = {
+    "gravity_torque_friction": (
+        "share",
+        0.2,
+        lambda t, q, v: t + 0.2 * np.abs(MASS * 9.81 * LENGTH / 2 * np.sin(q)) * np.sign(v),
+    ),
+    "direction_dependent_viscous_friction": ("difference", -0.02, lambda t, _q, v: t + 0.02 * np.minimum(v, 0.0)),
+    "direction_dependent_gear_loss": ("difference", 0.15, lambda t, _q, v: np.where(t * v > 0, t / 0.85, t)),
+}
+"""By effect: its parameter, the value here, and the law written out."""
+
+
+@pytest.mark.parametrize("effect", LAWS)
+def test_a_law_of_friction_is_found_at_its_size(effect: str) -> None:
+    part, value, law = LAWS[effect]
+    name, others = f"joint1.{effect}.{part}", OPTIONS.parameters or ()
+    records = [swinging(1, law=law)], [swinging(5, law=law)]
+    found = fit_torques(
+        rod().with_effect(effect, (1,)), *records, FitOptions(parameters=(name, *others), use_priors=False)
+    )
+    assert found.model.parameter(name).value == pytest.approx(value, rel=0.05)
+    without = fit_torques(rod(), *records, OPTIONS)
+    assert found.held_out is not None
+    assert without.held_out is not None
+    assert found.held_out < 0.2 * without.held_out

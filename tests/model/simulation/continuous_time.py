@@ -40,12 +40,15 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     VISCOUS,
     COULOMB,
     ARM,
+    GRAVITY_SHARE,
     PRESLIDING,
     STRIBECK,
     STRIBECK_SPEED,
     BREAKAWAY,
     DIRECTION,
+    VISCOUS_DIRECTION,
     LOSS,
+    LOSS_DIRECTION,
     GIVE,
     DAMPING,
     GAP,
@@ -60,19 +63,9 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     LAGS,
     GIVES,
     STICKS,
-) = range(31)
+) = range(34)
 # Columns of the state. X is the relative rise of the resistance.
 Q, V, Z, I, M, W, X, STUCK = range(8)  # noqa: E741 (a current)
-
-
-@numba.njit(cache=True)
-def _levels(s: Floats, p: Floats, body: Floats, level: Floats) -> None:
-    """(7.32) to (7.34) in magnitude, and a constant each, N·m. `body`: see `_body`."""
-    weight_2, weight_3 = body[4], body[5]
-    t2, t3 = s[1, Q], s[1, Q] + s[2, Q]
-    level[0] = p[0, COULOMB] + p[0, ARM] * abs(weight_2 * sin(t2) * cos(t2) + weight_3 * sin(t3) * cos(t3))
-    level[1] = p[1, COULOMB] + p[1, ARM] * abs(weight_2 * sin(t2) + weight_3 * sin(t3) * cos(s[2, Q]))
-    level[2] = p[2, COULOMB] + p[2, ARM] * abs(weight_3 * sin(t3))
 
 
 @numba.njit(cache=True)
@@ -85,6 +78,19 @@ def _weights(s: Floats, body: Floats, weight: Floats) -> None:
     weight[0] = -(p2 * cos(t2) + p3 * cos(t3)) * (y * c1 - x * s1)
     weight[2] = -p3 * (-sin(t3) * along + cos(t3) * z)
     weight[1] = -p2 * (-sin(t2) * along + cos(t2) * z) + weight[2]
+
+
+@numba.njit(cache=True)
+def _levels(s: Floats, p: Floats, body: Floats, weight: Floats, level: Floats) -> None:
+    """(7.32) to (7.34) in magnitude, a constant each, and a share of the gravity torques, N·m. `body`: see `_body`."""
+    weight_2, weight_3 = body[4], body[5]
+    t2, t3 = s[1, Q], s[1, Q] + s[2, Q]
+    level[0] = p[0, COULOMB] + p[0, ARM] * abs(weight_2 * sin(t2) * cos(t2) + weight_3 * sin(t3) * cos(t3))
+    level[1] = p[1, COULOMB] + p[1, ARM] * abs(weight_2 * sin(t2) + weight_3 * sin(t3) * cos(s[2, Q]))
+    level[2] = p[2, COULOMB] + p[2, ARM] * abs(weight_3 * sin(t3))
+    _weights(s, body, weight)
+    for j in range(3):
+        level[j] += p[j, GRAVITY_SHARE] * abs(weight[j])
 
 
 @numba.njit(cache=True)
@@ -117,8 +123,7 @@ def _transmitted(a: Floats, twist: float, twisting: float) -> float:
 def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Floats, work: Floats) -> None:
     """Derivative of the state (3, 8)."""
     level, torque, rotor, weight = work[0], work[1], work[2], work[3]
-    _levels(s, p, body, level)
-    _weights(s, body, weight)
+    _levels(s, p, body, weight, level)
     for j in range(3):
         a, q, v = p[j], s[j, Q], s[j, V]
         z = min(max(s[j, Z], -1.0), 1.0)
@@ -131,6 +136,9 @@ def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Fl
         link -= z * a[STRIBECK] * exp(-abs(v) / a[STRIBECK_SPEED])
         if a[DIRECTION] * z > 0:
             link -= abs(a[DIRECTION]) * z
+        link -= a[GEAR] ** 2 * max(a[VISCOUS_DIRECTION] * v, 0.0) * (1.0 if v > 0 else -1.0)
+        if a[LOSS_DIRECTION] * motor * z > 0:
+            link -= abs(a[LOSS_DIRECTION] * motor) * z
         link += a[RIPPLE_S] * sin(a[RIPPLE_N] * q) + a[RIPPLE_C] * cos(a[RIPPLE_N] * q) - a[SPRING] * (q - a[REST])
         turn = 2 * np.pi * a[SHAKE_F] * t
         link += a[SHAKE_S] * sin(turn) + a[SHAKE_C] * cos(turn)
@@ -171,7 +179,7 @@ def _advance(t: float, duration: float, step: float, s: Floats, volts: Floats, p
             _rates(now + reach, there, volts, p, body, k[stage], work)
         for stage, weight in ((0, 1.0), (1, 2.0), (2, 2.0), (3, 1.0)):
             _moved(s, weight * h / 6, k[stage], s)
-        _levels(s, p, body, work[0])
+        _levels(s, p, body, work[3], work[0])
         for j in range(3):
             _settle(s[j], p[j], work[0, j])
 
@@ -203,8 +211,7 @@ def readings(model: Model, set_points: Floats, start: Floats, step: float = STEP
     state[:, Q] = state[:, M] = start
     state[:, STUCK] = 1.0
     level, weight = np.zeros(3), np.zeros(3)
-    _levels(state, p, body, level)
-    _weights(state, body, weight)
+    _levels(state, p, body, weight, level)
     state[:, Z] = np.clip(-weight / (level + p[:, STICKS] * p[:, BREAKAWAY]), -1.0, 1.0)  # what it holds at rest
     state[:, M] += p[:, GIVES] * p[:, GAP] / 2
     sides = [_Joint(model, j, value) for j in (1, 2, 3)]
@@ -270,7 +277,7 @@ class _Joint:
 
 
 def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
-    """(3, 31), in the order of the columns above."""
+    """(3, 34), in the order of the columns above."""
     rows = []
     for j in (1, 2, 3):
         drive, sensor = model.machine.joint(j).dc_motor, model.machine.joint(j).sensor
@@ -296,12 +303,15 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
                 of("viscous_friction.coefficient"),
                 of("coulomb_friction.torque"),
                 of("load_dependent_friction.arm"),
+                of("gravity_torque_friction.share"),
                 PRESLIDING_COUNTS * sensor.range.value / COUNTS,
                 of("stribeck_friction.torque"),
                 of("stribeck_friction.speed", 1.0),
                 of("stiction.breakaway"),
                 of("direction_dependent_friction.difference"),
+                of("direction_dependent_viscous_friction.difference"),
                 of("gear_loss.loss"),
+                of("direction_dependent_gear_loss.difference"),
                 of("joint_compliance.compliance") + contact,
                 damping,
                 of("backlash.gap"),

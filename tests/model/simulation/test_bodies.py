@@ -8,6 +8,7 @@ import pytest
 from daq.contracts.machine import load_machine
 from model import layout as at
 from model.arrays import Floats
+from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import base_model
 from model.simulation.bodies import chain_body
@@ -171,3 +172,24 @@ def test_friction_of_the_arm_of_rods_grows_as_the_source_has_it() -> None:
         3.0 + 0.3 * abs(three),
     ]
     np.testing.assert_allclose(levels(chain, q, joints, published=1), expected)
+
+
+def test_friction_in_proportion_to_gravity_torque_is_a_share_of_the_slope_of_potential_energy() -> None:
+    """Three joints, one of them sliding; gravity from anywhere."""
+    rng = np.random.default_rng(11)
+    names = ("THETA", "ALPHA", "A", "D", "MASS", "GRAVITY_SHARE")
+    joints = np.array(
+        [
+            joint(at.ROD, **dict(zip(names, rng.uniform(0.2, 1.2, len(names)), strict=True)), PRISMATIC=float(k == 1))
+            for k in range(3)
+        ]
+    )
+    gravity, q = rng.normal(size=3), rng.normal(size=3)
+    chain = body_of(*joints, LOAD=0.7, GRAVITY_X=gravity[0], GRAVITY_Y=gravity[1], GRAVITY_Z=gravity[2])
+    steps = 1e-5 * np.eye(3)
+    slope = np.array(
+        [recursive.potential_energy(chain, q + h) - recursive.potential_energy(chain, q - h) for h in steps]
+    )
+    expected = joints[:, at.GRAVITY_SHARE] * np.abs(slope / 2e-5)
+    assert expected.min() > 0.05
+    np.testing.assert_allclose(levels(chain, q, joints), expected, rtol=1e-6)

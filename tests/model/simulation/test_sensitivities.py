@@ -46,3 +46,18 @@ def test_effects_at_their_null_value_have_derivatives_too() -> None:
     assert np.abs(found.reading[0] - slope).max() < 0.02 * np.abs(slope).max()
     assert np.abs(found.reading[1][:, 2]).max() > 10 * np.abs(found.reading[1][:, 0]).max()
     assert found.reading[2][0] == pytest.approx([1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("general", [False, True], ids=["closed form", "recursive"])
+def test_friction_under_gravity_has_its_derivative_where_there_is_none_yet(general: bool) -> None:
+    """The term is left out at a share of zero; a dual part alone is enough to have it."""
+    options = Options(quantise=False, step=2.5e-4, general=general)
+    model = base_model(load_machine("ma2000")).with_effect("gravity_torque_friction", (2, 3))
+    shares = [model.parameter(f"joint{j}.gravity_torque_friction.share") for j in (2, 3)]
+    inputs = ramp_inputs(model.machine)
+    found = sensitivities(model, inputs, shares, options)
+    for share, slope in zip(shares, found.reading, strict=True):
+        more = simulate(model.with_values({share.name: 1e-4}), inputs, options).reading
+        difference = (more - found.simulation.reading) / 1e-4
+        assert np.abs(slope).max() > 1e-3
+        assert np.abs(slope - difference).max() < 0.02 * np.abs(slope).max()

@@ -34,6 +34,7 @@ KEPT = Path(__file__).parents[3] / "docs" / "trial"
 
 def test_seeds_are_the_mock_s() -> None:
     kinds = {"shared": Kind.SHARED_BY_JOINTS, "open-set": Kind.OPEN_SET, "wrong-priors": Kind.WRONG_PRIORS}
+    kinds["later"] = Kind.LATER_SINGLE
     for kind in KINDS:
         for load in LOADS:
             ours = compose(77, kind, load)

@@ -7,7 +7,7 @@ import pytest
 from daq.contracts.errors import SpecError
 from model import layout as at
 from model.discrepancy.candidates.library import STICTION_SPEED, hypotheses, tone
-from model.effects.library import add_own, library, remove_own
+from model.effects.library import BESIDE, add_own, library, remove_own
 from tests.model.discrepancy.own_effects import own_effect
 from tests.model.fitting import imagined
 
@@ -20,8 +20,14 @@ def test_every_effect_is_tried_on_every_joint() -> None:
             assert all(tone(arm, name, j, {"sine": 0.1, "cosine": 0.0}, 0.5) is not None for j in (1, 2, 3))
         elif effect.whole_machine:
             assert (name, ()) in found
+        elif name in BESIDE:
+            beside = arm.with_effect(BESIDE[name], (2,))
+            assert not any(n == name for n, _ in found)
+            assert {c.joints for c in hypotheses(beside) if c.name == name} == {(2,)}
+            assert len(hypotheses(arm, (name,))) == 3, "asked for by name"
         else:
-            assert {joints for n, joints in found if n == name} == {(1,), (2,), (3,)}, name
+            expected = {(2,), (3,)} if name == "gravity_torque_friction" else {(1,), (2,), (3,)}
+            assert {joints for n, joints in found if n == name} == expected, name
 
 
 def test_trials_stay_within_bounds() -> None:

@@ -1,0 +1,37 @@
+"""Laws that the field has beside each other, hidden in rigs that others wrote, are told apart by their names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.machine import load_machine
+from daq.traces.csv_table import import_csv
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.machine_model.model import base_model
+from tests.worlds.folder import write_world
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(
+    ("kind", "seed", "drawn", "effect", "joints", "part", "value"),
+    [
+        pytest.param("axis-current", 550, "load_dependent_friction", "gravity_torque_friction", (1,), "share", 0.1957),
+        pytest.param(
+            *("planar-torques", 551, "load_dependent_friction", "gravity_torque_friction", (2,), "share", 0.0605),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_a_law_is_named_and_its_size_found(
+    kind: str, seed: int, drawn: str, effect: str, joints: tuple[int, ...], part: str, value: float, tmp_path: Path
+) -> None:
+    write_world(tmp_path, kind, seed, effect=drawn)
+    lab = tmp_path / "lab"
+    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
+    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    assert found.verdict == "named", found.summary
+    (step,) = [s for s in found.steps if s.adopted]
+    assert (step.effect, step.joints) == (effect, joints)
+    assert step.parameters[f"joint{joints[0]}.{effect}.{part}"].value == pytest.approx(value, rel=0.05)
