@@ -30,6 +30,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
+from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
@@ -97,7 +98,8 @@ def diagnose_torques(
         raise TraceError("no traces: a diagnosis needs at least one")
     chosen = torque_options(options)
     check_options(chosen, model)
-    _refuse_unseen(chosen)
+    controller = judge_controller(model, traces)
+    _refuse_unseen(chosen, controller.settled)
     cutoff = chosen.cutoff or choose_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     records = recorded_motions(traces, model.machine, cutoff)
@@ -108,7 +110,7 @@ def diagnose_torques(
         np.maximum(torque_noise(model, traces, cutoff), repeats),
         chosen,
     )
-    work = _Workflow(model, case, progress, cancel or Never())
+    work = _Workflow(model, case, controller, progress, cancel or Never())
     work.run()
     work.notes += on_unfinished((*traces, *held_out))
     answer = work.answer([t.record.trace_id for t in traces], [t.record.trace_id for t in held_out], cutoff)
@@ -116,10 +118,10 @@ def diagnose_torques(
     return with_sentences(answer.model_copy(update={"seconds": time.perf_counter() - begun, "robot_seconds": robot}))
 
 
-def _refuse_unseen(options: TorqueOptions) -> None:
+def _refuse_unseen(options: TorqueOptions, settled: Sequence[str]) -> None:
     """Raises SpecError for a named effect that torques do not show: not finding it would say nothing."""
     for name in options.effects or ():
-        if name in NOT_IN_TORQUES:
+        if name in NOT_IN_TORQUES and name not in settled:
             raise SpecError(f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out")
 
 
@@ -129,6 +131,7 @@ class _Workflow:
 
     model: Model
     case: TorqueCase
+    controller: JudgedController
     progress: Progress
     cancel: Cancel
     added: dict[str, Parameter] = field(default_factory=dict)
@@ -508,13 +511,17 @@ class _Workflow:
             fit={"fitted": [u.name for u in own]},
             note="diagnosis",
         )
+        proved = self.controller.steps(self.begin, self.case.noise)
+        found = self.model.with_values(self.now.model_values)
         fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
         return Diagnosis(
-            verdict=verdict(steps, unexplained=missing and not adopted, suspected=self.suspicion is not None),
+            verdict=verdict(
+                (*proved, *steps), unexplained=missing and not adopted, suspected=self.suspicion is not None
+            ),
             suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
-            steps=steps,
+            steps=(*proved, *steps),
             rmse_fit=fit_errors,
             rmse_holdout=held_errors,
             gap=torque_gap(fit_errors, held_errors, steps),
@@ -522,20 +529,27 @@ class _Workflow:
             candidates=self.tried,
             remaining=shapes,
             model_before=self.begin,
-            model_after=self.model.with_values(self.now.model_values).with_lineage(lineage),
+            model_after=self.controller.with_findings(found).with_lineage(lineage),
             traces=tuple(traces),
             holdout=tuple(held_out),
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes_data=(*stated, *named, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
+            notes_data=(
+                *stated,
+                *named,
+                self._shares(),
+                *_assumptions(cutoff, self.controller.not_looked_for),
+                *self._timing(),
+                *self.notes,
+            ),
         )
 
 
-def _assumptions(cutoff: float) -> tuple[Note, ...]:
+def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note, ...]:
     return (
         Note(kind="cutoff", values={"cutoff": cutoff}),
         Note(kind="resting-left-out"),
-        Note(kind="not-looked-for", values={"effects": NOT_IN_TORQUES}),
+        Note(kind="not-looked-for", values={"effects": dict(not_looked_for)}),
         Note(kind="positions-of-links"),
     )
