@@ -28,7 +28,7 @@ from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit, prior_distance
 from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
@@ -52,6 +52,8 @@ CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
 SHOWN = 12
 """Most candidates that a step lists."""
+FAR_OFF = 4.0
+"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
@@ -230,7 +232,6 @@ class _Workflow:
 
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
-        options = self.case.options
         refused: list[Fitted] = []
         for chosen in found.fitted[:CHANCES]:
             told = self._evidence_held_out(chosen)
@@ -241,13 +242,23 @@ class _Workflow:
                 continue
             before, after = self._predicted(reference, chosen.fit)
             removed = self._removed(reference, chosen, before, after)
-            holds = removed >= options.least_share
-            self.steps.append(self._step(found, chosen, reference, (before, after), removed, told, refused))
-            if holds:
+            refusal = self._refusal(chosen, removed)
+            self.steps.append(self._step(found, chosen, reference, (before, after), removed, told, refused, refusal))
+            if refusal is None:
                 self._take(chosen)
                 return True
             refused.append(chosen)
         return False
+
+    def _refusal(self, chosen: Fitted, removed: float) -> Refusal | None:
+        """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or
+        asks for another machine than the file describes. An effect that is there brings stated numbers back."""
+        if removed < self.case.options.least_share:
+            return Refusal(kind="falls-too-little", numbers={"share": removed})
+        before = {u.name: abs(prior_distance(u, self.now.values[u.name])[0]) for u in self.now.unknowns}
+        after = {u.name: abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in chosen.fit.unknowns}
+        farthest = max((d for name, d in after.items() if before.get(name, FAR_OFF) < FAR_OFF), default=0.0)
+        return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
 
     def _reference(self, chosen: Fitted) -> BalanceFit:
         """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
@@ -368,17 +379,18 @@ class _Workflow:
         removed: float,
         told: float,
         refused: Sequence[Fitted],
+        refusal: Refusal | None,
     ) -> Step:
         """The step that the chosen effect is.
 
         Args:
             reference: the fit that it is held against.
             elsewhere: mean squares (n,) on records not fitted to, before and after. told: evidence that held-out ones
-                give. refused: candidates of this step that did not hold there; they are no rivals.
+                give. refused: candidates of this step that were not taken; they are no rivals. refusal: why this one
+                is not.
         """
         before, after = elsewhere
         case = self.case
-        holds = removed >= case.options.least_share
         standing = [c for c in found.fitted if not any(c is one for one in refused)]
         rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < self._margin(chosen, r)]
@@ -400,8 +412,8 @@ class _Workflow:
             where=locate(self.now, case),
             reason=UNWRITTEN,
             reason_data=Reason(removed=removed, slides=self._slides(chosen.joints)),
-            adopted=holds,
-            refusal=None if holds else Refusal(kind="falls-too-little", numbers={"share": removed}),
+            adopted=refusal is None,
+            refusal=refusal,
         )
 
     def _excess_removed(self, fitted: Floats, before: Floats, after: Floats) -> float | None:
