@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import NoController
 from daq_cli.app import completion
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
@@ -41,6 +43,13 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
+
+
+class Comparison(StrEnum):
+    """How model and records are compared."""
+
+    OUTPUT_ERROR = "output-error"
+    INVERSE_DYNAMICS = "inverse-dynamics"
 
 
 def _spec_file(path: Path | None) -> Path | None:
@@ -78,6 +87,13 @@ def diagnose(
             min=1, max=10, help="Largest number of effects to add, one after the other (default: 3; of torques 8)."
         ),
     ] = None,
+    method: Annotated[
+        Comparison | None,
+        typer.Option(
+            help="Simulate the closed loop (output-error), or balance torques along the recorded motion "
+            "(inverse-dynamics). Default: as machine and traces allow."
+        ),
+    ] = None,
     out: Annotated[Path | None, OutOption] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
@@ -110,10 +126,12 @@ def diagnose(
 
     robot = robot_of(context)
     load_effects(effect_file, robot)
-    options = _options(effects, joints, most)
+    options = _options(effects, joints, most, method)
     fitted_to = read_traces(robot, folder, traces)
     held = read_traces(robot, folder, holdout) if holdout else []
     begin = _beginning(robot, fitted_to, traces, model, load)
+    if method is None and (acquire or next_file is not None) and not isinstance(begin.machine.controller, NoController):
+        options = options.model_copy(update={"method": Comparison.OUTPUT_ERROR.value})  # it alone asks for experiments
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
     if load is not None:
         require_load_held(begin, fitted_to)
@@ -177,16 +195,15 @@ def _print_result(
         console().print(f"report: {page}")
 
 
-def _options(effects: str | None, joints: str | None, most: int | None) -> DiagnosisOptions:
+def _options(effects: str | None, joints: str | None, most: int | None, method: Comparison | None) -> DiagnosisOptions:
     from daq.contracts.experiment import parse_joints
     from daq_cli.models.effect_choice import effect_names
     from model.discrepancy.options import DiagnosisOptions
 
     names = None if effects is None else effect_names(effects)
     chosen = None if joints is None else tuple(parse_joints(joints))
-    if most is None:
-        return DiagnosisOptions(effects=names, joints=chosen)
-    return DiagnosisOptions(effects=names, joints=chosen, most_steps=most)
+    given: dict[str, Any] = {} if most is None else {"most_steps": most}
+    return DiagnosisOptions(effects=names, joints=chosen, method=None if method is None else method.value, **given)
 
 
 def _beginning(

@@ -179,6 +179,7 @@ class ServiceJobs:
             effects=options.effects,
             joints=options.joints,
             most_steps=options.most_steps,
+            method=options.method,
             design=design,
             name=None if out is None else model_name(out.name),
         )

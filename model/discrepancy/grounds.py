@@ -79,7 +79,9 @@ Measurement = Literal[
     "stopped-arm",
 ]
 """A measurement beside the arm's own readings."""
-RefusalKind = Literal["diverges", "error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"]
+RefusalKind = Literal[
+    "contradicts-file", "diverges", "error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"
+]
 
 
 class NamedEffect(FrozenRecord):

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
+from model.discrepancy.grounds import Method
 from model.effects.library import effect
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ class DiagnosisOptions(FrozenRecord):
     effects: candidates by name; None for the whole library and loaded effects of the user's own.
     joints: on these joints only; None for all that the model moves.
     most_steps: effects that may be added, one after another.
+    method: how model and records are compared; None: as machine and traces allow (`method_choice`).
     fitted: candidates per step that are fitted after the probes.
     polished: how many of the best fits are taken to their ends.
     """
@@ -27,6 +29,7 @@ class DiagnosisOptions(FrozenRecord):
     effects: tuple[str, ...] | None = None
     joints: tuple[int, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+    method: Method | None = None
     fitted: Annotated[int, Field(ge=1, le=100)] = 8
     polished: Annotated[int, Field(ge=1, le=100)] = 3
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
+from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
@@ -26,9 +26,9 @@ def diagnose(
 ) -> Diagnosis:
     """Where a model and traces disagree, which effects are missing, and what adding them brings.
 
-    On a machine with a controller the closed loop is simulated from the recorded set points. Without one, or where the
-    traces have no set points, the recorded drive is balanced against the motion in torques. `chooser` knows the
-    experiments that may be run next on a machine with a controller; without it, nothing is proposed.
+    Either the closed loop is simulated from the recorded set points, or the recorded drive is balanced against the
+    motion in torques: `method_choice` says when. `chooser` knows the experiments that may be run next on a machine with
+    a controller; without it, or in torques, nothing is proposed.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give an answer; one line says why.
@@ -37,7 +37,8 @@ def diagnose(
     options, cancel = options or DiagnosisOptions(), cancel or Never()
     check_options(options, model)
     _refuse_shared(traces, holdout)
-    if isinstance(model.machine.controller, NoController) or any(t.set_point is None for t in traces):
+    designs = chooser is not None and chooser.search is not None
+    if choose_method(model, traces, options, designs=designs) == "inverse-dynamics":
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
         return diagnose_torques(model, traces, holdout, options, progress, cancel)

@@ -18,7 +18,7 @@ from model.inverse_dynamics.drive_timing import samples_late
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
-from model.machine_model.nominal import is_rod_arm
+from model.machine_model.nominal import is_rod_arm, nominal_vector
 from model.simulation.bodies import chain_body
 from model.simulation.own_table import own_table
 
@@ -64,7 +64,8 @@ class TorqueBalance:
         """Torque needed of the motors less torque that they were driven with, N·m (N), low-passed, compared samples.
 
         It is the drive that is predicted from the motion, and not the motion from the drive: an effect that makes the
-        drive act less would otherwise make the residual smaller by itself.
+        drive act less would otherwise make the residual smaller by itself. For the same reason it is told as a torque
+        of the drive that the machine file states, whatever the fitted resistance, magnet and gear ratio make of a volt.
 
         values: of the model's parameters, and of `drive_timing.timing_unknowns`, by name.
         """
@@ -97,7 +98,7 @@ class TorqueBalance:
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
             torque = _held_by_friction(torque, levels[i], motion.contact, record)
-            result.append(record.compared(torque))
+            result.append(record.compared(torque * (self._stated_gain / _torque_per_volt(joints))))
         return result
 
     def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
@@ -113,9 +114,12 @@ class TorqueBalance:
 
     def supplied_by_drive(self) -> list[Floats]:
         """Torque of the drive alone (m, n), as recorded, of motors at standstill: what residuals are shares of."""
-        joints = _joints_of(self.model.vector, self.model)
-        gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
-        return [record.compared(record.drive * gain) for record in self.records]
+        return [record.compared(record.drive * self._stated_gain) for record in self.records]
+
+    @cached_property
+    def _stated_gain(self) -> Floats:
+        """Torque of a motor at standstill for a unit of drive (n,), by the machine file."""
+        return _torque_per_volt(_joints_of(nominal_vector(self.model.machine), self.model))
 
     @cached_property
     def _own(self) -> NDArray[np.int64]:
@@ -210,6 +214,12 @@ def _joints_of(vector: Floats, model: Model) -> Floats:
     return np.ascontiguousarray(vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
 
 
+def _torque_per_volt(joints: Floats) -> Floats:
+    """Torque of a motor at standstill for a volt, or for a unit of a plain drive (n,)."""
+    constant = joints[:, at.TORQUE_CONSTANT] * (1 - joints[:, at.FLUX_LOSS])
+    return np.asarray(joints[:, at.GEAR] * constant / joints[:, at.RESISTANCE])
+
+
 def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) -> Floats:
     out, settings = np.zeros_like(position), np.zeros(at.SETTINGS, dtype=np.int64)
     settings[at.PUBLISHED_LOADS] = int(is_rod_arm(model.machine))
@@ -257,9 +267,8 @@ def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
     width = joints[:, at.DEAD_ZONE]
     if not width.any():
         return np.zeros_like(asked)
-    geared = joints[:, at.GEAR] * (1 - joints[:, at.FLUX_LOSS])
-    gain = geared * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
-    back_emf = geared * joints[:, at.BACK_EMF]
+    gain = _torque_per_volt(joints)
+    back_emf = joints[:, at.GEAR] * (1 - joints[:, at.FLUX_LOSS]) * joints[:, at.BACK_EMF]
     volts = asked / gain + back_emf * speed
     soft = CONTACT_SHARE * np.sqrt(np.mean(volts**2, axis=0)) + 1e-12
     return np.asarray(gain * width * np.tanh(volts / soft))

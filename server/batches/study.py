@@ -161,7 +161,9 @@ def _diagnosed(study: DiagnoseStudy, model: Model, trace: Trace) -> tuple[Column
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
 
-    options = DiagnosisOptions(effects=study.effects, joints=study.joints, most_steps=study.most_steps)
+    options = DiagnosisOptions(
+        effects=study.effects, joints=study.joints, most_steps=study.most_steps, method=study.method
+    )
     found = diagnose(model, [trace], [], options)
     return of_diagnosis(found, headline(found)), found.model_dump_json()
 

@@ -211,7 +211,9 @@ class _Worker:
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
         begin = self._model(request.model)
-        options = DiagnosisOptions(effects=request.effects, joints=request.joints, most_steps=request.most_steps)
+        options = DiagnosisOptions(
+            effects=request.effects, joints=request.joints, most_steps=request.most_steps, method=request.method
+        )
         found = diagnose(
             begin,
             traces,

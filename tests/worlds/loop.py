@@ -28,10 +28,11 @@ def rounded(value: float) -> float:
 def control(wanted: float, read: float, p: Any, loop: Any, exact: bool, memory: Any) -> float:
     """The output of a period, as it is recorded. Without `exact` (a smooth loop) nothing is rounded.
 
-    Board-like: integers, in counts; else volts or N·m. Gains are multiplied by what a wrong gain adds; a share of set
-    points that gets lost shows as a set point between this one and the last.
+    Board-like: integers, in counts; else volts or N·m. Gains are multiplied by what a wrong gain adds. In a smooth loop
+    a share of set points that gets lost shows as a set point between this one and the last; in an exact one the
+    caller has lost them already.
     """
-    taken = wanted - p.lost * (wanted - memory[LAST_WANTED])
+    taken = wanted if exact else wanted - p.lost * (wanted - memory[LAST_WANTED])
     memory[LAST_WANTED] = wanted
     error = taken - read
     before = memory[LAST_ERROR]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -113,7 +113,18 @@ def record(rig: Rig, name: str) -> Motion:
     """A record of the rig as it is measured, from the end of its settling."""
     asked = wanted(rig, name)
     noise = sensor_noise(rig, generator(rig.kind_name, rig.seed, f"noise of {name}"), asked.shape)
-    return without_settling(rig, simulate(rig.bodies, rig.joints, rig.loop, asked, noise=noise))
+    taken = not_lost(rig, generator(rig.kind_name, rig.seed, f"losses of {name}"), asked)
+    made = simulate(rig.bodies, rig.joints, rig.loop, taken, noise=noise)
+    return without_settling(rig, replace(made, set_point=asked))  # a record has what was sent
+
+
+def not_lost(rig: Rig, draw: Generator, asked: Floats) -> Floats:
+    """Set points (k, n) that the controller works with: for each one that is lost, the one that it had before."""
+    taken = asked.copy()
+    lost = draw.random(asked.shape) < rig.joints["lost"]
+    for k in range(1, len(taken)):
+        taken[k] = np.where(lost[k], taken[k - 1], asked[k])
+    return taken
 
 
 def without_settling(rig: Rig, motion: Motion) -> Motion:

@@ -81,6 +81,8 @@ class DiagnoseStudy(Wire):
     """Candidate effects; None for all known ones."""
     joints: tuple[JointNumber, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+    method: Literal["output-error", "inverse-dynamics"] | None = None
+    """How model and traces are compared; None: as machine and traces allow."""
 
 
 Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]

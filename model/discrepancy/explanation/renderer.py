@@ -133,25 +133,31 @@ def refusal_words(refusal: Refusal) -> str:
     """Why an effect was not taken into the model, as a clause."""
     n = refusal.numbers
     match refusal.kind:
+        case "contradicts-file":
+            words = (
+                f"with it, a number of the machine comes out {n['deviations']:.1f} stated deviations from what "
+                "its file says, which it did not without"
+            )
         case "diverges":
-            return "with it, the simulation of the held-out traces does not stay finite"
+            words = "with it, the simulation of the held-out traces does not stay finite"
         case "error-grows":
-            return f"the error on the held-out traces grows, by {n['share']:.0%} of what is beyond noise there"
+            words = f"the error on the held-out traces grows, by {n['share']:.0%} of what is beyond noise there"
         case "error-rises":
-            return (
+            words = (
                 f"the error on the held-out traces rises: its sum of squares by {n['rise']:.0f} ± {n['deviation']:.0f} "
                 "variances of a reading"
             )
         case "falls-too-little":
-            return f"on records not fitted to, the mean square falls by only {n['share']:.1%}"
+            words = f"on records not fitted to, the mean square falls by only {n['share']:.1%}"
         case "only-resembles":
-            return (
+            words = (
                 "it only resembles what is missing: with all that was found, "
                 f"{joints_in_words(refusal.joints)} still {'disagrees' if len(refusal.joints) == 1 else 'disagree'} "
                 "beyond noise"
             )
         case "superfluous":
-            return "a later effect explains what it explained"
+            words = "a later effect explains what it explained"
+    return words
 
 
 def summary(answer: Diagnosis) -> str:

@@ -28,8 +28,9 @@ from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit, prior_distance
 from model.discrepancy.inverse_dynamics.gap import torque_gap
+from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
@@ -51,6 +52,8 @@ CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
 SHOWN = 12
 """Most candidates that a step lists."""
+FAR_OFF = 4.0
+"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
@@ -97,7 +100,8 @@ def diagnose_torques(
         raise TraceError("no traces: a diagnosis needs at least one")
     chosen = torque_options(options)
     check_options(chosen, model)
-    _refuse_unseen(chosen)
+    controller = judge_controller(model, traces)
+    _refuse_unseen(chosen, controller.settled)
     cutoff = chosen.cutoff or choose_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     records = recorded_motions(traces, model.machine, cutoff)
@@ -108,7 +112,7 @@ def diagnose_torques(
         np.maximum(torque_noise(model, traces, cutoff), repeats),
         chosen,
     )
-    work = _Workflow(model, case, progress, cancel or Never())
+    work = _Workflow(model, case, controller, progress, cancel or Never())
     work.run()
     work.notes += on_unfinished((*traces, *held_out))
     answer = work.answer([t.record.trace_id for t in traces], [t.record.trace_id for t in held_out], cutoff)
@@ -116,10 +120,10 @@ def diagnose_torques(
     return with_sentences(answer.model_copy(update={"seconds": time.perf_counter() - begun, "robot_seconds": robot}))
 
 
-def _refuse_unseen(options: TorqueOptions) -> None:
+def _refuse_unseen(options: TorqueOptions, settled: Sequence[str]) -> None:
     """Raises SpecError for a named effect that torques do not show: not finding it would say nothing."""
     for name in options.effects or ():
-        if name in NOT_IN_TORQUES:
+        if name in NOT_IN_TORQUES and name not in settled:
             raise SpecError(f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out")
 
 
@@ -129,6 +133,7 @@ class _Workflow:
 
     model: Model
     case: TorqueCase
+    controller: JudgedController
     progress: Progress
     cancel: Cancel
     added: dict[str, Parameter] = field(default_factory=dict)
@@ -227,7 +232,6 @@ class _Workflow:
 
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
-        options = self.case.options
         refused: list[Fitted] = []
         for chosen in found.fitted[:CHANCES]:
             told = self._evidence_held_out(chosen)
@@ -238,13 +242,23 @@ class _Workflow:
                 continue
             before, after = self._predicted(reference, chosen.fit)
             removed = self._removed(reference, chosen, before, after)
-            holds = removed >= options.least_share
-            self.steps.append(self._step(found, chosen, reference, (before, after), removed, told, refused))
-            if holds:
+            refusal = self._refusal(chosen, removed)
+            self.steps.append(self._step(found, chosen, reference, (before, after), removed, told, refused, refusal))
+            if refusal is None:
                 self._take(chosen)
                 return True
             refused.append(chosen)
         return False
+
+    def _refusal(self, chosen: Fitted, removed: float) -> Refusal | None:
+        """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or
+        asks for another machine than the file describes. An effect that is there brings stated numbers back."""
+        if removed < self.case.options.least_share:
+            return Refusal(kind="falls-too-little", numbers={"share": removed})
+        before = {u.name: abs(prior_distance(u, self.now.values[u.name])[0]) for u in self.now.unknowns}
+        after = {u.name: abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in chosen.fit.unknowns}
+        farthest = max((d for name, d in after.items() if before.get(name, FAR_OFF) < FAR_OFF), default=0.0)
+        return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
 
     def _reference(self, chosen: Fitted) -> BalanceFit:
         """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
@@ -365,17 +379,18 @@ class _Workflow:
         removed: float,
         told: float,
         refused: Sequence[Fitted],
+        refusal: Refusal | None,
     ) -> Step:
         """The step that the chosen effect is.
 
         Args:
             reference: the fit that it is held against.
             elsewhere: mean squares (n,) on records not fitted to, before and after. told: evidence that held-out ones
-                give. refused: candidates of this step that did not hold there; they are no rivals.
+                give. refused: candidates of this step that were not taken; they are no rivals. refusal: why this one
+                is not.
         """
         before, after = elsewhere
         case = self.case
-        holds = removed >= case.options.least_share
         standing = [c for c in found.fitted if not any(c is one for one in refused)]
         rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < self._margin(chosen, r)]
@@ -397,8 +412,8 @@ class _Workflow:
             where=locate(self.now, case),
             reason=UNWRITTEN,
             reason_data=Reason(removed=removed, slides=self._slides(chosen.joints)),
-            adopted=holds,
-            refusal=None if holds else Refusal(kind="falls-too-little", numbers={"share": removed}),
+            adopted=refusal is None,
+            refusal=refusal,
         )
 
     def _excess_removed(self, fitted: Floats, before: Floats, after: Floats) -> float | None:
@@ -508,13 +523,17 @@ class _Workflow:
             fit={"fitted": [u.name for u in own]},
             note="diagnosis",
         )
+        proved = self.controller.steps(self.begin, self.case.noise)
+        found = self.model.with_values(self.now.model_values)
         fit_errors, held_errors = self._errors(self.case.records), self._errors(self.case.held_out)
         return Diagnosis(
-            verdict=verdict(steps, unexplained=missing and not adopted, suspected=self.suspicion is not None),
+            verdict=verdict(
+                (*proved, *steps), unexplained=missing and not adopted, suspected=self.suspicion is not None
+            ),
             suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
-            steps=steps,
+            steps=(*proved, *steps),
             rmse_fit=fit_errors,
             rmse_holdout=held_errors,
             gap=torque_gap(fit_errors, held_errors, steps),
@@ -522,20 +541,27 @@ class _Workflow:
             candidates=self.tried,
             remaining=shapes,
             model_before=self.begin,
-            model_after=self.model.with_values(self.now.model_values).with_lineage(lineage),
+            model_after=self.controller.with_findings(found).with_lineage(lineage),
             traces=tuple(traces),
             holdout=tuple(held_out),
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes_data=(*stated, *named, self._shares(), *_assumptions(cutoff), *self._timing(), *self.notes),
+            notes_data=(
+                *stated,
+                *named,
+                self._shares(),
+                *_assumptions(cutoff, self.controller.not_looked_for),
+                *self._timing(),
+                *self.notes,
+            ),
         )
 
 
-def _assumptions(cutoff: float) -> tuple[Note, ...]:
+def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note, ...]:
     return (
         Note(kind="cutoff", values={"cutoff": cutoff}),
         Note(kind="resting-left-out"),
-        Note(kind="not-looked-for", values={"effects": NOT_IN_TORQUES}),
+        Note(kind="not-looked-for", values={"effects": dict(not_looked_for)}),
         Note(kind="positions-of-links"),
     )

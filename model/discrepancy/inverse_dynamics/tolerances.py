@@ -34,7 +34,7 @@ def tolerances(
     known = sizes or {}
     every = [known.get(p.name, p) for p in model.parameters]
     own = [p for p in every if p.name not in added]
-    stated = [p for p in own if p.deviation is not None and p.effect is None and not p.sets_torque_scale]
+    stated = [p for p in own if p.deviation is not None and p.effect is None]
     bodies = [p for p in own if p.kind is Kind.INERTIA and p.value != 0.0]
     machine: list[tuple[Parameter, float | None]]
     source: DeviationSource

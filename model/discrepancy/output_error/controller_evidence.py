@@ -18,9 +18,8 @@ from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, o
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, SignalError, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
-from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.sampled_controller import controller_numbers
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
@@ -198,8 +197,8 @@ class _JointRecords:
         return wanted[free], power[free]
 
 
-def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
-    """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its errors are zero."""
+def proved_step(finding: ControllerFinding, errors: tuple[SignalError, ...]) -> Step:
+    """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its `errors` are zero."""
     part, effect = finding.effect.part, finding.effect.value
     name = f"joint{finding.joint}.{effect}.{part}"
     value = FoundValue(
@@ -209,7 +208,6 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
     proof = Candidate(
         effect=effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
     )
-    quiet: Signals = tuple(np.zeros_like(r.measured) for r in observation.records)
     return Step(
         effect=effect,
         joints=(finding.joint,),
@@ -217,7 +215,7 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
         evidence=evidence,
         margin=evidence,
         candidates=(proof,),
-        rmse_fit=observation.errors(quiet, quiet, observation.deviations),
+        rmse_fit=errors,
         where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
         reason=UNWRITTEN,
         proof=ControllerProof(samples=finding.samples, of=finding.of),

@@ -25,6 +25,8 @@ LEAST_STEPS = 4.0
 """Least drive of a sample that is used for a gain, in resolutions: rounding dominates below it."""
 LEAST_SAMPLES = 20
 """Samples that the estimate of a gain needs."""
+REWEIGHTED = 20
+"""Rounds of weights for a line of least absolute deviations."""
 
 
 @dataclass(frozen=True)
@@ -62,26 +64,46 @@ def controller_numbers(trace: Trace, machine: Machine, joint: int) -> Controller
     limited = np.abs(drive) >= (np.inf if limit is None else limit.value - resolution)
     law = _Law(controller, joint, period)
     sent, position = _rounded(trace.set_point[:, column], controller, joint), trace.position[:, column]
-    plain = law.follow(sent, position, drive, limited, 1.0, np.inf)[1]
-    free = ~limited & (np.abs(plain) > LEAST_STEPS * resolution)
-    factor = 1.0 if int(free.sum()) < LEAST_SAMPLES else _ratio(drive[free], plain[free], resolution)
-    if not factor > 0.0:
-        return None
-    factor = 1.0 if abs(factor - 1.0) < FINEST else factor
-    used, formed = law.follow(sent, position, drive, limited, factor, resolution)
-    apart = np.abs(drive - factor * formed)
-    agreed = limited | (apart <= 0.75 * resolution + 2 * FINEST * np.abs(drive))
-    if np.mean(agreed) < LEAST_AGREEMENT:
-        return None
-    near = apart <= _farthest(drive, resolution)
-    large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
-    return ControllerNumbers(used, formed, drive, limited, large, factor)
+    plain = law.follow(sent, position, drive, limited, _Scale(1.0, 0.0), np.inf)[1]
+    free = ~limited & (np.abs(drive) > LEAST_STEPS * resolution)
+    # By the file from the first sample on, which is right however many set points were lost; and by a line.
+    scales = [_Scale(1.0, float(drive[0] - plain[0]) if law.integrates else 0.0)]
+    if int(free.sum()) >= LEAST_SAMPLES:
+        scales.append(_scale(drive[free], plain[free], resolution, offset=law.integrates))
+    found: list[tuple[float, ControllerNumbers]] = []
+    for scale in (s for s in scales if s.factor > 0.0):
+        used, formed = law.follow(sent, position, drive, limited, scale, resolution)
+        apart = np.abs(drive - scale.factor * formed)
+        agreed = limited | (apart <= 0.75 * resolution + 2 * FINEST * np.abs(drive))
+        near = apart <= _farthest(drive, resolution)
+        large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
+        numbers = ControllerNumbers(used, formed, drive, limited, large, scale.factor)
+        found.append((float(np.mean(agreed)), numbers))
+    share, numbers = max(found, key=lambda one: one[0])
+    return numbers if share >= LEAST_AGREEMENT else None
 
 
-def _ratio(drive: Floats, formed: Floats, resolution: float) -> float:
-    """By which the drive is larger than the formed one, but for samples whose set points were lost."""
-    near = np.abs(drive - np.median(drive / formed) * formed) <= _farthest(drive, resolution)
-    return float(drive[near] @ formed[near] / (formed[near] @ formed[near]))
+@dataclass(frozen=True)
+class _Scale:
+    """What a drive is of the one that the gains of the file form with empty integrators: `factor` times it, and `held`
+    beside it, which the integrators held when the record began."""
+
+    factor: float
+    held: float
+
+
+def _scale(drive: Floats, formed: Floats, resolution: float, *, offset: bool) -> _Scale:
+    """The straight line from the formed drive to the recorded one, but for samples whose set points were lost: of least
+    absolute deviations first, then of least squares near that. offset: whether it may pass beside zero."""
+    columns = np.column_stack([formed, np.full(len(formed), float(offset))])
+    line: Floats = np.zeros(2)
+    weight: Floats = np.ones(len(formed))
+    for _ in range(REWEIGHTED):
+        line = np.asarray(np.linalg.lstsq(columns * weight[:, None], drive * weight, rcond=None)[0])
+        weight = 1 / np.sqrt(np.maximum(np.abs(drive - columns @ line), resolution))
+    near = np.abs(drive - columns @ line) <= _farthest(drive, resolution)
+    line = np.asarray(np.linalg.lstsq(columns[near], drive[near], rcond=None)[0])
+    return _Scale(1.0 if abs(line[0] - 1.0) < FINEST else float(line[0]), float(line[1]))
 
 
 def _farthest(drive: Floats, resolution: float) -> Floats:
@@ -118,17 +140,26 @@ class _Law:
         self.inner = None if inner is None else inner[joint - 1]
         self.period = period
 
+    @property
+    def integrates(self) -> bool:
+        """Whether the controller sums up errors, of which a record does not hold the beginning."""
+        return self._summed != 0.0
+
+    @property
+    def _summed(self) -> float:
+        """I of the loop that forms the drive."""
+        return (self.outer if self.inner is None else self.inner)[1]
+
     def follow(
-        self, sent: Floats, position: Floats, drive: Floats, limited: NDArray[np.bool_], factor: float, line: float
+        self, sent: Floats, position: Floats, drive: Floats, limited: NDArray[np.bool_], scale: _Scale, line: float
     ) -> tuple[Floats, Floats]:
         """Set points in use, and the drive that the gains make of them. A set point counts as lost where the drive is
         further than `line` from what it would make, and nearer to what the one before makes."""
         used, formed = np.empty_like(sent), np.empty_like(sent)
-        p, i, _ = self.outer
-        start = float(sent[0] - position[0])
-        own = drive[0] / factor
-        total = (own - p * start) / i - start * self.period if i != 0.0 and self.inner is None else 0.0
-        memory = (total, start, 0.0, 0.0, float(position[0]))
+        factor, start = scale.factor, float(sent[0] - position[0])
+        total = scale.held / (factor * self._summed) if self.integrates else 0.0
+        totals = (total, 0.0) if self.inner is None else (0.0, total)
+        memory = (totals[0], start, totals[1], 0.0, float(position[0]))
         for k in range(len(sent)):
             wanted = float(sent[k])
             output, after = self._output(wanted - position[k], float(position[k]), memory)

@@ -17,7 +17,7 @@ from model.discrepancy.candidates.decision import Added, decide
 from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
@@ -94,7 +94,7 @@ def diagnose_by_simulation(
     first = judge(fitted)
     search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")
-    proved = tuple(proved_step(given.observation, f) for f in findings)
+    proved = tuple(proved_step(f, _no_errors(given.observation)) for f in findings)
     answer = _answer(case, search, proved, chooser, cancel)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
@@ -135,6 +135,12 @@ class _Search:
         after = [*self.before[1:], self.current]
         adopted = [k for k, step in enumerate(self.steps) if step.adopted]
         return [(self.steps[k], (self.current if k == adopted[-1] else after[k]).point) for k in adopted]
+
+
+def _no_errors(observation: Observation) -> tuple[SignalError, ...]:
+    """Errors of zero, of a step that fits nothing."""
+    quiet = tuple(np.zeros_like(r.measured) for r in observation.records)
+    return observation.errors(quiet, quiet, observation.deviations)
 
 
 def _given_point(observation: Observation, given: Calibration) -> Point:
