@@ -11,7 +11,7 @@ What this first version leaves out:
 - rivals on other joints than the effect's; held-out records; recorded speeds;
 - the closed loop hides a part of what a recorded drive shows: d′ is rather too small; coloured noise counts as white
   with its density at low frequencies, outliers do not count;
-- tolerances answer linearly (repeated where the outcome is near 5), sizes are sought from a few starts: for ripple,
+- sizes are sought from a few starts, with tolerances that answer linearly, before tolerances are refitted: for ripple,
   disturbance and the gears that give d′ may be too large.
 """
 
@@ -34,8 +34,18 @@ from tests.worlds.world import COLOURED_CORNER, TRAINING, wanted, without_settli
 
 STEP = 2e-4
 """s of the simulations here."""
-DECIDES = 15.0
-"""d′ above which an exact value decides nothing."""
+DECIDES = 300.0
+"""d′ by linear tolerances above which they are not refitted: no tolerance brings it below 5."""
+NOT_TOLD = 4.9
+"""d′ at which a refit of tolerances ends, since the record does not tell."""
+REFITTED = 6
+"""Steps of a refit of tolerances."""
+FARTHEST = 3.0
+"""Deviations at which a refit begins at the most; it may go twice as far."""
+DIFFERENCE = 0.05
+"""Step of differences in a refit, deviations."""
+ORIGIN = 20.0
+"""What a search adds to steps, which are around zero: its own differences are shares of its numbers."""
 EVALUATIONS = 6
 """Of sizes, at most, after the starts."""
 STARTS = (0.2, 0.6, 1.6)
@@ -59,6 +69,14 @@ SHIFTED = ("ripple_phase", "disturbance_phase", "spring_rest", "about_x", "about
 MOVED = 0.5
 KEPT = ("current", "duration", "cooling_time")
 """Sizes that are not refitted: little depends on them. Nor is the stiffness of a contact behind a gap."""
+
+
+class _NotToldError(Exception):
+    """A search has come to a χ² at which the record does not tell."""
+
+    def __init__(self, chi_square: float) -> None:
+        super().__init__(chi_square)
+        self.chi_square = chi_square
 
 
 @dataclass(frozen=True)
@@ -150,20 +168,40 @@ class _Comparison:
             )
             best = fit.x
         linear = _square(left(best))
-        if linear >= DECIDES**2:
+        if linear >= DECIDES**2 or not self.answers.shape[1]:
             return linear
-        return self._checked(rival(best), linear)
+        made = rival(best)
+        difference = self._readings(made.bodies, made.joints, made.loop) - self.true
+        both = np.concatenate([difference, np.zeros(self.answers.shape[1])])
+        steps = -np.linalg.solve(self.triangle, self.basis.T @ both)
+        return min(linear, self._refitted(made, steps))
 
-    def _checked(self, made: Rig, linear: float) -> float:
-        """χ² with the tolerances really moved, and moved again."""
-        steps, found = np.zeros(self.answers.shape[1]), math.inf
-        for _ in range(3):
+    def _refitted(self, made: Rig, linear: Floats) -> float:
+        """χ² with the tolerances really moved, by least squares from where they would answer if they were linear, and
+        from the stated numbers; not searched further once the record does not tell."""
+        best = math.inf
+        for start in (np.clip(linear, -FARTHEST, FARTHEST), np.zeros(linear.size)):
+            try:
+                found = self._searched(made, start)
+            except _NotToldError as untold:
+                return untold.chi_square
+            best = min(best, found)
+        return best
+
+    def _searched(self, made: Rig, start: Floats) -> float:
+        """Least χ² of a search that begins at steps (in deviations of the tolerances)."""
+
+        def left(moved_by: Floats) -> Floats:
+            steps = moved_by - ORIGIN
             by = {t: float(s) * t.share for t, s in zip(self.rig.tolerances, steps, strict=True)}
-            residual = self._readings(*moved(made, by)) - self.true
-            found = min(found, _square(residual) + _square(steps))
-            both = np.concatenate([residual - self.answers @ steps, np.zeros(steps.size)])
-            steps = -np.linalg.solve(self.triangle, self.basis.T @ both)
-        return max(found, 0.0) if math.isfinite(found) else linear
+            residual = np.concatenate([self._readings(*moved(made, by)) - self.true, steps])
+            if _square(residual) < NOT_TOLD**2:
+                raise _NotToldError(_square(residual))
+            return residual
+
+        bounds = (ORIGIN - 2 * FARTHEST, ORIGIN + 2 * FARTHEST)
+        fit = least_squares(left, start + ORIGIN, diff_step=DIFFERENCE / ORIGIN, bounds=bounds, max_nfev=REFITTED)
+        return 2.0 * float(fit.cost)
 
     def _less_tolerances(self, difference: Floats) -> Floats:
         """What of a difference the tolerances cannot take away, with what they cost."""
