@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController, SampledPid
 from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Method
@@ -45,11 +45,12 @@ def choose_method(model: Model, traces: Sequence[Trace], options: DiagnosisOptio
 
 
 def _accelerations_are_known(model: Model, traces: Sequence[Trace]) -> bool:
-    """Whether the traces hold drives, and accelerations beyond the noise of their readings."""
+    """Whether the traces hold drives, and accelerations beyond the noise of their readings. A record that torques
+    cannot use, as one with a gap, may still be simulated."""
     if any(trace.drive is None for trace in traces):
         return False
     try:
         choose_cutoff(traces, model.machine)
-    except SpecError:
+    except (SpecError, TraceError):
         return False
     return True

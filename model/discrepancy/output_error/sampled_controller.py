@@ -25,6 +25,9 @@ LEAST_STEPS = 4.0
 """Least drive of a sample that is used for a gain, in resolutions: rounding dominates below it."""
 LEAST_SAMPLES = 20
 """Samples that the estimate of a gain needs."""
+LATER_STARTS = (1, 2, 3, 4, 5)
+"""Samples from which what the integrators held is told, where the first does not tell it: a set point that was lost
+near one of them makes it wrong."""
 REWEIGHTED = 20
 """Rounds of weights for a line of least absolute deviations."""
 
@@ -66,19 +69,23 @@ def controller_numbers(trace: Trace, machine: Machine, joint: int) -> Controller
     sent, position = _rounded(trace.set_point[:, column], controller, joint), trace.position[:, column]
     plain = law.follow(sent, position, drive, limited, _Scale(1.0, 0.0), np.inf)[1]
     free = ~limited & (np.abs(drive) > LEAST_STEPS * resolution)
-    # By the file from the first sample on, which is right however many set points were lost; and by a line.
-    scales = [_Scale(1.0, float(drive[0] - plain[0]) if law.integrates else 0.0)]
-    if int(free.sum()) >= LEAST_SAMPLES:
-        scales.append(_scale(drive[free], plain[free], resolution, offset=law.integrates))
-    found: list[tuple[float, ControllerNumbers]] = []
-    for scale in (s for s in scales if s.factor > 0.0):
+
+    def judged(scale: _Scale) -> tuple[float, ControllerNumbers]:
         used, formed = law.follow(sent, position, drive, limited, scale, resolution)
         apart = np.abs(drive - scale.factor * formed)
         agreed = limited | (apart <= 0.75 * resolution + 2 * FINEST * np.abs(drive))
         near = apart <= _farthest(drive, resolution)
         large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
-        numbers = ControllerNumbers(used, formed, drive, limited, large, scale.factor)
-        found.append((float(np.mean(agreed)), numbers))
+        return float(np.mean(agreed)), ControllerNumbers(used, formed, drive, limited, large, scale.factor)
+
+    # By the file from the first sample on, which is right however many set points were lost; and by a line.
+    scales = [_Scale(1.0, float(drive[0] - plain[0]) if law.integrates else 0.0)]
+    if int(free.sum()) >= LEAST_SAMPLES:
+        scales.append(_scale(drive[free], plain[free], resolution, offset=law.integrates))
+    found = [judged(scale) for scale in scales if scale.factor > 0.0]
+    if law.integrates and max(share for share, _ in found) < LEAST_AGREEMENT:
+        # A record that begins in motion does not hold the change up to its first sample: by a later one, then.
+        found += [judged(_Scale(1.0, float(drive[k] - plain[k]))) for k in LATER_STARTS if not limited[k]]
     share, numbers = max(found, key=lambda one: one[0])
     return numbers if share >= LEAST_AGREEMENT else None
 

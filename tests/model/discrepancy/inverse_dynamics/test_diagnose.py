@@ -15,6 +15,7 @@ from daq.contracts.progress import CancelledError
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.explanation.renderer import refusal_words
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.holdout import relative_torque_error
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -158,6 +159,43 @@ def test_an_effect_that_explains_too_little_of_records_not_fitted_to_is_refused(
     assert found.steps[0].refusal is not None
     assert found.steps[0].refusal.kind == "falls-too-little"
     assert found.model_after.effects == found.model_before.effects
+
+
+@pytest.mark.parametrize(("mass", "taken"), [(12.0, True), (16.0, False)])
+def test_an_effect_that_asks_for_another_machine_than_the_file_describes_is_refused(mass: float, taken: bool) -> None:
+    """A spring hides a mass 6.7 deviations above the 12 kg of the file: with it, that mass comes out."""
+    traces = [rigs.slide_trace(seed, {"mass": mass, "spring": 400.0}) for seed in (1, 2)]
+    spring = TorqueOptions(effects=("spring_torque",))
+    found = diagnose_torques(base_model(rigs.slide_machine()), traces[:1], traces[1:], spring)
+    (step,) = found.steps
+    assert (step.effect, step.adopted) == ("spring_torque", taken)
+    if taken:
+        assert found.verdict == "named"
+        return
+    assert found.verdict == "unknown-effect", found.summary
+    assert step.refusal is not None
+    assert step.refusal.kind == "contradicts-file"
+    assert step.refusal.numbers["deviations"] == pytest.approx((16.0 - 12.0) / 0.6, rel=0.1)
+    assert "stated deviations from what its file says" in refusal_words(step.refusal)
+    assert found.model_after.effects == found.model_before.effects
+
+
+@pytest.mark.parametrize(("resistance", "constant"), [(2.4, 0.05), (2.3, 0.045)])
+def test_a_motors_stated_resistance_and_torque_constant_are_tolerances(resistance: float, constant: float) -> None:
+    """Both scale every torque. Without them the rotor's inertia, stated to 5 %, would have to be 20 % off and more."""
+    stated = rigs.bench_machine().model_dump()
+    drive = stated["joints"][0]["drive"]
+    drive["resistance"].update(deviation=0.2, low=0.1)
+    drive["torque_constant"].update(deviation=0.005, low=0.001)
+    traces = [rigs.bench_trace(seed, {"resistance": resistance, "constant": constant}) for seed in (1, 2)]
+    found = diagnose_torques(base_model(Machine.model_validate(stated)), traces[:1], traces[1:])
+    assert (found.verdict, found.steps) == ("nothing-significant", ()), found.summary
+    names = ("motor.resistance", "motor.torque_constant", "motor.rotor_inertia")
+    r, k, inertia = (found.model_after.parameter(f"joint1.{name}").value for name in names)
+    assert r * inertia / k == pytest.approx(resistance * rigs.BENCH["inertia"] / constant, rel=0.005)
+    assert inertia == pytest.approx(rigs.BENCH["inertia"], abs=1e-5), "within its deviation"
+    assert abs(r - 2.0) < 2 * 0.2
+    assert abs(k - 0.05) < 2 * 0.005
 
 
 def test_a_machine_file_without_deviations_leaves_its_bodies_free() -> None:

@@ -2327,6 +2327,8 @@ export interface components {
              * @default 3
              */
             most_steps?: number;
+            /** Method */
+            method?: ("output-error" | "inverse-dynamics") | null;
             /** Traces */
             traces: string[];
             /**
@@ -2366,6 +2368,8 @@ export interface components {
              * @default 3
              */
             most_steps?: number;
+            /** Method */
+            method?: ("output-error" | "inverse-dynamics") | null;
         };
         /**
          * DiagnosisData
@@ -5214,7 +5218,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
+            kind: "contradicts-file" | "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
             /**
              * Numbers
              * @default {}
