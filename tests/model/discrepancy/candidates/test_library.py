@@ -21,7 +21,8 @@ def test_every_effect_is_tried_on_every_joint() -> None:
         elif effect.whole_machine:
             assert (name, ()) in found
         elif name in BESIDE:
-            without = arm.without_effect(BESIDE[name])
+            has_it = any(use.name == BESIDE[name] for use in arm.effects)
+            without = arm.without_effect(BESIDE[name]) if has_it else arm
             beside = without.with_effect(BESIDE[name], (2,))
             assert not any(c.name == name for c in hypotheses(without))
             assert {c.joints for c in hypotheses(beside) if c.name == name} == {(2,)}
