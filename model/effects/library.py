@@ -15,11 +15,16 @@ from model.effects.motor import MOTOR
 from model.effects.sensor import SENSOR
 from model.effects.transmission import TRANSMISSION
 
-BESIDE = {"direction_dependent_gear_loss": "gear_loss"}
+BESIDE = {
+    "direction_dependent_gear_loss": "gear_loss",
+    "direction_dependent_viscous_friction": "viscous_friction",
+}
 """Effects that a diagnosis tries, unless asked for by name, only on joints that have another effect already, and which.
 
 A gear that loses κ only while its motor drives gives the torque of one that loses κ/2 both ways, with a constant
 K_T (1 − κ/2). Within the tolerance of K_T it is `gear_loss`; to try both at once would make a group of every gear loss.
+Viscous friction of one direction alone has much of a constant torque, and takes the place of viscous friction and a
+constant torque together, neither of which explains as much by itself.
 """
 
 _own: dict[str, Effect] = {}
