@@ -23,8 +23,8 @@ BESIDE = {
 
 A gear that loses κ only while its motor drives gives the torque of one that loses κ/2 both ways, with a constant
 K_T (1 − κ/2). Within the tolerance of K_T it is `gear_loss`; to try both at once would make a group of every gear loss.
-Viscous friction of one direction alone has much of a constant torque, and takes the place of viscous friction and a
-constant torque together, neither of which explains as much by itself.
+Friction in proportion to speed in one direction, and none in the other, is no law of the field; alone, it stands for a
+constant force and friction together.
 """
 
 _own: dict[str, Effect] = {}
