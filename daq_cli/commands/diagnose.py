@@ -130,7 +130,10 @@ def diagnose(
     fitted_to = read_traces(robot, folder, traces)
     held = read_traces(robot, folder, holdout) if holdout else []
     begin = _beginning(robot, fitted_to, traces, model, load)
-    if method is None and (acquire or next_file is not None) and not isinstance(begin.machine.controller, NoController):
+    simulated = not isinstance(begin.machine.controller, NoController) and all(
+        t.set_point is not None for t in fitted_to
+    )
+    if method is None and (acquire or next_file is not None) and simulated:
         options = options.model_copy(update={"method": Comparison.OUTPUT_ERROR.value})  # it alone asks for experiments
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
     if load is not None:

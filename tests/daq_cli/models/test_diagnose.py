@@ -188,10 +188,43 @@ def test_json_is_the_answer_and_files_are_written(
     assert read_spec(tmp_path / "asked.json") == answer.next_experiment.spec
     assert f"daq run spec {tmp_path / 'asked.json'}" in "".join(said.err.split("\n"))
     assert Diagnosis.model_validate(json.loads(said.out)) == answer
-    assert asked["options"] == DiagnosisOptions(effects=("backlash", "coulomb_friction"), joints=(1,), most_steps=2)
+    assert asked["options"] == DiagnosisOptions(
+        effects=("backlash", "coulomb_friction"), joints=(1,), most_steps=2, method="output-error"
+    ), "it alone proposes the experiment that --next is to write"
     assert len(list(asked["holdout"])) == 1  # type: ignore[call-overload]
     assert json.loads((tmp_path / "new.json").read_text())["lineage"] is not None
     assert "Where they disagree" in (tmp_path / "page.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "method"),
+    [
+        ((), None),
+        (("--method", "inverse-dynamics"), "inverse-dynamics"),
+        (("--method", "output-error"), "output-error"),
+        (("--method", "inverse-dynamics", "--next", "asked.json"), "inverse-dynamics"),
+    ],
+)
+def test_the_method_is_the_one_that_was_asked_for(
+    words: tuple[str, ...],
+    method: str | None,
+    daq: CommandLine,
+    answer: Diagnosis,
+    tmp_path: Path,
+    single_axis: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[DiagnosisOptions] = []
+
+    def imagined(*given: object, **_more: object) -> Diagnosis:
+        asked.append(next(one for one in given if isinstance(one, DiagnosisOptions)))
+        return answer
+
+    monkeypatch.setattr("model.discrepancy.workflow.diagnose", imagined)
+    monkeypatch.chdir(tmp_path)
+    said = daq("diagnose", write_csv(tmp_path / "first.csv"), "--model", single_axis, *words)
+    assert said.code == 0, said.err
+    assert [options.method for options in asked] == [method]
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace, TraceRecord
 from model.fitting.log_cholesky import ENTRIES as PLACES
 from model.fitting.log_cholesky import second_moments
 from model.fitting.options import FitOptions, Prior
-from model.inverse_dynamics.fit import TorqueFit, fit_torques
+from model.inverse_dynamics.fit import TorqueFit, fit_torques, torque_curves
 from model.machine_model.model import Model, base_model
 from model.robot_files.bodies_of_model import outgoing_arm
 from model.robot_files.machine_of_arm import machine_from_urdf
@@ -82,6 +82,12 @@ def least_shares(model: Model) -> list[float]:
     return found
 
 
+def left_by(model: Model, trace: Trace) -> float:
+    """Share of the recorded torque that a model leaves, as `TorqueFit.in_sample` counts it."""
+    curves = torque_curves(model, trace)
+    return float(np.sqrt((curves.left**2).sum() / (curves.recorded**2).sum()))
+
+
 @pytest.mark.parametrize(("name", "joints", "noise", "priors"), [("ur5", 3, 3.0, False), ("panda", 4, 2.0, True)])
 def test_bodies_can_exist_where_those_of_the_plain_fit_cannot(
     name: str, joints: int, noise: float, priors: bool
@@ -103,7 +109,9 @@ def test_bodies_can_exist_where_those_of_the_plain_fit_cannot(
     assert plain.held_out is not None
     assert consistent.held_out is not None
     assert consistent.held_out < 1.01 * plain.held_out
-    assert consistent.in_sample < 1.03 * plain.in_sample
+    # The plain fit explains some of the noise by bodies that cannot exist. That of real bodies has the true ones to
+    # choose among, and so leaves no more than they do.
+    assert plain.in_sample < consistent.in_sample < 1.001 * left_by(model, fitted_to[0])
     with pytest.raises(SpecError, match="no real body has them"):
         mjcf_text(plain.model)
     text = mjcf_text(consistent.model)[0]
