@@ -10,6 +10,7 @@ from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Method
 from model.discrepancy.options import DiagnosisOptions
 from model.inverse_dynamics.readings import choose_cutoff
+from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model
 
@@ -46,11 +47,11 @@ def choose_method(model: Model, traces: Sequence[Trace], options: DiagnosisOptio
 
 def _accelerations_are_known(model: Model, traces: Sequence[Trace]) -> bool:
     """Whether the traces hold drives, and accelerations beyond the noise of their readings. A record that torques
-    cannot use, as one with a gap, may still be simulated."""
+    cannot use, as one with a gap or one of half a second, may still be simulated."""
     if any(trace.drive is None for trace in traces):
         return False
     try:
-        choose_cutoff(traces, model.machine)
+        recorded_motions(traces, model.machine, choose_cutoff(traces, model.machine))
     except (SpecError, TraceError):
         return False
     return True

@@ -38,7 +38,7 @@ def diagnose(
     check_options(options, model)
     _refuse_shared(traces, holdout)
     designs = chooser is not None and chooser.search is not None
-    if choose_method(model, traces, options, designs=designs) == "inverse-dynamics":
+    if choose_method(model, (*traces, *holdout), options, designs=designs) == "inverse-dynamics":
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
         return diagnose_torques(model, traces, holdout, options, progress, cancel)

@@ -116,12 +116,12 @@ class _Comparison:
     def rivals(self, names: Collection[str]) -> list[Rival]:
         hidden = self.rig.hidden[0]
         none = self._least(lambda _: self.sound, 0, ())
-        own = 0.0
-        if hidden.law != 0 and hidden.in_library:
+        own, known_as = 0.0, hidden.known_as or hidden.name
+        if hidden.law != 0 and hidden.in_library and known_as == hidden.name:
             own = self._fitted(hidden.name, hidden.joint)
         found = [Rival("none", math.sqrt(none)), Rival("own", math.sqrt(own))]
         for name in names:
-            if name in OPEN or name == hidden.name:
+            if name in OPEN or name == known_as:
                 continue
             places = joints_of(self.rig, name)
             if name not in WHOLE_MACHINE and hidden.joint is not None:
@@ -174,7 +174,8 @@ class _Comparison:
         difference = self._readings(made.bodies, made.joints, made.loop) - self.true
         both = np.concatenate([difference, np.zeros(self.answers.shape[1])])
         steps = -np.linalg.solve(self.triangle, self.basis.T @ both)
-        return min(linear, self._refitted(made, steps))
+        found = self._refitted(made, steps)
+        return found if math.isfinite(found) else linear
 
     def _refitted(self, made: Rig, linear: Floats) -> float:
         """χ² with the tolerances really moved, by least squares from where they would answer if they were linear, and

@@ -80,9 +80,15 @@ def _first_finding(work: _Records, highest: float, progress: Progress) -> Diagno
             progress(begin + done / len(LOOKS), text)
 
         found.append(work.below(share * highest, tell))
-        if _names_slow_effects(found[-1]) or found[0].verdict not in ("nothing-significant", "suspected"):
+        if _finds(found[0]) or _names_slow_effects(found[-1]):
             return found[-1]
     return found[0]
+
+
+def _finds(answer: Diagnosis) -> bool:
+    """Whether anything is found in torques, beside what the controller's own numbers prove."""
+    proved_alone = all(step.proof is not None for step in answer.steps if step.adopted)
+    return answer.verdict == "unknown-effect" or not proved_alone
 
 
 def _names_slow_effects(answer: Diagnosis) -> bool:
@@ -90,9 +96,9 @@ def _names_slow_effects(answer: Diagnosis) -> bool:
     and what is left of it looks like friction of another size."""
     if answer.verdict not in ("named", "ambiguous"):
         return False
-    adopted = [step for step in answer.steps if step.adopted]
+    adopted = [step for step in answer.steps if step.adopted and step.proof is None]
     names = {name for step in adopted for name in (step.effect, *(member.effect for member in step.group))}
-    return all(name is None or effect(name).shared_name.family != FRICTION for name in names)
+    return bool(adopted) and all(name is None or effect(name).shared_name.family != FRICTION for name in names)
 
 
 @dataclass(frozen=True)

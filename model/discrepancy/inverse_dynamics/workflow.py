@@ -199,9 +199,13 @@ class TorqueWorkflow:
         asks for another machine than the file describes. An effect that is there brings stated numbers back."""
         if removed < self.case.options.least_share:
             return Refusal(kind="falls-too-little", numbers={"share": removed})
+        if tolerances(self.model)[1] != "stated":
+            return None
         before = {u.name: abs(prior_distance(u, self.now.values[u.name])[0]) for u in self.now.unknowns}
-        after = {u.name: abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in chosen.fit.unknowns}
-        farthest = max((d for name, d in after.items() if before.get(name, FAR_OFF) < FAR_OFF), default=0.0)
+        stated = [
+            u for u in chosen.fit.unknowns if u.parameter.effect is None and before.get(u.name, FAR_OFF) < FAR_OFF
+        ]
+        farthest = max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
         return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
 
     def _reference(self, chosen: Fitted) -> BalanceFit:

@@ -23,6 +23,7 @@ from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.sampled_controller import controller_numbers
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
+from model.machine_model.nominal import gain_error
 
 COUNTS_OF_ROUNDING = 1.5
 """Counts by which a recorded error may differ: set points are rounded to posture units, and those to counts."""
@@ -30,6 +31,8 @@ LEAST_SHARE = 1e-3
 """Share of wrong samples below which they may be due to the start of the record."""
 LEAST_GAIN_DEVIATION = 0.01
 """Least relative deviation of a gain that is reported: rounding may explain a smaller one."""
+FAR_OFF = 4.0
+"""Stated deviations of a gain within which it is as the file says."""
 LEAST_POWER = 4.0
 """Least power of a sample that is used for a gain, DAC counts: rounding dominates below it."""
 LEAST_SAMPLES = 20
@@ -87,12 +90,11 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
 
 def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
     """The model with the gains that the records prove: in place of the gain error that it states for a joint, or as a
-    further effect. An error that several joints share is set for all of them.
-
-    Raises SpecError for a gain error beyond the bounds of the effect.
+    further effect. An error that several joints share is set for all of them. A gain beyond the bounds of the effect,
+    as of gains in another unit, stays out of the model: its step tells it.
     """
     for finding in findings:
-        if finding.effect is ControllerEffect.WRONG_GAIN:
+        if finding.effect is ControllerEffect.WRONG_GAIN and _is_allowed(model, finding):
             place = at.slot(finding.joint, at.GAIN_ERROR)
             stated = [p.name for p in model.parameters if place in p.slots]
             model = (
@@ -101,6 +103,16 @@ def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
                 else model.with_effect(finding.effect.value, (finding.joint,), {finding.effect.part: finding.value})
             )
     return model
+
+
+def _is_allowed(model: Model, finding: ControllerFinding) -> bool:
+    """Whether the effect's bounds allow the gain error of a finding."""
+    place = at.slot(finding.joint, at.GAIN_ERROR)
+    found = next((p for p in model.parameters if place in p.slots), None)
+    if found is None:
+        wider = model.with_effect(finding.effect.value, (finding.joint,))
+        found = next(p for p in wider.parameters if place in p.slots)
+    return found.low <= finding.value <= found.high
 
 
 def with_used_set_points(trace: Trace) -> Trace:
@@ -113,17 +125,18 @@ def with_used_set_points(trace: Trace) -> Trace:
 @dataclass(frozen=True)
 class _Losses:
     """Counts of a joint's samples. moved: the set point changed; lost: of these, it was lost; wrong: the error is not
-    set point − position; samples: all."""
+    set point − position; samples: all; clear: of the wrong ones, those that a drive's rounding cannot imitate."""
 
     moved: int
     lost: int
     wrong: int
     samples: int
+    clear: int
 
     @property
     def violated(self) -> bool:
         """Whether the recorded error is wrong too often for an accident."""
-        return self.wrong >= max(2.0, LEAST_SHARE * self.samples)
+        return self.clear >= max(2.0, LEAST_SHARE * self.samples)
 
 
 @dataclass(frozen=True)
@@ -141,23 +154,25 @@ class _JointRecords:
         if sensor is None:
             return None
         tolerance = COUNTS_OF_ROUNDING * sensor.range.value / 2**sensor.bits
-        moved = lost = total = 0
+        moved = lost = total = clear = 0
         for trace in self.traces:
             if trace.error is None or trace.set_point is None:
                 return None
             column = trace.column(self.joint)
             used = trace.position[:, column] + trace.error[:, column]
-            changed = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) > 2 * tolerance
             numbers = controller_numbers(trace, self.machine, self.joint)
+            sent = trace.set_point[:, column] if numbers is None else numbers.sent
+            changed = np.abs(np.diff(sent, prepend=sent[0])) > 2 * tolerance
+            wrong = np.abs(sent - used) > tolerance
+            clear += int((wrong if numbers is None else wrong & numbers.lost).sum())
             if numbers is not None:
                 changed &= ~numbers.limited
-            wrong = np.abs(trace.set_point[:, column] - used) > tolerance
             moved, lost, total = (
                 moved + int(changed.sum()),
                 lost + int((wrong & changed).sum()),
                 total + int(wrong.sum()),
             )
-        return _Losses(moved, lost, total, sum(len(t) for t in self.traces))
+        return _Losses(moved, lost, total, sum(len(t) for t in self.traces), clear)
 
     @cached_property
     def error_and_power(self) -> tuple[Floats, Floats] | None:
@@ -168,6 +183,12 @@ class _JointRecords:
         if len(known) < len(pairs) or sum(len(wanted) for wanted, _ in known) < LEAST_SAMPLES:
             return None
         return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
+
+    @property
+    def gain_deviation(self) -> float | None:
+        """Relative standard deviation of the gains, as far as the file states one."""
+        stated = gain_error(self.machine, self.joint)
+        return None if stated is None else stated.deviation
 
     @property
     def rounding(self) -> float:
@@ -249,7 +270,8 @@ def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
     deviation = float(np.sqrt(max(spread, own.rounding**2 / 12) * np.sum((counts * values) ** 2)) / squares)
-    if abs(relative - stated) < max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation):
+    within = max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation, FAR_OFF * (own.gain_deviation or 0.0))
+    if abs(relative - stated) < within:
         return None
     half, used = 2 * deviation, len(wanted)
     return ControllerFinding(

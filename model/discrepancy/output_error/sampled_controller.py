@@ -23,6 +23,9 @@ FINEST = 1e-3
 """Share of a joint's largest drive to which numbers of a record are trusted, where the file states no resolution."""
 LEAST_STEPS = 4.0
 """Least drive of a sample that is used for a gain, in resolutions: rounding dominates below it."""
+CLEAR = 4.0
+"""Distance of a drive from what a set point makes of it, in resolutions, beyond which it was another set point: a drive
+may be rounded more coarsely than a file tells, and then lies near what either of two set points makes."""
 LEAST_SAMPLES = 20
 """Samples that the estimate of a gain needs."""
 LATER_STARTS = (1, 2, 3, 4, 5)
@@ -36,17 +39,20 @@ REWEIGHTED = 20
 class ControllerNumbers:
     """What a record tells of one joint's controller.
 
-    used: (k,) rad, set points that it worked with. formed: (k,) drive that the gains of the file make of them. drive:
-    (k,) as recorded. limited: (k,) whether the drive is at its limit, where it tells nothing. free: (k,) whether it is
-    away from it and large enough to measure a gain. factor: by which the drive is larger than the gains of the file
-    make it.
+    sent: (k,) rad, set points in the steps that the controller takes. used: (k,) those that it worked with. formed:
+    (k,) drive that the gains of the file make of them. drive: (k,) as recorded. limited: (k,) whether the drive is at
+    its limit, where it tells nothing. free: (k,) whether it is away from it and large enough to measure a gain. lost:
+    (k,) whether it clearly worked with the set point before. factor: by which the drive is larger than the gains of
+    the file make it.
     """
 
+    sent: Floats
     used: Floats
     formed: Floats
     drive: Floats
     limited: NDArray[np.bool_]
     free: NDArray[np.bool_]
+    lost: NDArray[np.bool_]
     factor: float
 
 
@@ -71,12 +77,13 @@ def controller_numbers(trace: Trace, machine: Machine, joint: int) -> Controller
     free = ~limited & (np.abs(drive) > LEAST_STEPS * resolution)
 
     def judged(scale: _Scale) -> tuple[float, ControllerNumbers]:
-        used, formed = law.follow(sent, position, drive, limited, scale, resolution)
+        used, formed, clear = law.follow(sent, position, drive, limited, scale, resolution)
         apart = np.abs(drive - scale.factor * formed)
-        agreed = limited | (apart <= 0.75 * resolution + 2 * FINEST * np.abs(drive))
+        agreed = apart[~limited] <= (0.75 * resolution + 2 * FINEST * np.abs(drive))[~limited]
         near = apart <= _farthest(drive, resolution)
         large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
-        return float(np.mean(agreed)), ControllerNumbers(used, formed, drive, limited, large, scale.factor)
+        share = float(np.mean(agreed)) if agreed.size >= LEAST_SAMPLES else 0.0
+        return share, ControllerNumbers(sent, used, formed, drive, limited, large, clear, scale.factor)
 
     # By the file from the first sample on, which is right however many set points were lost; and by a line.
     scales = [_Scale(1.0, float(drive[0] - plain[0]) if law.integrates else 0.0)]
@@ -159,10 +166,14 @@ class _Law:
 
     def follow(
         self, sent: Floats, position: Floats, drive: Floats, limited: NDArray[np.bool_], scale: _Scale, line: float
-    ) -> tuple[Floats, Floats]:
-        """Set points in use, and the drive that the gains make of them. A set point counts as lost where the drive is
-        further than `line` from what it would make, and nearer to what the one before makes."""
-        used, formed = np.empty_like(sent), np.empty_like(sent)
+    ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """Set points in use, the drive that the gains make of them, and where one was clearly lost.
+
+        A set point counts as lost where the drive is further than `line` from what it would make, and nearer to what
+        the one before makes; as clearly lost where it is further than `CLEAR` times that, and at what the one before
+        makes.
+        """
+        used, formed, clear = np.empty_like(sent), np.empty_like(sent), np.zeros(len(sent), dtype=bool)
         factor, start = scale.factor, float(sent[0] - position[0])
         total = scale.held / (factor * self._summed) if self.integrates else 0.0
         totals = (total, 0.0) if self.inner is None else (0.0, total)
@@ -173,11 +184,13 @@ class _Law:
             miss = abs(drive[k] - factor * output)
             if k > 0 and not limited[k] and miss > line:
                 other, held = self._output(used[k - 1] - position[k], float(position[k]), memory)
-                if abs(drive[k] - factor * other) < 0.5 * miss:
+                left = abs(drive[k] - factor * other)
+                clear[k] = miss > CLEAR * line and left <= line
+                if left < 0.5 * miss:
                     wanted, output, after = float(used[k - 1]), other, held
             used[k], formed[k] = wanted, output
             memory = (memory[0], *after[1:]) if limited[k] else after
-        return used, formed
+        return used, formed, clear
 
     def _output(
         self, error: float, position: float, memory: tuple[float, float, float, float, float]
