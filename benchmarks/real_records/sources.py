@@ -85,7 +85,7 @@ RIGS = (
         _emps,
         "V",
         "coulomb,direction_dependent_friction",
-        (("coulomb_friction",), ("direction_dependent_friction",)),
+        (("coulomb_friction",), ("direction_dependent_friction", "direction_dependent_viscous_friction")),
         constant=True,
     ),
     Rig(

@@ -136,15 +136,8 @@ REPORTED: dict[str, Kind] = {
         recorded=("set_point", "drive", "velocity"),
         known_loop=False,
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "planar-cascade": replace(
         _PLANAR, controller=CASCADE, rate=(500.0,), bits=(18, 20), rounding=0.001, motions=("sweep", "via points")
-    ),
-    "six-volts": replace(
-        _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
     ),
     "axis-volts-table": replace(
         _AXIS, rate=(125.0,), bits=(16,), contacts=(SWITCH, BRISTLE), horizontal=True, motions=("sweep", "sines")
@@ -167,6 +160,38 @@ REPORTING: dict[str, Kind] = {
         bits=(17,),
         contacts=(TANH,),
         motions=("ramps", "via points"),
+        known_loop=False,
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "six-volts": replace(
+        _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
+    ),
+    "axis-cascade-table": replace(
+        _AXIS, controller=CASCADE, rate=(250.0,), bits=(18,), contacts=(SWITCH,), horizontal=True, motions=("sines",)
+    ),
+    "planar-volts": replace(_PLANAR, rate=(400.0,), bits=(18,), contacts=(BRISTLE,), motions=("sines", "random steps")),
+    "arm-volts": replace(_ANTHROPOMORPHIC, rate=(200.0,), bits=(15,), contacts=(SWITCH,), motions=("sweep", "ramps")),
+    "planar-current-steps": replace(
+        _PLANAR,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(16,),
+        contacts=(TANH,),
+        motions=("steps", "random steps"),
+        recorded=("drive", "velocity"),
+        known_loop=False,
+    ),
+    "axis-current-body": replace(
+        _AXIS,
+        drive=CURRENT,
+        rate=(250.0,),
+        bits=(19,),
+        contacts=(BRISTLE,),
+        body=True,
+        motions=("sweep", "via points"),
         known_loop=False,
     ),
 }
