@@ -80,7 +80,14 @@ Measurement = Literal[
 ]
 """A measurement beside the arm's own readings."""
 RefusalKind = Literal[
-    "contradicts-file", "diverges", "error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"
+    "contradicts-file",
+    "diverges",
+    "error-grows",
+    "error-rises",
+    "falls-too-little",
+    "only-resembles",
+    "superfluous",
+    "worse-than-given",
 ]
 
 

@@ -199,6 +199,8 @@ class TorqueWorkflow:
         asks for another machine than the file describes. An effect that is there brings stated numbers back."""
         if removed < self.case.options.least_share:
             return Refusal(kind="falls-too-little", numbers={"share": removed})
+        if grown := self._grown_held_out(chosen):
+            return Refusal(kind="worse-than-given", numbers={"share": grown})
         if tolerances(self.model)[1] != "stated":
             return None
         before = {u.name: abs(prior_distance(u, self.now.values[u.name])[0]) for u in self.now.unknowns}
@@ -207,6 +209,18 @@ class TorqueWorkflow:
         ]
         farthest = max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
         return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
+
+    def _grown_held_out(self, chosen: Fitted) -> float:
+        """By which share the held-out variance is larger with an effect than with the model as given, on every joint of
+        the effect; 0 where it is not. What the fit of the stated numbers has followed is then nothing that the machine
+        does again, and an effect that only makes up for a part of that is none."""
+        if not self.case.held_out:
+            return 0.0
+        given = holdout.held_out_squares(self.begin, {}, self.case.held_out)
+        after = holdout.held_out_squares(chosen.model, chosen.fit.values, self.case.held_out)
+        own = [j in chosen.joints or not chosen.joints for j in self.model.machine.modelled_joints]
+        growth = after[own] / given[own] - 1.0
+        return max(0.0, float(np.min(growth))) if np.isfinite(growth).all() else 0.0
 
     def _reference(self, chosen: Fitted) -> BalanceFit:
         """The fit that a candidate is held against: the last one, or that with a number as the file states it. With

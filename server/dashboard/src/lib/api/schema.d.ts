@@ -5218,7 +5218,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "contradicts-file" | "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
+            kind: "contradicts-file" | "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous" | "worse-than-given";
             /**
              * Numbers
              * @default {}
