@@ -102,8 +102,8 @@ class TorqueBalance:
         return result
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:
-        """What `residual` tells (n,) for a unit of torque at each joint: not 1 where resistance, torque constant, flux or
-        gear ratio, or a plain gain, differ from the machine file's."""
+        """What `residual` tells (n,) for a unit of torque at each joint: not 1 where the motor's numbers are not the
+        machine file's."""
         return self._told_per_torque(_joints_of(self._vector(values), self.model))
 
     def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
