@@ -31,4 +31,4 @@ def test_the_loop_of_a_sampled_controller_is_simulated(
     bench: Any = SimpleNamespace(operator=SimpleNamespace(show=lambda _line: None))
     with pytest.raises(SpecError, match="seen"):
         by_command._diagnosed(bench, begin, swinging(1))
-    assert asked == [DiagnosisOptions(method=method)]  # type: ignore[arg-type]
+    assert asked == [DiagnosisOptions(method=method)]
