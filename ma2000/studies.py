@@ -62,9 +62,12 @@ def diagnose(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Diagnosis:
-    """Where a model and traces disagree, which effects are missing, and what to measure next.
+    """Where a model and traces disagree, which effects are missing, and, where the loop is simulated, what to measure
+    next.
 
     Args:
+        options: `DiagnosisOptions(method="output-error")` simulates; by default torques are balanced where a sampled
+            controller's drive was recorded (unless `design` is set), and they propose no experiment.
         design: what to measure next may be a motion that is designed for the candidates; it takes some 10 s more.
 
     Raises TraceError, SpecError for input that cannot give an answer; CancelledError when asked to end.

@@ -22,7 +22,7 @@ from daq_cli.commands.fit import (
 )
 from daq_cli.commands.simulate import NoRoundingOption
 from daq_cli.models.batch import LOCAL, Asked, run_at_service, run_here
-from daq_cli.models.model_input import MODEL_HELP, EffectFileOption, ExecutorOption
+from daq_cli.models.model_input import MODEL_HELP, ComparisonOption, EffectFileOption, ExecutorOption, MostOption
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -159,7 +159,8 @@ def diagnose(
         str | None,
         typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
     ] = None,
-    most: Annotated[int, typer.Option(min=1, max=10, help="Largest number of effects to add, one after another.")] = 3,
+    most: MostOption = None,
+    method: ComparisonOption = None,
     json: JsonOption = False,
 ) -> None:
     """Diagnose every trace by itself: a row with verdict, effects and errors for each."""
@@ -169,7 +170,8 @@ def diagnose(
 
     names = candidate_effects(effects, effect_file)
     chosen = None if joints is None else tuple(parse_joints(joints))
-    study = DiagnoseStudy(effects=names, joints=chosen, most_steps=most)
+    compared = None if method is None else method.value
+    study = DiagnoseStudy(effects=names, joints=chosen, most_steps=most, method=compared)
     _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
 
 

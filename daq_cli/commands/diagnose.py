@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,8 +16,11 @@ from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.model_input import (
     MODEL_HELP,
+    Comparison,
+    ComparisonOption,
     EffectFileOption,
     HoldoutOption,
+    MostOption,
     OutOption,
     ReportOption,
     TraceFolderOption,
@@ -43,13 +45,6 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
-
-
-class Comparison(StrEnum):
-    """How model and records are compared."""
-
-    OUTPUT_ERROR = "output-error"
-    INVERSE_DYNAMICS = "inverse-dynamics"
 
 
 def _spec_file(path: Path | None) -> Path | None:
@@ -81,19 +76,8 @@ def diagnose(
         typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
     ] = None,
     load: Annotated[float | None, typer.Option(min=0.0, help="Load that the arm carried, in kg.")] = None,
-    most: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=10, help="Largest number of effects to add, one after the other (default: 3; of torques 8)."
-        ),
-    ] = None,
-    method: Annotated[
-        Comparison | None,
-        typer.Option(
-            help="Simulate the closed loop (output-error), or balance torques along the recorded motion "
-            "(inverse-dynamics). Default: as machine and traces allow."
-        ),
-    ] = None,
+    most: MostOption = None,
+    method: ComparisonOption = None,
     out: Annotated[Path | None, OutOption] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,

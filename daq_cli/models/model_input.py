@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -64,6 +65,32 @@ HoldoutOption = Annotated[
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", help="An effect of your own (.py, docs/own-effect.md). May be repeated."),
+]
+
+
+class Comparison(StrEnum):
+    """How a diagnosis compares model and records."""
+
+    OUTPUT_ERROR = "output-error"
+    INVERSE_DYNAMICS = "inverse-dynamics"
+
+
+ComparisonOption = Annotated[
+    Comparison | None,
+    typer.Option(
+        "--method",
+        help="Simulate the closed loop (output-error), or balance torques along the recorded motion "
+        "(inverse-dynamics). Default: as machine and traces allow.",
+    ),
+]
+MostOption = Annotated[
+    int | None,
+    typer.Option(
+        "--most",
+        min=1,
+        max=10,
+        help="Largest number of effects to add, one after the other (default: 3; of torques 8).",
+    ),
 ]
 
 ExecutorOption = Annotated[

@@ -178,7 +178,7 @@ class ServiceJobs:
             model=self._number(begin, "doubted"),
             effects=options.effects,
             joints=options.joints,
-            most_steps=options.most_steps,
+            most_steps=options.most_steps if "most_steps" in options.model_fields_set else None,
             method=options.method,
             design=design,
             name=None if out is None else model_name(out.name),

@@ -44,8 +44,12 @@ def excitation_of(
     """
     motions = recorded_motions(traces, model.machine, CUTOFF)
     balance = TorqueBalance(model, motions)
-    torques = balance.supplied_by_drive()
-    residuals = [left * _moving(model, record) for left, record in zip(balance.residual({}), motions, strict=True)]
+    # columns are joint torques, and so is what is compared with them
+    told = balance.told_per_torque({})
+    torques = [one / told for one in balance.supplied_by_drive()]
+    residuals = [
+        left / told * _moving(model, record) for left, record in zip(balance.residual({}), motions, strict=True)
+    ]
     columns = [_columns(model, one, standards, grouping) for one in motions]
     whole = np.concatenate([one.reshape(-1, one.shape[-1]) for one in columns])
     sizes = np.linalg.norm(whole, axis=0)

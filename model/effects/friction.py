@@ -101,7 +101,8 @@ FRICTION = (
     ),
     Effect(
         "direction_dependent_viscous_friction",
-        physics="τ = −n² |Δv| q̇ where Δv q̇ > 0: v_eff is Δv higher forwards, or |Δv| backwards where Δv is negative",
+        physics="τ = −n² |Δv| q̇ where Δv q̇ > 0, with q̇ the link's speed, where viscous friction has the rotor's: "
+        "v_eff is Δv higher forwards, or |Δv| backwards where Δv is negative",
         source="Canudas de Wit, Åström and Braun 1987, IEEE J. Robotics and Automation 3(6)",
         parameters=(EffectParameter("difference", at.VISCOUS_DIRECTION, "N·m·s/rad", deviation=noticeable_damping),),
     ),

@@ -98,8 +98,13 @@ class TorqueBalance:
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
             torque = _held_by_friction(torque, levels[i], motion.contact, record)
-            result.append(record.compared(torque * (self._stated_gain / _torque_per_volt(joints))))
+            result.append(record.compared(torque * self._told_per_torque(joints)))
         return result
+
+    def told_per_torque(self, values: Mapping[str, float]) -> Floats:
+        """What `residual` tells (n,) for a unit of torque at each joint: not 1 where the motor's numbers are not the
+        machine file's."""
+        return self._told_per_torque(_joints_of(self._vector(values), self.model))
 
     def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
         """Derivative (m, n) of every record's residual by one unknown: a difference towards the inside of its bounds.
@@ -115,6 +120,9 @@ class TorqueBalance:
     def supplied_by_drive(self) -> list[Floats]:
         """Torque of the drive alone (m, n), as recorded, of motors at standstill: what residuals are shares of."""
         return [record.compared(record.drive * self._stated_gain) for record in self.records]
+
+    def _told_per_torque(self, joints: Floats) -> Floats:
+        return np.asarray(self._stated_gain / _torque_per_volt(joints))
 
     @cached_property
     def _stated_gain(self) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from daq.contracts.machine import NoController
 from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import (
     Acquired,
@@ -179,8 +180,7 @@ def _next(found: Diagnosis) -> Section:
     if experiment is None:
         if found.inseparable:
             return Section(title, tuple(Text(sentence(class_words(c)), "warning") for c in found.inseparable))
-        text = "No further experiment is asked for." if found.verdict == "named" else "Nothing is left to tell apart."
-        return Section(title, (Text(text, "quiet"),))
+        return Section(title, (Text(_without_experiment(found), "quiet"),))
     rows = [("on the arm", f"{experiment.duration:.1f} s")]
     if experiment.separates:
         apart = experiment.separates
@@ -189,3 +189,15 @@ def _next(found: Diagnosis) -> Section:
         rows.append(("predicted separation", separation))
     table = Table(("experiment", experiment.name), tuple((Cell(a), Cell(b)) for a, b in rows))
     return Section(title, (Text(experiment.reason), table))
+
+
+def _without_experiment(found: Diagnosis) -> str:
+    """Why no experiment is asked for."""
+    if found.verdict == "nothing-significant":
+        return "Nothing is left to tell apart."
+    if found.verdict == "named" or found.method == "output-error":
+        return "No further experiment is asked for."
+    text = "Nothing was simulated, so no experiment is proposed, though one may be needed."
+    if isinstance(found.model_before.machine.controller, NoController):
+        return text
+    return f"{text} Of traces with set points, `daq diagnose --next FILE` simulates the loop and looks for one."

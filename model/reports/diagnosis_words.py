@@ -29,8 +29,8 @@ def _balanced(torque: str) -> Compared:
     return Compared(
         f"{torque} that the model needs − {torque} that was applied",
         f"Both {torque}s are taken along the recorded motion, and nothing is simulated.",
-        "There is no overlay: without a controller, or without set points, no motion is simulated. The map and the "
-        f"errors are of {torque}s along the recorded motion.",
+        f"There is no overlay, since nothing was simulated: the map and the errors are of {torque}s along the recorded "
+        "motion.",
     )
 
 

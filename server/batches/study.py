@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.extras import missing_extras_named
@@ -28,6 +28,7 @@ from server.batches.columns import Columns, of_diagnosis, of_fit, of_simulation,
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
+    from model.discrepancy.options import DiagnosisOptions
     from model.fitting.options import FitOptions
     from model.machine_model.model import Model
 
@@ -158,14 +159,19 @@ def _simulated(study: SimulateStudy, model: Model, trace: Trace) -> tuple[Column
 
 def _diagnosed(study: DiagnoseStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
     from model.discrepancy.explanation.headline import headline
-    from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
 
-    options = DiagnosisOptions(
-        effects=study.effects, joints=study.joints, most_steps=study.most_steps, method=study.method
-    )
-    found = diagnose(model, [trace], [], options)
+    found = diagnose(model, [trace], [], diagnosis_options(study))
     return of_diagnosis(found, headline(found)), found.model_dump_json()
+
+
+def diagnosis_options(study: DiagnoseStudy) -> DiagnosisOptions:
+    """Returns the options of a diagnosis. A number of steps is set only where the study has one: the methods have
+    defaults of their own."""
+    from model.discrepancy.options import DiagnosisOptions
+
+    given: dict[str, Any] = {} if study.most_steps is None else {"most_steps": study.most_steps}
+    return DiagnosisOptions(effects=study.effects, joints=study.joints, method=study.method, **given)
 
 
 def fit_options(study: FitStudy) -> FitOptions:

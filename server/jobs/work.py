@@ -23,7 +23,7 @@ from daq.contracts.service.jobs import (
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.executors.address import LOCAL
 from daq.traces.reader import read_trace
-from server.batches.study import fit_options, with_effects
+from server.batches.study import diagnosis_options, fit_options, with_effects
 from server.jobs.headlines import of_comparison, of_fit, of_validation
 from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox
 
@@ -202,7 +202,6 @@ class _Worker:
         """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
         from model.discrepancy.explanation.headline import headline
-        from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
         from server.jobs.diagnosis_data import diagnosis_data, where_given
@@ -211,14 +210,11 @@ class _Worker:
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
         begin = self._model(request.model)
-        options = DiagnosisOptions(
-            effects=request.effects, joints=request.joints, most_steps=request.most_steps, method=request.method
-        )
         found = diagnose(
             begin,
             traces,
             held,
-            options,
+            diagnosis_options(request),
             lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text),
             self.mailbox,
             chooser=experiment_chooser(begin.machine, design=request.design),

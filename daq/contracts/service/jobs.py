@@ -80,7 +80,8 @@ class DiagnoseStudy(Wire):
     effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
     """Candidate effects; None for all known ones."""
     joints: tuple[JointNumber, ...] | None = None
-    most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+    most_steps: Annotated[int, Field(ge=1, le=10)] | None = None
+    """Most effects to add, one after another; None: 3 where the loop is simulated, 8 of torques."""
     method: Literal["output-error", "inverse-dynamics"] | None = None
     """How model and traces are compared; None: as machine and traces allow."""
 

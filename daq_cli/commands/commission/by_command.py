@@ -192,9 +192,11 @@ def model(bench: Bench) -> dict[str, Any]:
 
 def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     """What a diagnosis says of the ramp, and its report."""
+    from daq.contracts.machine import SampledPid
     from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
     from model.discrepancy.explanation.headline import headline
+    from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
     from model.reports.diagnosis_report import LABELS, diagnosis_report
     from model.reports.page import write_report
@@ -203,8 +205,10 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     bench.operator.show(
         "The ramp differs from the machine file by more than noise. A diagnosis follows; it only computes."
     )
+    simulated = isinstance(begin.machine.controller, SampledPid)  # torques, its default, propose no experiment
+    options = DiagnosisOptions(method="output-error" if simulated else None)
     with shown_progress("diagnosing") as progress:
-        found = diagnose(begin, [trace], progress=progress, chooser=experiment_chooser(begin.machine))
+        found = diagnose(begin, [trace], (), options, progress, chooser=experiment_chooser(begin.machine))
     pair = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
     write_report(diagnosis_report(found, compare(pair, [trace])), bench.folder / DIAGNOSIS)
     said = headline(found)

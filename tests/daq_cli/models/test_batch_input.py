@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from daq.contracts.service.jobs import DiagnoseStudy, Study
+from daq_cli.commands import batch
+from daq_cli.models.batch import Asked
+from daq_cli.robot.access import RobotAccess
 from tests.daq_cli.invoke import CommandLine
 
 
@@ -22,6 +26,7 @@ from tests.daq_cli.invoke import CommandLine
         ("fit traces --out o --effects rust", "effect 'rust': not in the library"),
         ("fit traces --out o --bound link1.mass=2:1", "the lower bound 2 is not below the upper 1"),
         ("diagnose traces --out o --joints 9-1", "9-1"),
+        ("diagnose traces --out o --method guess", "'guess'"),
         ("validate traces --out o --effect-file none.py", "none.py"),
     ],
 )
@@ -29,6 +34,28 @@ def test_wrong_input_is_told_in_one_line_and_nothing_is_begun(daq: CommandLine, 
     Path("traces").mkdir()
     daq("batch", *words.split()).complains(2, says)
     assert not Path("o").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "study"),
+    [
+        ("", DiagnoseStudy()),
+        ("--method output-error --most 5", DiagnoseStudy(method="output-error", most_steps=5)),
+        ("--method inverse-dynamics", DiagnoseStudy(method="inverse-dynamics")),
+    ],
+)
+def test_a_batch_of_diagnoses_takes_the_method_and_the_steps_that_were_asked_for(
+    daq: CommandLine, words: str, study: DiagnoseStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[Study] = []
+
+    def run_here(_robot: RobotAccess, _asked: Asked, study: Study) -> bool:
+        begun.append(study)
+        return True
+
+    monkeypatch.setattr(batch, "run_here", run_here)
+    assert daq("batch", "diagnose", "traces", "--out", "o", *words.split()).code == 0
+    assert begun == [study]
 
 
 def test_a_service_looks_for_one_word(daq: CommandLine) -> None:

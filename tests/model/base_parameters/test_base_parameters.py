@@ -160,6 +160,26 @@ def test_a_record_that_excites_all_tells_all_and_the_fitted_model_has_their_valu
         assert abs(parameter.value - own) < max(4 * recorded.deviation, 0.1 * own)
 
 
+def test_a_motor_other_than_the_files_is_judged_as_one_that_the_file_states(tmp_path: Path) -> None:
+    """The residual of a torque balance is told in the unit of the stated drive, base parameters are joint torques."""
+    text, as_stated = (EXAMPLES / "single_axis.toml").read_text("utf-8"), "gain = { value = 0.5,"
+    assert as_stated in text
+    other = tmp_path / "single_axis.toml"
+    other.write_text(text.replace(as_stated, "gain = { value = 0.7,"), "utf-8")
+    names = [name for name in rod().by_name if name.endswith("drive.gain")]
+    fitted = rod().with_values(dict.fromkeys(names, 0.7))
+    found = base_parameters(fitted, [swinging(1)]).excitation
+    stated = base_parameters(base_model(load_machine(str(other))), [swinging(1)]).excitation
+    assert found is not None
+    assert stated is not None
+    for one, same in zip(found.parameters, stated.parameters, strict=True):
+        assert one.deviation == pytest.approx(same.deviation, rel=1e-6)
+    assert found.residual == pytest.approx(stated.residual, rel=1e-6)
+    as_file = base_parameters(rod(), [swinging(1)]).excitation
+    assert as_file is not None
+    assert found.residual != pytest.approx(as_file.residual, rel=0.1)
+
+
 def test_a_record_of_one_joint_does_not_tell_the_others(tmp_path: Path) -> None:
     machine = load_machine(str(EXAMPLES / "pan_tilt.toml"))
     tones = Multisine(amplitude={2: 0.2}, duration=4.0, lowest=0.2, highest=1.5, tones=8, seed=1)

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from daq.contracts.machine import NoController
 from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import Acquired, Diagnosis, Inseparable, PlacedEffect
 from model.discrepancy.grounds import ControllerProof
@@ -257,6 +258,35 @@ def test_a_page_about_torques_does_not_speak_of_a_simulation(answer: tuple[Diagn
     assert "measured − simulated" not in text
     assert "torque that the model needs − torque that was applied" in text
     assert "There is no overlay" in text
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(
+    ("verdict", "method", "controlled", "says"),
+    [
+        ("nothing-significant", "inverse-dynamics", True, "Nothing is left to tell apart."),
+        ("named", "inverse-dynamics", True, "No further experiment is asked for."),
+        ("ambiguous", "output-error", True, "No further experiment is asked for."),
+        ("ambiguous", "inverse-dynamics", True, "`daq diagnose --next FILE` simulates"),
+        ("suspected", "inverse-dynamics", True, "`daq diagnose --next FILE` simulates"),
+        ("unknown-effect", "inverse-dynamics", True, "`daq diagnose --next FILE` simulates"),
+        ("unknown-effect", "inverse-dynamics", False, "no experiment is proposed, though one may be needed."),
+    ],
+)
+def test_a_page_without_an_experiment_says_why(
+    answer: tuple[Diagnosis, Comparison], verdict: str, method: str, controlled: bool, says: str
+) -> None:
+    found = answer[0]
+    before = found.model_before
+    if not controlled:
+        machine = before.machine.model_copy(update={"controller": NoController(kind="none")})
+        before = before.model_copy(update={"machine": machine})
+    change = {"verdict": verdict, "method": method, "next_experiment": None, "model_before": before}
+    report = diagnosis_report(found.model_copy(update=change))
+    (text,) = next(s for s in report.sections if s.title == "What to run next").blocks
+    assert isinstance(text, Text)
+    assert says in text.text
+    assert ("--next" in text.text) == ("--next" in says)
 
 
 @pytest.mark.usefixtures("undrawn")

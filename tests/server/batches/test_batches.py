@@ -12,18 +12,19 @@ from pyarrow import parquet
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import CancelledError
-from daq.contracts.service.jobs import SimulateStudy
+from daq.contracts.service.jobs import DiagnoseStudy, SimulateStudy
 from daq.executors import Workers
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from daq.traces.reader import read_trace
+from model.discrepancy.inverse_dynamics.options import torque_options
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.batches.choice import chosen_traces
 from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened, take_over
 from server.batches.run import Chosen, Standing, run_batch
-from server.batches.study import Answer, Common
+from server.batches.study import Answer, Common, diagnosis_options
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.server.batches.traces import MACHINE, folder_of_traces, number
 
@@ -60,6 +61,17 @@ def test_the_table_has_what_a_simulation_of_each_trace_gives(tmp_path: Path, tra
         apart = trace.position[:, 1] - made.at_samples(made.reading)[:, 1]
         assert float(row["joint2.largest"]) == pytest.approx(np.abs(apart).max(), rel=1e-6)
         assert (row["state"], row["problem"]) == ("done", "")
+
+
+@pytest.mark.parametrize(
+    ("study", "simulated", "balanced"),
+    [(DiagnoseStudy(), 3, 8), (DiagnoseStudy(most_steps=3), 3, 3), (DiagnoseStudy(most_steps=5), 5, 5)],
+)
+def test_a_number_of_steps_that_is_not_given_is_the_methods_own(
+    study: DiagnoseStudy, simulated: int, balanced: int
+) -> None:
+    options = diagnosis_options(DiagnoseStudy.model_validate_json(study.model_dump_json()))
+    assert (options.most_steps, torque_options(options).most_steps) == (simulated, balanced)
 
 
 def test_parquet_and_csv_hold_the_same_and_the_answers_are_kept_whole(tmp_path: Path, traces: Path) -> None:

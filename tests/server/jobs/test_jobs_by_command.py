@@ -93,8 +93,11 @@ def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_
     assert (tmp_path / "diagnosis.html").read_text().startswith("<!doctype html>")
     newest = sound_service.robot.get("/jobs").json()["items"][0]
     assert (newest["request"]["kind"], newest["state"]) == ("diagnose", "done")
-    assert newest["request"]["effects"] == ["coulomb_friction"]
+    assert (newest["request"]["effects"], newest["request"]["most_steps"]) == (["coulomb_friction"], 1)
     daq("diagnose", "last", "--effects", "no_such_effect").complains(2, "no_such_effect")
+    assert daq("diagnose", "last", "--joints", "1", "--effects", "coulomb_friction").code == 0
+    newest = sound_service.robot.get("/jobs").json()["items"][0]
+    assert newest["request"]["most_steps"] is None, "the method's own number holds"
 
 
 NOW = datetime(2026, 11, 22, 18, 0, tzinfo=UTC)

@@ -2322,11 +2322,8 @@ export interface components {
             effects?: string[] | null;
             /** Joints */
             joints?: number[] | null;
-            /**
-             * Most Steps
-             * @default 3
-             */
-            most_steps?: number;
+            /** Most Steps */
+            most_steps?: number | null;
             /** Method */
             method?: ("output-error" | "inverse-dynamics") | null;
             /** Traces */
@@ -2363,11 +2360,8 @@ export interface components {
             effects?: string[] | null;
             /** Joints */
             joints?: number[] | null;
-            /**
-             * Most Steps
-             * @default 3
-             */
-            most_steps?: number;
+            /** Most Steps */
+            most_steps?: number | null;
             /** Method */
             method?: ("output-error" | "inverse-dynamics") | null;
         };
