@@ -7,12 +7,18 @@ something stale. The database itself refuses every change of its connections (`s
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import re
 
-from starlette.requests import Request
+import anyio.to_thread
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.requests import HTTPConnection, Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
+from server.access.caller import caller_of
+from server.database_errors import DamagedError, one_line
 from server.problems import ProblemError, conflict, response
 from server.store.engine import Store
 from server.store.lock import owner_of
@@ -26,17 +32,23 @@ _ROBOT = (
 ANSWERED = re.compile(rf"{_PLAIN}|/assets/.*|/api/v1/({_SERVICE}|robots/[^/]+/({_ROBOT}))")
 """Addresses whose GET reads the database and files alone."""
 REFUSED = 1008
+OWNER_WITHIN = 1.0
+"""Time (s) for which a refusal waits for the owner's name: clients wait 3 s for the answer to a stop."""
+_UNKNOWN = "its address cannot be read now"
+log = logging.getLogger("server")
 
 
 def reads_only(app: ASGIApp, store: Store) -> ASGIApp:
     """Returns `app` as a service that only reads answers: everything but the addresses above is refused with a 409,
-    which names the service that owns the arms."""
+    which tells callers that are known where the service is that owns the arms."""
+    owner = _Owner(store)
 
     async def reading(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket") or _is_answered(scope):
             await app(scope, receive, send)
             return
-        problem = _refusal(await _owner(store))
+        known = caller_of(HTTPConnection(scope)) is not None
+        problem = _refusal(await owner.where() if known else "callers with a token are told where it is")
         if scope["type"] == "websocket":
             await WebSocketClose(REFUSED, problem.detail[:100])(scope, receive, send)
         else:
@@ -45,10 +57,28 @@ def reads_only(app: ASGIApp, store: Store) -> ASGIApp:
     return reading
 
 
-async def _owner(store: Store) -> str:
-    from fastapi.concurrency import run_in_threadpool
+class _Owner:
+    """Asks the database where the owner is: one question at a time, whoever waits for the answer, so that a database
+    that does not answer takes one thread and one connection from those who read."""
 
-    return await run_in_threadpool(owner_of, store)
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._asked: asyncio.Task[str] | None = None
+
+    async def where(self) -> str:
+        """Returns it in words; within OWNER_WITHIN s, also while the database does not answer. Never raises."""
+        if self._asked is None or self._asked.done():
+            self._asked = asyncio.create_task(self._ask())
+        task = self._asked
+        await asyncio.wait({task}, timeout=OWNER_WITHIN)
+        return task.result() if task.done() else _UNKNOWN
+
+    async def _ask(self) -> str:
+        try:
+            return await anyio.to_thread.run_sync(owner_of, self._store, abandon_on_cancel=True)
+        except (SQLAlchemyError, DamagedError) as error:
+            log.warning("database: who owns the arms cannot be read: %s", one_line(error))
+            return _UNKNOWN
 
 
 def _is_answered(scope: Scope) -> bool:

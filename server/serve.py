@@ -31,6 +31,7 @@ from server.steady import keep_steady
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
 from server.store.lock import sole_use, sqlite_file
+from server.store.owner_name import owner_name
 
 KEEP_ALIVE = 60
 """Time (s) for which an idle connection stays open. Clients close theirs after a few seconds (httpx: 5 s); if the
@@ -62,7 +63,8 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         _tell_sessions(services, gate, door)
         config, address = _configuration(make_app(services, gate)), _address_of(listener)
         _connect(services, door, beside)
-        tell_name(f"{address} at {socket.gethostname()}")
+        bound, port = listener.getsockname()[:2]
+        tell_name(owner_name(section.names, bound, port, socket.gethostname()))
 
         def ending() -> None:
             for rig in services.robots():
@@ -79,19 +81,28 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
 
 def _serve_reading(settings: Settings, ready: Callable[[str], None]) -> None:
     """Does the same for a service that only reads: without lock, stop listener and audit log."""
-    with listening(settings.server) as (listener, beside):
-        beside.close()  # no stop listener: it has no arm to stop
+    # `stop_port` is that of the service that owns the arms, where both have one configuration.
+    section = settings.server.model_copy(update={"stop_port": None})
+    with listening(section) as (listener, beside):
         services = Services(settings)
         try:
-            gate = replace(_gate(services, settings.server, 0), stop_port=None, audit=None)
+            gate = replace(_gate(services, section, 0), stop_port=None, audit=None)
         except SpecError:
             services.close()
             raise
         config, address = _configuration(make_app(services, gate)), _address_of(listener)
+
+        def ending() -> None:
+            for rig in services.robots():
+                rig.hub.end_waiting()
+            services.end_processes()
+
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         with suppress(KeyboardInterrupt):
-            ending = EndInTime(services.end_processes).arm
-            _Server(config, lambda: ready(address), services.end_processes, ending).run([listener])
+            server = _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm)
+            # Clients ask for a stop at the port after the service's, too. It is refused there by this service itself:
+            # at a port left free another service might listen, and stop an arm that nobody meant.
+            server.run([listener, beside])
 
 
 def _configuration(app: FastAPI) -> uvicorn.Config:

@@ -74,8 +74,9 @@ def _copy_file(text: str, path: Path, what: str) -> None:
 
 
 def _copy_examples(folder: Path) -> None:
-    """Copies the examples into a new folder."""
+    """Copies the examples into a new folder: all of them, or none and no folder."""
     import shutil
+    import tempfile
 
     from daq.config.examples import example_files
 
@@ -85,9 +86,12 @@ def _copy_examples(folder: Path) -> None:
     if folder.exists():
         raise SpecError(f"{folder}: is there already; name another folder with -o")
     try:
-        folder.mkdir()
-        for file in files:
-            shutil.copyfile(file, folder / file.name)
+        with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.absolute().parent) as beside:
+            part = Path(beside) / folder.name
+            part.mkdir()
+            for file in files:
+                shutil.copyfile(file, part / file.name)
+            part.rename(folder)
     except OSError as error:
         raise SpecError(f"{folder}: cannot be written: {error.strerror}") from error
 

@@ -147,8 +147,9 @@ def get_batch_table(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
     responses={200: {"content": {PARQUET_TYPE: {}}}},
 )
 def get_batch_parquet(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """Returns the table of a batch as Parquet; 404 where the service has no `pyarrow` to write it."""
-    path = rig.jobs.result_file(job, f"{BATCH}/{PARQUET}")
+    """Returns the table of a batch as Parquet; 404 if the service had no `pyarrow` to write it."""
+    advice = "table.csv has the same; Parquet is written where `pip install 'ma2000-daq[tables]'` was done before"
+    path = rig.jobs.result_file(job, f"{BATCH}/{PARQUET}", advice)
     return FileResponse(path, media_type=PARQUET_TYPE, filename=f"{job}.parquet")
 
 

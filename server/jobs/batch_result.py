@@ -10,7 +10,7 @@ from daq.contracts.trace_limits import TraceLimits
 from daq.traces.catalogue import summary_of
 from model.reports.page import Report
 from server.batches.choice import chosen_of
-from server.batches.folder import BatchFolder
+from server.batches.folder import PARQUET, BatchFolder
 from server.batches.run import Chosen, Standing
 from server.batches.study import OneTrace
 from server.jobs.results import BatchData, BatchJobResult, BatchTrace
@@ -33,7 +33,8 @@ def _chosen(number: str, path: Path, limits: TraceLimits) -> Chosen:
 def batch_result(job: str, ended: Standing, folder: BatchFolder) -> BatchJobResult:
     """Returns how a batch ended."""
     traces = tuple(BatchTrace(trace=row.key, problem=row.problem, seconds=round(row.seconds, 3)) for row in folder.rows)
-    return BatchJobResult(id=job, data=BatchData(done=ended.before + ended.done, failed=ended.failed, traces=traces))
+    done, parquet = ended.before + ended.done, (folder.path / PARQUET).is_file()
+    return BatchJobResult(id=job, data=BatchData(done=done, failed=ended.failed, traces=traces, parquet=parquet))
 
 
 def batch_report(study: Study, data: BatchData, model: str) -> Report:

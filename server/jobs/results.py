@@ -150,11 +150,12 @@ class BatchTrace(FrozenRecord):
 
 
 class BatchData(FrozenRecord):
-    """How a batch ended. What it found is in its table (`table.csv`, `table.parquet`)."""
+    """How a batch ended. What it found is in its table: `table.csv`, and `table.parquet` if `parquet` says so."""
 
     done: int
     failed: int
     traces: tuple[BatchTrace, ...]
+    parquet: bool = False
 
 
 class BatchJobResult(FrozenRecord):

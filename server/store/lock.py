@@ -27,7 +27,7 @@ _NUMBER = int.from_bytes(b"ma2000dq")
 _HOLDER = text(
     "SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid) WHERE locktype = 'advisory' AND granted"
     " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-    " AND (classid::bigint << 32) + objid::bigint = :number"
+    " AND objsubid = 1 AND (classid::bigint << 32) + objid::bigint = :number"  # 1: a lock of one number, not of two
 )
 log = logging.getLogger("server")
 

@@ -158,8 +158,7 @@ def _each(query: Select[TraceRow], moment: InstrumentedAttribute[datetime], rang
     """Asks PostgreSQL for several ranges at once, each through the list's index: an answer takes longer to come than
     to find. (`OR` leaves it to the planner, which may read the whole list.)"""
     begins, beyonds = (
-        literal([moment.replace(tzinfo=None) for moment in moments], ARRAY(DateTime))
-        for moments in zip(*ranges, strict=True)
+        literal([time.replace(tzinfo=None) for time in ends], ARRAY(DateTime)) for ends in zip(*ranges, strict=True)
     )
     times = func.unnest(begins, beyonds).table_valued(column("begin"), column("beyond"), name="times").render_derived()
     found = query.where(moment >= times.c.begin, moment < times.c.beyond).lateral()

@@ -15,6 +15,7 @@ import typer
 
 from daq.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
 from daq.commissioning.potentiometer import Interval, Potentiometer
+from daq.config.examples import example_files
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.machine import BoardPid, load_machine, parse_machine
@@ -124,6 +125,16 @@ def test_the_examples_are_copied_whole_and_never_over_a_folder(daq: CommandLine,
     assert {path.name: path.read_bytes() for path in target.iterdir()} == ours
     daq("config", "copy", "examples", "-o", target).complains(2, "is there already; name another folder")
     daq("config", "copy", "examples", "-o", tmp_path / "none" / "here").complains(2, "cannot be written")
+
+
+def test_examples_that_cannot_all_be_copied_leave_no_folder(
+    daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known, target = example_files(), tmp_path / "copied"
+    monkeypatch.setattr("daq.config.examples.example_files", lambda: (*known, tmp_path / "gone"))
+    before = set(tmp_path.iterdir())
+    daq("config", "copy", "examples", "-o", target).complains(2, "copied: cannot be written: No such file")
+    assert set(tmp_path.iterdir()) == before
 
 
 def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place_of_a_table(

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -117,8 +118,8 @@ def test_linters_of_others_find_nothing() -> None:
         assert done.returncode == 0, done.stdout
 
 
-def test_the_image_is_built_from_every_package_and_from_no_more() -> None:
-    wheel = re.findall(r"^packages = \[(.*)\]$", (ROOT / "pyproject.toml").read_text("utf-8"), re.MULTILINE)[0]
+def test_the_image_is_built_from_every_folder_of_the_wheel_and_from_no_more() -> None:
+    wheel = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hatch"]["build"]["targets"]["wheel"]
     copied = re.findall(r"^COPY (\w+) \1$", (ROOT / "deploy" / "Containerfile").read_text("utf-8"), re.MULTILINE)
     let_in = re.findall(r"^!/(\w+)$", (ROOT / ".dockerignore").read_text("utf-8"), re.MULTILINE)
-    assert set(re.findall(r'"(\w+)"', wheel)) == set(copied) <= set(let_in)
+    assert {*wheel["packages"], *wheel["force-include"]} == set(copied) <= set(let_in)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import pytest
@@ -102,6 +103,22 @@ def test_a_batch_gives_its_table(studied: Studied, studied_dashboard: Dashboard)
     head, *rows = told.value.path().read_text("utf-8").splitlines()
     assert head.startswith("trace,file,")
     assert sorted(row.split(",")[0] for row in rows) == sorted(studied.traces)
+    expect(table.get_by_role("button", name="Parquet")).to_be_visible()
+
+
+def test_parquet_is_offered_only_where_the_service_has_written_it(
+    studied: Studied, studied_dashboard: Dashboard
+) -> None:
+    job = done(studied.service, {"kind": "batch", "study": {"kind": "simulate"}, "traces": list(studied.traces)})
+    place = studied.service.folder / "service" / "jobs" / job["id"]
+    (place / "batch" / "table.parquet").unlink()
+    told = json.loads((place / "result.json").read_text("utf-8"))
+    told["data"]["parquet"] = False  # as a service without pyarrow writes it
+    (place / "result.json").write_text(json.dumps(told), "utf-8")
+    page = studied_dashboard.open(f"models/job/{job['id']}")
+    table = page.get_by_role("region", name=re.compile("^Table"))
+    expect(table.get_by_role("button", name="CSV")).to_be_visible()
+    expect(table.get_by_role("button", name="Parquet")).to_have_count(0)
 
 
 def test_what_the_service_refuses_is_said_beside_the_form(studied: Studied, studied_dashboard: Dashboard) -> None:

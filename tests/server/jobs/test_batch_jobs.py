@@ -50,9 +50,13 @@ def test_a_batch_has_a_table_and_the_next_one_goes_on(sound_service: Service, tr
     assert [row["trace"] for row in table(sound_service, second["id"])] == sorted(traces)
     before = sound_service.robot.get(f"/jobs/{first['id']}/result").json()["data"]["traces"]
     data = sound_service.robot.get(f"/jobs/{second['id']}/result").json()["data"]
-    assert (data["done"], data["failed"]) == (2, 0)
+    assert (data["done"], data["failed"], data["parquet"]) == (2, 0, True)
     assert before[0] in data["traces"]  # the time that it took, too: it was not done again
     assert sound_service.robot.get(f"/jobs/{second['id']}/table.parquet").content.startswith(b"PAR1")
+    place = sound_service.folder / "service" / "jobs" / first["id"]
+    (place / "batch" / "table.parquet").unlink()  # as where the service has no pyarrow
+    none = sound_service.robot.get(f"/jobs/{first['id']}/table.parquet")
+    assert (none.status_code, "table.csv has the same" in none.json()["advice"]) == (404, True)
     assert "2 of 2 traces done" in sound_service.robot.get(f"/jobs/{second['id']}/report.html").text
 
 

@@ -1253,7 +1253,7 @@ export interface paths {
         };
         /**
          * Get Batch Parquet
-         * @description Returns the table of a batch as Parquet; 404 where the service has no `pyarrow` to write it.
+         * @description Returns the table of a batch as Parquet; 404 if the service had no `pyarrow` to write it.
          */
         get: operations["get_batch_parquet"];
         put?: never;
@@ -1845,7 +1845,7 @@ export interface components {
         };
         /**
          * BatchData
-         * @description How a batch ended. What it found is in its table (`table.csv`, `table.parquet`).
+         * @description How a batch ended. What it found is in its table: `table.csv`, and `table.parquet` if `parquet` says so.
          */
         BatchData: {
             /** Done */
@@ -1854,6 +1854,11 @@ export interface components {
             failed: number;
             /** Traces */
             traces: components["schemas"]["BatchTrace"][];
+            /**
+             * Parquet
+             * @default false
+             */
+            parquet?: boolean;
         };
         /**
          * BatchJobResult
