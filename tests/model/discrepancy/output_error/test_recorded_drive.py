@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import TraceError
+from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.controller_evidence import (
     check_controller,
     settled_by_records,
@@ -25,6 +26,7 @@ from model.machine_model.parameter import Kind
 from tests.model.discrepancy import outside_arm
 
 MACHINE = outside_arm.machine()
+BY_SIMULATION = DiagnosisOptions(method="output-error")
 
 
 @pytest.fixture(scope="module")
@@ -63,17 +65,21 @@ def test_sudden_friction_with_the_true_numbers_leaves_the_noise_of_readings() ->
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("seed", [106, 107])
 def test_a_sound_arm_is_not_called_unsound(seed: int) -> None:
     arm = outside_arm.drawn(seed)
     traces = [outside_arm.record(arm, 10 * seed + k) for k in (1, 2)]
-    assert diagnose(base_model(MACHINE), traces[:1], traces[1:]).verdict == "nothing-significant"
+    found = diagnose(base_model(MACHINE), traces[:1], traces[1:], BY_SIMULATION)
+    assert found.verdict == "nothing-significant", found.summary
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_a_dead_zone_is_found() -> None:
     arm = outside_arm.drawn(11).changed("dead_zone", 2, 1.2)
-    answer = diagnose(base_model(MACHINE), [outside_arm.record(arm, 111)], [outside_arm.record(arm, 112)])
+    records = [outside_arm.record(arm, seed) for seed in (111, 112)]
+    answer = diagnose(base_model(MACHINE), records[:1], records[1:], BY_SIMULATION)
     step = answer.steps[0]
     assert (step.effect, step.joints) == ("dead_zone", (2,))
     assert next(iter(step.parameters.values())).value == pytest.approx(1.2, abs=0.05)
