@@ -5,7 +5,7 @@ The controllers and the joints that they move are written out here: nothing of `
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -192,3 +192,37 @@ def test_a_diagnosis_in_torques_of_a_sound_controller_names_nothing() -> None:
     assert (found.method, found.verdict, found.steps) == ("inverse-dynamics", "nothing-significant", ())
     (note,) = (n for n in found.notes_data if n.kind == "not-looked-for")
     assert set(note.values["effects"]) == set(NOT_IN_TORQUES) - BOTH
+
+
+def stated(law: str, **controller: Any) -> Machine:
+    """The machine whose file states more of its controller."""
+    file = machine(law).model_dump()
+    file["controller"].update(controller)
+    return Machine.model_validate(file)
+
+
+@pytest.mark.parametrize("step", [2e-5, 1e-3])
+@pytest.mark.parametrize("law", GAINS)
+def test_set_points_that_are_rounded_as_the_file_says_are_not_lost(
+    law: str, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent = asked(1, 1400)
+    monkeypatch.setitem(globals(), "asked", lambda *_: step * np.floor(sent / step + 0.5))
+    trace = replace(recorded(law), set_point=sent[:, None])
+    known = base_model(stated(law, set_point_resolution=quantity(step, "m")))
+    assert judge_controller(known, [trace]).findings == ()
+
+
+@pytest.mark.parametrize("law", GAINS)
+def test_a_gain_within_its_stated_deviation_is_not_wrong(law: str) -> None:
+    known = base_model(stated(law, gain_error=quantity(0.0, "1", deviation=0.05)))
+    assert judge_controller(known, [recorded(law, factor=1.04)]).findings == ()
+    assert len(judge_controller(known, [recorded(law, factor=1.4)]).findings) == 1
+
+
+@pytest.mark.parametrize("law", GAINS)
+def test_a_gain_beyond_the_bounds_of_its_effect_is_told_and_stays_out_of_the_model(law: str) -> None:
+    model = base_model(machine(law))
+    found = judged(law, factor=0.04)
+    assert [finding.value for finding in found.findings] == [pytest.approx(-0.96, abs=0.01)]
+    assert found.with_findings(model) == model
