@@ -121,7 +121,7 @@ def recorded(law: str, seed: int = 1, factor: float = 1.0, lost: float = 0.0, be
     return Trace(
         record,
         (1,),
-        PERIOD * np.arange(count),
+        np.asarray(PERIOD * np.arange(count), dtype=np.float64),
         position[shown, None],
         set_point=sent[shown, None],
         drive=drive[shown, None],
