@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.drives.amplifier import motor_volts, warmed
+from model.drives.amplifier import warmed
 from model.drives.magnet import torque_constant
 from model.dynamics import recursive
 from model.dynamics.compilation import compiled, internal
@@ -78,14 +78,6 @@ def gravity_along(chain: ChainArrays, position: NDArray[Any], out: NDArray[Any])
         found = recursive.gravity_torques(chain, position[k])
         for j in range(position.shape[1]):
             out[k, j] = found[j]
-
-
-@compiled
-def amplify(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> None:
-    """Volts at the motors (k, n) for a commanded drive."""
-    for k in range(drive.shape[0]):
-        for j in range(drive.shape[1]):
-            out[k, j] = motor_volts(drive[k, j], joints[j])
 
 
 @compiled

@@ -1,0 +1,43 @@
+"""Where a recorded drive stands at a limit that no file states: what acts there may be less than what is recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq.contracts.machine import DcMotor, Machine
+from model.arrays import Floats, Mask
+
+AT_LIMIT = 1e-6
+"""Share of its largest value within which a drive stands at it."""
+RUN = 3
+"""Samples in a row at the largest value, of either sign, that show a limit: a motion passes its largest value once."""
+MOST = 0.5
+"""Share of the samples beyond which a drive that only switches is taken as it was recorded."""
+
+
+def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
+    """(r, n) where a recorded torque, force or current (r, n) stands at its limit, for as long as it does.
+
+    A current loop, or whatever forms a torque, is asked for its largest value where it may not give it: the supply's
+    voltage, less the back-EMF, is not known. Of a DC motor the volts are recorded, and the file states the supply.
+    """
+    found = np.zeros(drive.shape, dtype=bool)
+    for column, joint in enumerate(machine.modelled_joints):
+        size = np.abs(drive[:, column])
+        if isinstance(machine.joint(joint).drive, DcMotor) or not size.any():
+            continue
+        at = size >= (1 - AT_LIMIT) * size.max()
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], at, [False])).astype(int)))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            found[begin:end, column] = end - begin >= RUN
+        if found[:, column].mean() > MOST:
+            found[:, column] = False
+    return found
+
+
+def spread(mask: Mask, samples: int) -> Mask:
+    """(r, n) the mask, and so many samples before and after."""
+    counts = np.concatenate([np.zeros((1, mask.shape[1]), dtype=int), np.cumsum(mask, axis=0)])
+    rows = np.arange(len(mask))
+    high = np.minimum(rows + samples + 1, len(mask))
+    return np.asarray(counts[high] > counts[np.maximum(rows - samples, 0)])
