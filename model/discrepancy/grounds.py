@@ -37,6 +37,7 @@ PatternKind = Literal[
 ]
 NoteKind = Literal[
     "cutoff",
+    "drive-at-limit",
     "drive-timing",
     "errors-follow-record",
     "larger-noise",

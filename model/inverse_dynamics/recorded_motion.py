@@ -223,7 +223,9 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
     limited = spread(stands_at_limit(readings.drive, machine), round(EDGE / cutoff / readings.period))[::thin]
     moving = (_moving(speed, noise, period) & ~limited)[edge : len(time) - edge : every]
     if not moving.any():
-        raise TraceError(f"trace {readings.name}: no joint moves beyond the noise of its readings, and below its drive's limit")
+        raise TraceError(
+            f"trace {readings.name}: no joint moves beyond the noise of its readings, and below its drive's limit"
+        )
     return RecordedMotion(
         name=readings.name,
         time=time,

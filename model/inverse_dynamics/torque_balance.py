@@ -15,7 +15,7 @@ from model.arrays import Floats
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
-from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples, low_pass
+from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, holds_drive_between_samples, low_pass
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm, nominal_vector
@@ -33,8 +33,8 @@ DIFFERENCE = 1e-3
 CONTACT_SHARE = 0.02
 """Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
 HOLDING_ROUNDS = 4
-"""Rounds in which friction of a slow joint takes up what is left below the cutoff: without any, steps of a set point left
-2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
+"""Rounds in which friction of a slow joint takes up what is left below the cutoff: without any, steps of a set point
+left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
 LEAST_KEPT = 0.05
 """Least share of a torque that gears are taken to pass on: two losses together may exceed one."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
@@ -153,7 +153,7 @@ class TorqueBalance:
         return kept[1]
 
     def _volts(self, index: int, vector: Floats, joints: Floats, samples: Floats) -> Floats:
-        """Volts at the motors at the grid's times, after delay and limit; `_lost_in_dead_zone` has what a dead zone takes.
+        """Volts at the motors at the grid's times, after delay and limit; `_lost_in_dead_zone` has what a zone takes.
 
         samples: (n,) that drives are late by.
         """
@@ -182,7 +182,7 @@ class TorqueBalance:
                 extra = _twist_rate(asked[:, j], joints[j], time)
                 rotor_speed[:, j] += extra
                 inertia = joints[j, at.ROTOR_INERTIA] * joints[j, at.GEAR] ** 2
-                needed[:, j] += inertia * (acceleration[:, j] + np.gradient(extra, time))
+                needed[:, j] += inertia * (acceleration[:, j] + derivative(extra, time[1] - time[0]))
             kernel.supplied_torque(driven._replace(rotor_speed=rotor_speed), numbers, motor, other)
             asked = needed - other
         asked = _before_losses(asked, driven.contact, joints)
@@ -300,4 +300,4 @@ def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
     if joint[at.GAP] > 0:
         soft = CONTACT_SHARE * float(np.sqrt(np.mean(through**2))) + 1e-12
         twist = twist + 0.5 * joint[at.GAP] * np.tanh(through / soft)
-    return np.gradient(twist, time)
+    return derivative(twist, time[1] - time[0])

@@ -22,6 +22,14 @@ def _cutoff(v: Values) -> str:
     return f"torques are compared below {v['cutoff']:g} Hz; faster effects are not seen"
 
 
+def _drive_at_limit(v: Values) -> str:
+    shares = ", ".join(f"{share:.0%} of joint {joint}" for joint, share in v["shares"])
+    return (
+        f"samples beside the largest recorded drive are left out ({shares}): it stands there for several samples, and "
+        "what acts at such a limit may be less than what is recorded"
+    )
+
+
 def _drive_timing(v: Values) -> str:
     late = ", ".join(f"{samples:.2g}" for samples in v["late"])
     return (
@@ -152,6 +160,7 @@ def _rounded(value: float, unit: str) -> str:
 
 WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
+    "drive-at-limit": _drive_at_limit,
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
     "larger-noise": _larger_noise,

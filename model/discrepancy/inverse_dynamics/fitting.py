@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.likelihood import (
     minus_twice_log_likelihood,
     noise_model,
 )
+from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_rows
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
@@ -27,9 +28,6 @@ STEPS = (1.0, 0.5, 0.2, 0.05)
 """Shares of a Gauss-Newton step that are tried, until one is downhill."""
 SETTLED = 1e-2
 """Fall of −2 log posterior in a round below which the fit has settled."""
-
-NEXT_TO_NONE = 1e-2
-"""Share of what a file states below which friction is not told from none."""
 
 
 @dataclass(frozen=True)
@@ -73,28 +71,6 @@ class BalanceFit:
     def slopes(self) -> Slopes:
         """Derivatives by every unknown, by name, for reuse in later fits."""
         return {u.name: self.slope(u) for u in self.unknowns}
-
-
-def prior_cost(unknowns: Sequence[Unknown], values: Mapping[str, float]) -> float:
-    """Σ d², with d the distance of every number from what is expected, in deviations (`prior_distance`)."""
-    return sum(prior_distance(u, values[u.name])[0] ** 2 for u in unknowns if u.deviation is not None)
-
-
-def prior_distance(u: Unknown, value: float) -> tuple[float, float]:
-    """Distance of a number from what is expected, in deviations, and its derivative. 0 where nothing is expected.
-
-    Friction that the file states is stated to a share of itself. Below, it counts by its logarithm: in plain
-    distances, none at all is only 3.3 deviations from friction that is stated to 30 %, and a fit would rather take a
-    friction away than show that another law is missing. Both have the same slope where they meet.
-    """
-    if u.deviation is None:
-        return 0.0, 0.0
-    of_effect = u.parameter.effect is not None and not u.nuisance
-    if not of_effect or u.low < 0.0 or u.expected <= 0.0 or value >= u.expected:
-        return (value - u.expected) / u.deviation, 1.0 / u.deviation
-    least = max(value, NEXT_TO_NONE * u.expected)
-    per_share = u.expected / u.deviation
-    return float(np.log(least / u.expected)) * per_share, per_share / least
 
 
 def fit(
@@ -177,13 +153,3 @@ def stacked(slopes: Slopes, now: BalanceFit) -> list[Floats]:
     if not now.unknowns:
         return [np.zeros((*r.shape, 0)) for r in now.residual]
     return [np.stack([slopes[u.name][i] for u in now.unknowns], axis=2) for i in range(len(now.residual))]
-
-
-def prior_rows(unknowns: Sequence[Unknown], at: Floats) -> tuple[Floats, Floats]:
-    """Rows (c, p) and right-hand sides (c,) that hold unknowns near their expected values, linearised at `at` (p,)."""
-    claimed = [k for k, u in enumerate(unknowns) if u.deviation is not None]
-    rows, aims = np.zeros((len(claimed), len(unknowns))), np.zeros(len(claimed))
-    for row, k in enumerate(claimed):
-        distance, rows[row, k] = prior_distance(unknowns[k], float(at[k]))
-        aims[row] = -distance
-    return rows, aims

@@ -9,7 +9,8 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, Trial
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, prior_distance, prior_rows, stacked
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, stacked
+from model.discrepancy.inverse_dynamics.priors import prior_distance, prior_rows
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
 NONLINEAR = frozenset(

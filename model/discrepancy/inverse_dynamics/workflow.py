@@ -24,10 +24,11 @@ from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit, prior_distance
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
+from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
@@ -226,7 +227,7 @@ class TorqueWorkflow:
         """The fit that a candidate is held against: the last one, or that with a number as the file states it. With
         its prior, a number far off may be fitted as well as without. An effect that the tolerances can imitate, at the
         price of numbers far from what is stated, is held against what they are with it."""
-        if not chosen.stated and chosen.relief > MOSTLY:
+        if chosen.relief > MOSTLY:
             return self._without_effect(chosen)
         if not chosen.stated:
             return self.now
@@ -236,10 +237,12 @@ class TorqueWorkflow:
         return fit(balance, unknowns, self.now.values, self.case.data, self.now.noise.memory)
 
     def _without_effect(self, chosen: Fitted) -> BalanceFit:
-        """The model that lacks an effect, with all other numbers as they are with it."""
-        known = {name: v for name, v in chosen.fit.model_values.items() if name in self.model.by_name}
+        """The model that lacks an effect, or has its numbers as the file states them, with all others as they are with
+        it."""
+        stated = {p.name: p.value for p in chosen.stated}
+        known = {name: v for name, v in chosen.fit.model_values.items() if name in self.model.by_name} | stated
         balance = TorqueBalance(self.model.with_values(known), self.case.records)
-        begin = {**self.now.values, **chosen.fit.values}
+        begin = {**self.now.values, **chosen.fit.values, **stated}
         return fit(balance, self.now.unknowns, begin, self.case.data, self.now.noise.memory, rounds=0)
 
     def _needed(self, chosen: Fitted) -> float:
@@ -322,6 +325,14 @@ class TorqueWorkflow:
         if late.max() < SLIGHTLY_LATE:
             return ()
         return (Note(kind="drive-timing", values={"late": list(map(float, late)), "samples": MOST}),)
+
+    def _at_limits(self) -> tuple[Note, ...]:
+        """What was left out beside limits of the drives that no file states."""
+        records = (*self.case.records, *self.case.held_out)
+        shares = np.average([r.at_limit for r in records], axis=0, weights=[np.ptp(r.time) for r in records])
+        joints = self.model.machine.modelled_joints
+        found = [(joint, float(share)) for joint, share in zip(joints, shares, strict=True) if share > 0.0]
+        return (Note(kind="drive-at-limit", values={"shares": found}),) if found else ()
 
     def _predicted(self, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
@@ -514,6 +525,7 @@ class TorqueWorkflow:
                 *named,
                 self._shares(),
                 *_assumptions(cutoff, self.controller.not_looked_for),
+                *self._at_limits(),
                 *self._timing(),
                 *self.notes,
             ),
