@@ -166,7 +166,7 @@ class _JointRecords:
             wrong = np.abs(sent - used) > tolerance
             clear += int((wrong if numbers is None else wrong & numbers.lost).sum())
             if numbers is not None:
-                changed &= ~numbers.limited
+                changed &= numbers.told
             moved, lost, total = (
                 moved + int(changed.sum()),
                 lost + int((wrong & changed).sum()),
