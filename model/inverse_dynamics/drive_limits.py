@@ -10,13 +10,13 @@ from model.arrays import Floats, Mask
 AT_LIMIT = 1e-6
 """Share of its largest value within which a drive stands at it."""
 RUN = 3
-"""Samples in a row at the largest value, of either sign, that show a limit: a motion passes its largest value once."""
-MOST = 0.5
-"""Share of the samples beyond which a drive that only switches is taken as it was recorded."""
+"""Samples in a row at the largest value that show a limit: a motion passes its largest value once."""
+MOST = 0.9
+"""Share of the samples beyond which a drive only switches, and is taken as it was recorded."""
 
 
 def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
-    """(r, n) where a recorded torque, force or current (r, n) stands at its limit, for as long as it does.
+    """(r, n) where a recorded torque, force or current (r, n) is at its limit.
 
     A current loop, or whatever forms a torque, is asked for its largest value where it may not give it: the supply's
     voltage, less the back-EMF, is not known. Of a DC motor the volts are recorded, and the file states the supply.
@@ -27,11 +27,9 @@ def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
         if isinstance(machine.joint(joint).drive, DcMotor) or not size.any():
             continue
         at = size >= (1 - AT_LIMIT) * size.max()
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], at, [False])).astype(int)))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True):
-            found[begin:end, column] = end - begin >= RUN
-        if found[:, column].mean() > MOST:
-            found[:, column] = False
+        runs = np.lib.stride_tricks.sliding_window_view(at, RUN).all(axis=1)
+        if runs.any() and at.mean() <= MOST:
+            found[:, column] = at
     return found
 
 

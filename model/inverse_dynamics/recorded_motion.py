@@ -31,6 +31,8 @@ KEPT = 3.0
 """Samples per period of the cutoff that are compared: closer ones are not independent."""
 EDGE = 1.0
 """Periods of the cutoff at both ends that are left out, where the low-pass lacks samples on one side."""
+BESIDE_LIMIT = 1.5
+"""Periods of the cutoff before and after a drive at an unknown limit that are left out: the low-pass spreads it."""
 SHORTEST = 1.0
 """Shortest duration of a record, s."""
 TURNING_NOISE = 2.0
@@ -220,7 +222,7 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
     edge = max(1, int(EDGE / cutoff / period))
     noise = readings.speed_noise(wide)
     turning = np.maximum(TURNING_NOISE * noise, 0.5 * period * np.median(np.abs(acceleration), axis=0)) + 1e-12
-    limited = spread(stands_at_limit(readings.drive, machine), round(EDGE / cutoff / readings.period))[::thin]
+    limited = spread(stands_at_limit(readings.drive, machine), round(BESIDE_LIMIT / cutoff / readings.period))[::thin]
     moving = (_moving(speed, noise, period) & ~limited)[edge : len(time) - edge : every]
     if not moving.any():
         raise TraceError(
