@@ -28,8 +28,10 @@ NOT_IN_TORQUES = {
     "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
 }
 """Effects that low-passed torques of the recorded drive do not show, and why. All others take part."""
-DIFFERENCE = 1e-3
-"""Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear."""
+DIFFERENCE = 1e-6
+"""Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear. A
+step of a thousandth took joints that turn over a corner of their friction, each parameter over others; masses that
+cancel each other then did not, and a fit could not move along them."""
 CONTACT_SHARE = 0.02
 """Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
 HOLDING_ROUNDS = 4

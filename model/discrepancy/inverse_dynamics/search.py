@@ -23,6 +23,8 @@ from model.machine_model.parameter import Parameter
 
 SHORTLIST = 7
 """Most effects that are fitted after probing."""
+REFINED = 6
+"""Most candidates that are fitted with derivatives of their own."""
 LARGER_PART = 0.5
 """Share of a joint's residual from which an effect that explains it is fitted, whatever it promises in evidence."""
 ALIKE = 0.97
@@ -97,15 +99,27 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
+    found = _refined(_weigh(found, now, places))
     weighed = _weigh(found, now, places)
     while weighed and len(weighed[0].joints) > 1:
         stop_if(cancel)
         fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        found += [_fit_effect(fitted_model, now, slopes, p) for p in fewer]
+        found += _refined([_fit_effect(fitted_model, now, slopes, p) for p in fewer])
         weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
+
+
+def _refined(found: Sequence[Fitted]) -> list[Fitted]:
+    """The candidates, of which the first have been fitted on with derivatives of their own: those that were reused are
+    of another place, and a number that the tolerances had taken far off does not come back by them."""
+    refined = []
+    for one in found[:REFINED]:
+        last = one.fit
+        fitted = fit(last.balance, last.unknowns, last.values, last.data, last.noise.memory)
+        refined.append(replace(one, fit=fitted))
+    return [*refined, *found[REFINED:]]
 
 
 def _with_fewer_joints(probes: Sequence[Probe], best: Fitted) -> list[list[Probe]]:
