@@ -73,10 +73,15 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Findings:
-    """What one step found: fitted candidates, best first, and all candidates as they were probed."""
+    """What one step found: fitted candidates, best first, and all candidates as they were probed.
+
+    unresolved: fitted candidates that the records may not resolve (`resolution`): none of them is named, but another
+    one that follows the same changes of a torque is not named alone beside them.
+    """
 
     fitted: tuple[Fitted, ...]
     probed: tuple[Probe, ...]
+    unresolved: tuple[Fitted, ...] = ()
 
 
 def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, cancel: Cancel) -> Findings:

@@ -29,7 +29,7 @@ from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.priors import prior_distance
-from model.discrepancy.inverse_dynamics.resolution import is_resolved
+from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES, is_resolved
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import verdict, withdrawn
@@ -158,7 +158,12 @@ class TorqueWorkflow:
     def _search(self) -> Findings:
         """What a step found, without what the records do not resolve."""
         found = search(self.model, self.now, self.case, self._report, self.cancel)
-        return replace(found, fitted=tuple(f for f in found.fitted if is_resolved(f, self.now, self.case)))
+        resolved = [is_resolved(f, self.now, self.case) for f in found.fitted]
+        return replace(
+            found,
+            fitted=tuple(f for f, is_one in zip(found.fitted, resolved, strict=True) if is_one),
+            unresolved=tuple(f for f, is_one in zip(found.fitted, resolved, strict=True) if not is_one),
+        )
 
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
@@ -365,6 +370,8 @@ class TorqueWorkflow:
         before, after = elsewhere
         case = self.case
         standing = [c for c in found.fitted if not any(c is one for one in refused)]
+        if chosen.effect in OF_CHANGES:
+            standing += [c for c in found.unresolved if c.effect in OF_CHANGES and c.joints == chosen.joints]
         rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < self._margin(chosen, r)]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
