@@ -174,7 +174,7 @@ def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
     """Butterworth's low-pass forwards and backwards along the first axis, so without delay.
 
     It is the gain of `scipy.signal.sosfiltfilt` at every frequency, of a signal that is continued oddly at both ends,
-    and takes a sixth of the time: a diagnosis does little else. The signal is unchanged where the sampling ends below
+    and takes a quarter of the time: a diagnosis does little else. The signal is unchanged where the sampling ends below
     the cutoff.
     """
     if cutoff >= 0.45 / period:
