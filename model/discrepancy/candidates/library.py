@@ -14,6 +14,7 @@ from model.effects.effect import JointScale, Tone
 from model.effects.library import BESIDE, effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
+from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Parameter
 from model.simulation.chain_of_model import gravity_loads
 
@@ -21,6 +22,7 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
     "joint_compliance": (0.15, 0.5, 1.5),
     "dead_zone": (0.1, 0.4, 1.5),
+    "amplifier_threshold": (0.2, 0.6, 1.5, 4.0),
     "supply_limit": (0.3, 0.8, 1.3),
     "input_delay": (0.1, 0.4, 1.2, 2.5),
     "motor_inductance": (0.6, 2.0, 8.0),
@@ -30,6 +32,7 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "direction_dependent_friction": (0.3, 2.0),
     "direction_dependent_viscous_friction": (0.3, 2.0),
     "direction_dependent_gear_loss": (0.3, 2.0),
+    "one_sided_spring": (0.3, 2.0),
 }
 """Trial sizes, in expected deviations, of effects whose response is not proportional to their parameter."""
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
@@ -48,6 +51,9 @@ STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
 """Trial values of the speed over which friction falls, rad/s."""
 
 
+SLACK_SHARE = 1 / 16
+"""Share of a sensor's range to either side of the rest posture at which a cable is tried to become taut: a motion that
+uses half of the range passes all three places."""
 GRAVITY_FRICTION = "gravity_torque_friction"
 """Friction in proportion to a gravity torque."""
 POSTURES, LEAST_CHANGE = 16, 1e-6
@@ -219,12 +225,22 @@ def _variants(place: _Place) -> list[Hypothesis]:
         found.append(_sized(place))
     elif place.name == "resistance_drift":
         found.append(_sized(place, ({"time_constant": 10.0}, {"time_constant": 30.0})))
+    elif place.name == "resistance_rise":
+        found.append(_sized(place, ({"time_constant": 15.0}, {"time_constant": 60.0})))
     elif place.name == "spring_torque":
-        rest = place.model.machine.rest_posture
-        found.append(_sized(place, ({"rest": 0.0 if rest is None else rest[place.joints[0] - 1]},)))
+        found.append(_sized(place, ({"rest": _rest_of(place)},)))
+    elif place.name == "one_sided_spring":
+        away = SLACK_SHARE * joint_scale(place.model.machine, place.joints[0]).range
+        found.append(_sized(place, tuple({"rest": _rest_of(place) + side * away} for side in (-1, 0, 1))))
     else:
         found.append(_sized(place))
     return [c for c in found if c is not None]
+
+
+def _rest_of(place: _Place) -> float:
+    """Angle of the joint in the machine's rest posture, rad; 0 where the file states none."""
+    rest = place.model.machine.rest_posture
+    return 0.0 if rest is None else float(rest[place.joints[0] - 1])
 
 
 def _sized(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -46,6 +47,11 @@ SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
 """Quantiles of a joint's speed in magnitude: speeds at which Stribeck friction may have faded."""
 DRIVE_QUANTILES = (0.2, 0.5, 0.8)
 """Quantiles of the drive in magnitude that are tried as dead zones."""
+THRESHOLD_SHARES = tuple(float(share) for share in np.geomspace(0.02, 0.6, 16))
+"""Thresholds of an amplifier that are tried, as shares of the largest drive, each a quarter larger than the one before:
+a search goes from sample to sample, and finds a threshold only from near it."""
+PASSED = 0.3
+"""Least share of the record in which the drive is above a threshold that is tried."""
 LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
 """Limits of the drive that are tried, as shares of its largest value."""
 UNLIMITED = 0.7
@@ -54,6 +60,10 @@ DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 """Delays, and time constants of windings, that are tried, s."""
 WARMING_TIMES = (10.0, 40.0, 200.0)
 """Thermal time constants that are tried, s."""
+RISES = (0.2, -0.2)
+"""Rises of a winding's resistance with time that are tried: copper 50 K warmer, and 50 K colder."""
+TAUT_QUANTILES = (0.25, 0.5, 0.75)
+"""Quantiles of a joint's positions at which a cable is tried to become taut."""
 WINDING_SHARES = (0.01, 0.1)
 """Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
 are tried."""
@@ -224,12 +234,15 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
 def _narrowed(p: Parameter, place: _Place) -> Parameter:
     """The parameter, with bounds narrowed to what the record allows.
 
-    A limit of the drive must leave most of the record below it: a drive that hardly ever acts would explain any motion,
-    with bodies without mass. Friction must not change within the speeds at which its direction is not resolved.
+    A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
+    ever acts would explain any motion, with bodies without mass. Friction must not change within the speeds at which
+    its direction is not resolved.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
         return replace(p, low=min(p.high, max(p.low, slowest)))
+    if p.effect == "amplifier_threshold":
+        return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
     if p.effect != "supply_limit":
         return p
     return replace(p, low=min(p.high, max(p.low, float(np.quantile(place.drives, UNLIMITED)))))
@@ -253,6 +266,13 @@ def _dead_zone(place: _Place) -> Iterator[Start]:
     drive = place.drives
     for width in (0.05 * float(drive.max()), *np.quantile(drive, DRIVE_QUANTILES)):
         yield {"width": float(width)}
+
+
+def _threshold(place: _Place) -> Iterator[Start]:
+    largest, highest = float(place.drives.max()), float(np.quantile(place.drives, 1 - PASSED))
+    for width in (share * largest for share in THRESHOLD_SHARES):
+        if width <= highest:
+            yield {"width": width}
 
 
 def _limit(place: _Place) -> Iterator[Start]:
@@ -285,6 +305,11 @@ def _warming(place: _Place) -> Iterator[Start]:
         yield {"heating": 0.2 / max(current**2 * time, 1e-12), "time_constant": time}
 
 
+def _timed_warming(_place: _Place) -> Iterator[Start]:
+    for time, rise in itertools.product(WARMING_TIMES, RISES):
+        yield {"rise": rise, "time_constant": time}
+
+
 def _ripple(place: _Place) -> Iterator[Start]:
     column, records = place.column, place.records
     every = np.concatenate([r.position[r.rows, column][r.moving[:, column]] for r in records])
@@ -315,6 +340,13 @@ def _spring(place: _Place) -> Iterator[Start]:
     middle, span = float(np.mean(position)), float(np.ptp(position))
     for rest in (middle, middle - 2 * span, middle + 2 * span):
         yield {"stiffness": place.torque / max(span, 1e-9), "rest": rest}
+
+
+def _cable(place: _Place) -> Iterator[Start]:
+    position = np.concatenate([r.position[r.rows, place.column] for r in place.records])
+    stiffness = place.torque / max(float(np.ptp(position)), 1e-9)
+    for rest, side in itertools.product(np.quantile(position, TAUT_QUANTILES), (1.0, -1.0)):
+        yield {"stiffness": side * stiffness, "rest": float(rest)}
 
 
 def _compliance(place: _Place) -> Iterator[Start]:
@@ -367,13 +399,16 @@ def _peaks(rates: Floats, along: Sequence[Floats], place: _Place) -> list[float]
 _SEARCHED: dict[str, Callable[[_Place], Iterator[Start]]] = {
     "stribeck_friction": _stribeck,
     "dead_zone": _dead_zone,
+    "amplifier_threshold": _threshold,
     "supply_limit": _limit,
     "input_delay": _delay,
     "motor_inductance": _inductance,
     "resistance_drift": _warming,
+    "resistance_rise": _timed_warming,
     "torque_ripple": _ripple,
     "periodic_disturbance": _disturbance,
     "spring_torque": _spring,
+    "one_sided_spring": _cable,
     "base_tilt": _tilt,
     "joint_compliance": _compliance,
     "backlash": _play,

@@ -36,6 +36,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "weakened_magnet": (2, {"loss": 0.3}),
     "motor_inductance": (3, {"inductance": 0.03}),
     "dead_zone": (1, {"width": 2.0}),
+    "amplifier_threshold": (1, {"width": 2.0}),
     "supply_limit": (2, {"reduction": 12.0}),
     "torque_ripple": (3, {"amplitude": 0.9, "periods": 20.0, "phase": 0.0}),
     "gear_loss": (2, {"loss": 0.4}),
