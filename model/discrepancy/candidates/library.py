@@ -14,7 +14,6 @@ from model.effects.effect import JointScale, Tone
 from model.effects.library import BESIDE, effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
-from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Parameter
 from model.simulation.chain_of_model import gravity_loads
 
@@ -51,9 +50,9 @@ STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
 """Trial values of the speed over which friction falls, rad/s."""
 
 
-SLACK_SHARE = 1 / 16
-"""Share of a sensor's range to either side of the rest posture at which a cable is tried to become taut: a motion that
-uses half of the range passes all three places."""
+TAUT_QUANTILES, TAUT_WITHIN = (0.25, 0.5, 0.75), (0.05, 0.95)
+"""Quantiles of a joint's recorded positions at which a cable is tried to become taut, and between which it must: one
+that is taut in the whole record is a spring, and one that never is, is nothing."""
 GRAVITY_FRICTION = "gravity_torque_friction"
 """Friction in proportion to a gravity torque."""
 POSTURES, LEAST_CHANGE = 16, 1e-6
@@ -227,20 +226,12 @@ def _variants(place: _Place) -> list[Hypothesis]:
         found.append(_sized(place, ({"time_constant": 10.0}, {"time_constant": 30.0})))
     elif place.name == "resistance_rise":
         found.append(_sized(place, ({"time_constant": 15.0}, {"time_constant": 60.0})))
-    elif place.name == "spring_torque":
-        found.append(_sized(place, ({"rest": _rest_of(place)},)))
-    elif place.name == "one_sided_spring":
-        away = SLACK_SHARE * joint_scale(place.model.machine, place.joints[0]).range
-        found.append(_sized(place, tuple({"rest": _rest_of(place) + side * away} for side in (-1, 0, 1))))
+    elif place.name in ("spring_torque", "one_sided_spring"):
+        rest = place.model.machine.rest_posture
+        found.append(_sized(place, ({"rest": 0.0 if rest is None else rest[place.joints[0] - 1]},)))
     else:
         found.append(_sized(place))
     return [c for c in found if c is not None]
-
-
-def _rest_of(place: _Place) -> float:
-    """Angle of the joint in the machine's rest posture, rad; 0 where the file states none."""
-    rest = place.model.machine.rest_posture
-    return 0.0 if rest is None else float(rest[place.joints[0] - 1])
 
 
 def _sized(

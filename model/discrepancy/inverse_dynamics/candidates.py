@@ -11,7 +11,7 @@ import numpy as np
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.candidates.library import is_beside
+from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN, is_beside
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -62,8 +62,6 @@ WARMING_TIMES = (10.0, 40.0, 200.0)
 """Thermal time constants that are tried, s."""
 RISES = (0.2, -0.2)
 """Rises of a winding's resistance with time that are tried: copper 50 K warmer, and 50 K colder."""
-TAUT_QUANTILES = (0.25, 0.5, 0.75)
-"""Quantiles of a joint's positions at which a cable is tried to become taut."""
 WINDING_SHARES = (0.01, 0.1)
 """Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
 are tried."""
@@ -126,6 +124,11 @@ class _Place:
     def drives(self) -> Floats:
         """Magnitudes of the joint's drive where it moves."""
         return self._magnitudes(lambda r: r.drive)
+
+    @property
+    def positions(self) -> Floats:
+        """The joint's positions in all records, rad (m)."""
+        return np.concatenate([r.position[r.rows, self.column] for r in self.records])
 
     @property
     def torque(self) -> float:
@@ -236,11 +239,14 @@ def _narrowed(p: Parameter, place: _Place) -> Parameter:
 
     A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
     ever acts would explain any motion, with bodies without mass. Friction must not change within the speeds at which
-    its direction is not resolved.
+    its direction is not resolved. A spring on one side must begin to pull within the recorded positions.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
         return replace(p, low=min(p.high, max(p.low, slowest)))
+    if p.effect == "one_sided_spring" and p.null is None:
+        low, high = np.quantile(place.positions, TAUT_WITHIN)
+        return replace(p, low=float(low), high=float(high))
     if p.effect == "amplifier_threshold":
         return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
     if p.effect != "supply_limit":
@@ -336,16 +342,14 @@ def _disturbance(place: _Place) -> Iterator[Start]:
 
 
 def _spring(place: _Place) -> Iterator[Start]:
-    position = np.concatenate([r.position[r.rows, place.column] for r in place.records])
-    middle, span = float(np.mean(position)), float(np.ptp(position))
+    middle, span = float(np.mean(place.positions)), float(np.ptp(place.positions))
     for rest in (middle, middle - 2 * span, middle + 2 * span):
         yield {"stiffness": place.torque / max(span, 1e-9), "rest": rest}
 
 
 def _cable(place: _Place) -> Iterator[Start]:
-    position = np.concatenate([r.position[r.rows, place.column] for r in place.records])
-    stiffness = place.torque / max(float(np.ptp(position)), 1e-9)
-    for rest, side in itertools.product(np.quantile(position, TAUT_QUANTILES), (1.0, -1.0)):
+    stiffness = place.torque / max(float(np.ptp(place.positions)), 1e-9)
+    for rest, side in itertools.product(np.quantile(place.positions, TAUT_QUANTILES), (1.0, -1.0)):
         yield {"stiffness": side * stiffness, "rest": float(rest)}
 
 
