@@ -17,7 +17,8 @@ MOTOR = (
         physics="R → R (1 + x), ẋ = h i² − x/T: the winding warms",
         source="first-order heat balance; copper gains 0.39 % a kelvin",
         parameters=(
-            EffectParameter("heating", at.HEATING, "1/(A²·s)", low=0.0, high=100.0, deviation=0.005),
+            # up to a winding of 10 mA that gains a tenth in a hundredth of a second: small motors have few amperes
+            EffectParameter("heating", at.HEATING, "1/(A²·s)", low=0.0, high=1e5, deviation=0.005),
             EffectParameter(
                 "time_constant", at.COOLING_TIME, "s", null=None, start=60.0, low=1.0, high=3600.0, deviation=40.0
             ),

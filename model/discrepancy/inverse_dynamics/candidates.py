@@ -60,8 +60,10 @@ DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 """Delays, and time constants of windings, that are tried, s."""
 WARMING_TIMES = (10.0, 40.0, 200.0)
 """Thermal time constants that are tried, s."""
-RISES = (0.2, -0.2)
-"""Rises of a winding's resistance with time that are tried: copper 50 K warmer, and 50 K colder."""
+LARGEST_HEATING = 0.2
+"""Largest rise of a winding's resistance in a second of the record's own current: copper 50 K warmer in a second."""
+RISE = 0.2
+"""Rise of a winding's resistance in a record that is tried: copper 50 K warmer."""
 WINDING_SHARES = (0.01, 0.1)
 """Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
 are tried."""
@@ -129,6 +131,19 @@ class _Place:
     def positions(self) -> Floats:
         """The joint's positions in all records, rad (m)."""
         return np.concatenate([r.position[r.rows, self.column] for r in self.records])
+
+    @property
+    def current(self) -> float:
+        """Root mean square of the motor's settled current where the joint moves, A."""
+        joint = self.numbers
+        per_speed = joint[at.GEAR] * joint[at.BACK_EMF]
+        currents = self._magnitudes(lambda r: (r.drive - per_speed * r.speed) / joint[at.RESISTANCE])
+        return float(np.sqrt(np.mean(currents**2)))
+
+    @property
+    def duration(self) -> float:
+        """Of the longest record, s."""
+        return max(float(np.ptp(r.time)) for r in self.records)
 
     @property
     def torque(self) -> float:
@@ -247,6 +262,8 @@ def _narrowed(p: Parameter, place: _Place) -> Parameter:
     if p.effect == "one_sided_spring" and p.null is None:
         low, high = np.quantile(place.positions, TAUT_WITHIN)
         return replace(p, low=float(low), high=float(high))
+    if p.effect == "resistance_drift" and p.null is not None:
+        return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
     if p.effect == "amplifier_threshold":
         return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
     if p.effect != "supply_limit":
@@ -306,14 +323,13 @@ def _inductance(place: _Place) -> Iterator[Start]:
 
 
 def _warming(place: _Place) -> Iterator[Start]:
-    current = float(np.sqrt(np.mean(place.drives**2))) / float(place.numbers[at.RESISTANCE])
     for time in WARMING_TIMES:
-        yield {"heating": 0.2 / max(current**2 * time, 1e-12), "time_constant": time}
+        yield {"heating": RISE / max(place.current**2 * min(time, place.duration), 1e-12), "time_constant": time}
 
 
-def _timed_warming(_place: _Place) -> Iterator[Start]:
-    for time, rise in itertools.product(WARMING_TIMES, RISES):
-        yield {"rise": rise, "time_constant": time}
+def _timed_warming(place: _Place) -> Iterator[Start]:
+    for time, side in itertools.product(WARMING_TIMES, (1.0, -1.0)):
+        yield {"rise": side * RISE / (1.0 - float(np.exp(-place.duration / time))), "time_constant": time}
 
 
 def _ripple(place: _Place) -> Iterator[Start]:
