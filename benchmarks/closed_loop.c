@@ -13,6 +13,10 @@ enum { SUM, LAST_ERROR, MEMORY = 5 };
 
 static inline double clamped(double x, double limit) { return x > limit ? limit : (x < -limit ? -limit : x); }
 static inline double outside(double x, double w) { return x > w ? x - w : (x < -w ? x + w : 0.0); }
+static inline double amplified(double u, const double *j) {
+  return clamped(outside(fabs(u) > j[THRESHOLD] ? u : 0.0, j[DEAD_ZONE]), j[SUPPLY]);
+}
+static inline double risen(double t, const double *j) { return j[TIMED_RISE] != 0 ? j[TIMED_RISE] * (1.0 - exp(-t / j[RISING_TIME])) : 0.0; }
 static inline double torque_constant(const double *j) { return j[TORQUE_CONSTANT] * (1.0 - j[FLUX_LOSS]); }
 static inline double back_emf(const double *j) { return j[BACK_EMF] * (1.0 - j[FLUX_LOSS]); }
 static inline double motor_gain(const double *j, double rise) {
@@ -78,6 +82,7 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   if (j[RIPPLE_SINE] != 0 || j[RIPPLE_COSINE] != 0)
     torque += j[RIPPLE_SINE] * sin(j[RIPPLE_CYCLES] * q) + j[RIPPLE_COSINE] * cos(j[RIPPLE_CYCLES] * q);
   if (j[SPRING] != 0) torque -= j[SPRING] * (q - j[SPRING_REST]);
+  if (j[CABLE] * (q - j[CABLE_REST]) > 0) torque -= fabs(j[CABLE]) * (q - j[CABLE_REST]);
   if (j[DISTURBANCE_SINE] != 0 || j[DISTURBANCE_COSINE] != 0) {
     const double w = 2 * M_PI * j[DISTURBANCE_FREQUENCY] * t;
     torque += j[DISTURBANCE_SINE] * sin(w) + j[DISTURBANCE_COSINE] * cos(w);
@@ -210,11 +215,11 @@ void run(long periods, const double *set_points, const double *noise, const doub
     for (; i > 0 && times[order[i - 1]] > times[j]; i--) order[i] = order[i - 1];
     order[i] = j;
     flags[j] = modes[j];
-    const int extras[] = {STRIBECK, DIRECTION, VISCOUS_DIRECTION, GEAR_LOSS, GEAR_LOSS_DIRECTION, RIPPLE_SINE, RIPPLE_COSINE, SPRING, DISTURBANCE_SINE, DISTURBANCE_COSINE};
+    const int extras[] = {STRIBECK, DIRECTION, VISCOUS_DIRECTION, GEAR_LOSS, GEAR_LOSS_DIRECTION, RIPPLE_SINE, RIPPLE_COSINE, SPRING, CABLE, DISTURBANCE_SINE, DISTURBANCE_COSINE};
     for (unsigned e = 0; e < sizeof extras / sizeof *extras; e++)
       if (p[j][extras[e]] != 0) flags[j] |= HAS_EXTRA_TORQUE;
     for (int k = 0; k < QUEUE; k++) queue[k][j] = first_drive[j];
-    volts[j] = clamped(outside(first_drive[j], p[j][DEAD_ZONE]), p[j][SUPPLY]);
+    volts[j] = amplified(first_drive[j], p[j]);
     s[j][POSITION] = initial[2 * j]; s[j][SPEED] = initial[2 * j + 1];
     s[j][STUCK] = 1; s[j][DEFLECTION] = deflection[j];
     s[j][CURRENT] = steady_current(p[j], 0, volts[j], initial[2 * j + 1]);
@@ -239,25 +244,28 @@ void run(long periods, const double *set_points, const double *noise, const doub
         const long wanted = (long)fmax(1, ceil((until - done) / longest - 1e-9));
         long pieces = 1;
         for (int j = 0; j < N; j++)
-          if (p[j][HEATING] != 0) pieces = wanted;
+          if (p[j][HEATING] != 0 || p[j][TIMED_RISE] != 0) pieces = wanted;
         const double t = (until - done) / pieces;
         for (long piece = 0; piece < pieces; piece++) {
+          const double start = k * shared[PERIOD] + done + piece * t;
           double begun[N][3];
           for (int j = 0; j < N; j++) {
             const double v = s[j][SPEED], rise = s[j][RISE];
             begun[j][0] = s[j][POSITION]; begun[j][1] = v; begun[j][2] = rise;
-            if (p[j][HEATING] != 0) s[j][RISE] = warmed(rise, rise, volts[j], v, v, v, 0.5 * t, p[j]);
+            if (p[j][HEATING] != 0) s[j][RISE] = warmed(rise, rise + risen(start, p[j]), volts[j], v, v, v, 0.5 * t, p[j]);
+            s[j][RISE] += risen(start + 0.5 * t, p[j]);
           }
-          advance(s, volts, k * shared[PERIOD] + done + piece * t, t, wanted / pieces, p, body, flags);
+          advance(s, volts, start, t, wanted / pieces, p, body, flags);
           for (int j = 0; j < N; j++)
             if (p[j][HEATING] != 0)
               s[j][RISE] = warmed(begun[j][2], s[j][RISE], volts[j], begun[j][1], s[j][SPEED], (s[j][POSITION] - begun[j][0]) / t, t, p[j]);
+            else s[j][RISE] = begun[j][2];
         }
       }
       done = until;
       if (i < N) {
         const long j = order[i];
-        volts[j] = clamped(outside(queue[(k - late[j] + QUEUE) % QUEUE][j], p[j][DEAD_ZONE]), p[j][SUPPLY]);
+        volts[j] = amplified(queue[(k - late[j] + QUEUE) % QUEUE][j], p[j]);
       }
     }
   }

@@ -48,8 +48,11 @@ SHARED = 10
     VOLTS_PER_COUNT,  # V at the motor for a DAC count
     SUPPLY,  # V
     DEAD_ZONE,  # V at the motor
+    THRESHOLD,  # V commanded, from which on the amplifier passes all
     HEATING,  # relative rise of resistance per A²·s
     COOLING_TIME,  # s
+    TIMED_RISE,  # relative rise of resistance that time alone ends at
+    RISING_TIME,  # s
     VISCOUS,  # N·m·s/rad, motor side
     COULOMB,  # N·m at the joint
     COULOMB_ARM,  # m
@@ -72,6 +75,8 @@ SHARED = 10
     RIPPLE_CYCLES,  # per joint turn
     SPRING,  # N·m/rad
     SPRING_REST,  # rad
+    CABLE,  # N·m/rad, signed: the side on which it pulls
+    CABLE_REST,  # rad
     DISTURBANCE_SINE,  # N·m
     DISTURBANCE_COSINE,
     DISTURBANCE_FREQUENCY,  # Hz
@@ -95,7 +100,7 @@ SHARED = 10
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(74)
+) = range(79)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS

@@ -125,6 +125,15 @@ LATER_SIZES: tuple[SizeRange, ...] = (
     SizeRange("gravity_torque_friction", "share", _alike(0.06, 0.6), joints=(2, 3)),
     SizeRange("direction_dependent_viscous_friction", "coefficient", ((12, 60), (30, 80), (5, 30)), signed=True),
     SizeRange("direction_dependent_gear_loss", "difference", ((0.03, 0.45), (0.07, 0.5), (0.03, 0.4)), signed=True),
+    SizeRange("amplifier_threshold", "width", _alike(0.3, 2)),
+    SizeRange("resistance_rise", "rise", ((0.06, 0.6), (0.02, 0.4), (0.04, 0.5)), also={"time_constant": (20.0, 60.0)}),
+    SizeRange(
+        "one_sided_spring",
+        "stiffness",
+        ((0.3, 8), (1, 30), (0.3, 8)),
+        signed=True,
+        per_joint={"slack": (3.2, 0.77, 0.0)},
+    ),
 )
 """Sizes of effects whose names are shared and that came after eight trials had been registered. They are arms of a kind
 of their own, so that every seed of those trials hides what it always hid."""

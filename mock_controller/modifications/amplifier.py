@@ -30,6 +30,21 @@ class DeadZone:
 
 
 @dataclass
+class AmplifierThreshold:
+    """`joint`'s amplifier gives nothing for a command of up to `width` volts, and all of a larger one."""
+
+    name: ClassVar[str] = "amplifier_threshold"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "u → u where |u| > w, else 0"
+    source: ClassVar[str] = "least pulse of a switched output stage"
+    joint: int = joint_parameter()
+    width: float = parameter(0.0, 20.0, unit="V", null=0.0)
+
+    def drive_voltage(self, volts: float, time_s: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        return 0.0 if abs(volts) <= self.width else volts
+
+
+@dataclass
 class SupplyLimit:
     """`joint`'s amplifier gives at most `reduction` volts less than the supply limit of the data file."""
 
@@ -89,5 +104,5 @@ class DriveCoupling:
         return coupled
 
 
-SHARED: tuple[type[Any], ...] = (DeadZone, SupplyLimit)
+SHARED: tuple[type[Any], ...] = (DeadZone, AmplifierThreshold, SupplyLimit)
 OPEN_SET: tuple[type[Any], ...] = (SlewRateLimit, DriveCoupling)

@@ -97,6 +97,25 @@ class SpringTorque:
 
 
 @dataclass
+class OneSidedSpring:
+    """A cable of |`stiffness`| pulls `joint` back to `slack` from beyond it, or, if negative, from before it."""
+
+    name: ClassVar[str] = "one_sided_spring"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque = −|k| (q − q₀) on the side of q₀ that k's sign says, else 0"
+    source: ClassVar[str] = "a cable that hangs slack on one side"
+    joint: int = joint_parameter()
+    stiffness: float = parameter(-200.0, 200.0, unit="N·m/rad", null=0.0)
+    slack: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        beyond = angle - self.slack
+        if self.stiffness >= 0.0:
+            return -self.stiffness * max(beyond, 0.0)
+        return self.stiffness * min(beyond, 0.0)
+
+
+@dataclass
 class PeriodicDisturbance:
     """Something outside pushes `joint` with `amplitude` at `frequency`, whatever the arm does."""
 
@@ -113,4 +132,12 @@ class PeriodicDisturbance:
         return self.amplitude * sin(6.283185307179586 * self.frequency * time_s + self.phase)
 
 
-SHARED: tuple[type[Any], ...] = (Payload, LinkMass, CentreOfMass, BaseTilt, SpringTorque, PeriodicDisturbance)
+SHARED: tuple[type[Any], ...] = (
+    Payload,
+    LinkMass,
+    CentreOfMass,
+    BaseTilt,
+    SpringTorque,
+    OneSidedSpring,
+    PeriodicDisturbance,
+)

@@ -93,4 +93,29 @@ class ResistanceDrift:
         return -self._torque_per_ampere * cold_current * (1.0 - self._cold / resistance)
 
 
-SHARED: tuple[type[Any], ...] = (WeakenedMagnet, ResistanceDrift, MotorInductance)
+@dataclass
+class ResistanceRise:
+    """The winding of `joint`'s motor is warmed from outside: in the end its resistance is larger by a share `rise`.
+
+    Whatever warms it begins with the simulation: R = R₀ (1 + r (1 − exp(−t/τ))). The current that the cold winding
+    would carry is divided by R/R₀, and the torque falls with it; the drive's own current plays no part.
+    """
+
+    name: ClassVar[str] = "resistance_rise"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "R = R₀ (1 + r (1 − exp(−t/τ))), whatever the current"
+    source: ClassVar[str] = "a housing that a neighbour warms, of one thermal mass"
+    joint: int = joint_parameter()
+    rise: float = parameter(-0.5, 2.0, null=0.0)
+    time_constant: float = parameter(0.1, 1e4, default=40.0, unit="s")
+
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the protocol's signature)
+        self._damping = parameters.joints[self.joint - 1].gear_ratio ** 2
+        self._damping *= parameters.joints[self.joint - 1].viscous_friction
+
+    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002
+        times_colder = 1.0 / (1.0 + self.rise * (1.0 - exp(-time_s / self.time_constant)))
+        return (torque + self._damping * rate) * (times_colder - 1.0)
+
+
+SHARED: tuple[type[Any], ...] = (WeakenedMagnet, ResistanceDrift, ResistanceRise, MotorInductance)

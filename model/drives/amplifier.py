@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from model import layout as at
 from model.drives.magnet import back_emf_constant
-from model.drives.piecewise import clamped, outside
+from model.drives.piecewise import clamped, outside, passed
 from model.dynamics.compilation import borrowing
 
 
 @borrowing
 def motor_volts(command: complex, joint: NDArray[Any]) -> Any:
-    """Volts at the motor for commanded volts: dead zone, then the supply's limit."""
-    return clamped(outside(command, joint[at.DEAD_ZONE]), joint[at.SUPPLY])
+    """Volts at the motor for commanded volts: threshold, dead zone, then the supply's limit."""
+    return clamped(outside(passed(command, joint[at.THRESHOLD]), joint[at.DEAD_ZONE]), joint[at.SUPPLY])
 
 
 @borrowing
@@ -36,3 +36,11 @@ def warmed(
     kept = np.exp(-duration / joint[at.COOLING_TIME])
     heat = joint[at.HEATING] * (current * current + change * change / 12.0)
     return rise * kept + heat * joint[at.COOLING_TIME] * (1.0 - kept)
+
+
+@borrowing
+def risen(time: Any, joint: NDArray[Any]) -> Any:
+    """Relative rise of the winding's resistance that time alone has made in `time` s, whatever the current."""
+    if joint[at.TIMED_RISE] == 0.0:
+        return 0.0 * time
+    return joint[at.TIMED_RISE] * (1.0 - np.exp(-time / joint[at.RISING_TIME]))

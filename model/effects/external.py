@@ -22,6 +22,22 @@ EXTERNAL = (
             EffectParameter("rest", at.SPRING_REST, "rad", null=None, start=0.0, low=-10.0, high=10.0, deviation=1.0),
         ),
     ),
+    Effect(
+        "one_sided_spring",
+        physics="τ = −|k| (q − q_0) where k (q − q_0) > 0: it pulls beyond q_0, or, where k < 0, before it",
+        source="Hooke; a cable that hangs slack on one side of q_0, or a stop that gives",
+        parameters=(
+            EffectParameter(
+                "stiffness",
+                at.CABLE,
+                "N·m/rad",
+                low=lambda s: -10 * s.strongest,
+                high=lambda s: 10 * s.strongest,
+                deviation=lambda s: 0.05 * s.torque,
+            ),
+            EffectParameter("rest", at.CABLE_REST, "rad", null=None, start=0.0, low=-10.0, high=10.0, deviation=1.0),
+        ),
+    ),
     # Its phase counts from the start of a record, so each record has another one. Held-out records get a phase of their
     # own (`model.discrepancy.output_error.holdout`); records that are fitted together share one, which is right for a
     # single record only.

@@ -17,9 +17,21 @@ MOTOR = (
         physics="R → R (1 + x), ẋ = h i² − x/T: the winding warms",
         source="first-order heat balance; copper gains 0.39 % a kelvin",
         parameters=(
-            EffectParameter("heating", at.HEATING, "1/(A²·s)", low=0.0, high=100.0, deviation=0.005),
+            # up to a winding of 10 mA that gains a tenth in a hundredth of a second: small motors have few amperes
+            EffectParameter("heating", at.HEATING, "1/(A²·s)", low=0.0, high=1e5, deviation=0.005),
             EffectParameter(
                 "time_constant", at.COOLING_TIME, "s", null=None, start=60.0, low=1.0, high=3600.0, deviation=40.0
+            ),
+        ),
+    ),
+    Effect(
+        "resistance_rise",
+        physics="R → R (1 + r (1 − exp(−t/T))), t from the start of the record",
+        source="a winding that its housing or a neighbour warms, of one thermal mass; copper gains 0.39 % a kelvin",
+        parameters=(
+            EffectParameter("rise", at.TIMED_RISE, "1", low=-0.5, high=2.0, deviation=0.2),
+            EffectParameter(
+                "time_constant", at.RISING_TIME, "s", null=None, start=60.0, low=1.0, high=3600.0, deviation=40.0
             ),
         ),
     ),
@@ -39,6 +51,16 @@ MOTOR = (
         parameters=(
             EffectParameter(
                 "width", at.DEAD_ZONE, "V", low=0.0, high=lambda s: s.highest, deviation=lambda s: 0.03 * s.volts
+            ),
+        ),
+    ),
+    Effect(
+        "amplifier_threshold",
+        physics="u = 0 for |u_c| ≤ w, else u_c",
+        source="least pulse of a switched output stage, or an input that is acted on from a level on; commanded volts",
+        parameters=(
+            EffectParameter(
+                "width", at.THRESHOLD, "V", low=0.0, high=lambda s: s.highest, deviation=lambda s: 0.03 * s.volts
             ),
         ),
     ),

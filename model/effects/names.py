@@ -10,6 +10,7 @@ _HYPHENATED = {
     "load_dependent": "load-dependent",
     "gravity_torque": "gravity-torque",
     "direction_dependent": "direction-dependent",
+    "one_sided": "one-sided",
 }
 
 

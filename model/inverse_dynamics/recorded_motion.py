@@ -94,18 +94,19 @@ class RecordedMotion:
         smooth = low_pass(torque, self.cutoff, self.period)
         return np.ascontiguousarray(smooth[self.rows])
 
-    def driven(self, late: Floats, limit: Floats) -> Floats:
-        """The drive (k, n) that acts at the grid's times, where it acts so long (n,), s, after its sample and no more
-        than ± `limit` (n,) of it gets through.
+    def driven(self, late: Floats, limit: Floats, threshold: Floats) -> Floats:
+        """The drive (k, n) that acts at the grid's times, where it acts so long (n,), s, after its sample, no more than
+        ± `limit` (n,) of it gets through, and nothing of a sample within ± `threshold` (n,).
 
-        A limit acts on the samples. The low-passed drive overshoots where samples jump, and a limit would cut that off.
+        Both act on the samples. The low-passed drive overshoots where samples jump, and a limit would cut that off.
         Between samples of the grid by cubic splines: a straight line would take 4 % of what moves at the cutoff.
         """
-        limited = np.abs(self.commanded).max(axis=0) > limit
-        drive = self.drive
-        if limited.any():
-            passed, wide = np.clip(self.commanded, -limit, limit), _wide(self.cutoff, self.sampled)
-            drive = np.where(limited, self._on_grid(low_pass(self._acting(passed), wide, self.sampled)), self.drive)
+        size, drive = np.abs(self.commanded), self.drive
+        changed = (size.max(axis=0) > limit) | (threshold > 0)
+        if changed.any():
+            wide = _wide(self.cutoff, self.sampled)
+            passed = np.clip(np.where((size > threshold) | (threshold == 0), self.commanded, 0.0), -limit, limit)
+            drive = np.where(changed, self._on_grid(low_pass(self._acting(passed), wide, self.sampled)), self.drive)
         if not late.any():
             return drive
         times = np.clip(self.time[:, None] - late, self.time[0], self.time[-1])

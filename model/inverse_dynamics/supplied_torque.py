@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.drives.amplifier import warmed
+from model.drives.amplifier import risen, warmed
 from model.drives.magnet import torque_constant
 from model.dynamics import recursive
 from model.dynamics.compilation import compiled, internal
@@ -92,7 +92,7 @@ def supplied_torque(motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[
         for j in range(n):
             joint, q, v, w = joints[j], motion.position[k, j], motion.speed[k, j], motion.rotor_speed[k, j]
             z, u = motion.contact[k, j], motion.volts[k, j]
-            motor[k, j] = _motor_torque(joint, modes[j], state[j], u, w, h)
+            motor[k, j] = _motor_torque(joint, modes[j], state[j], u, w, h, time[k] - time[0])
             torque = -joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * w - z * motion.level[k, j]
             if modes[j] != 0:
                 torque += extra_torque(joint, modes[j], time[k], q, v, z, 0.0, 0.0)
@@ -102,17 +102,22 @@ def supplied_torque(motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[
 
 
 @internal
-def _motor_torque(joint: NDArray[Any], flags: int, state: NDArray[Any], volts: float, speed: float, h: float) -> Any:
-    """Torque of a motor at its joint; warms its winding, and advances its current where that lags.
+def _motor_torque(
+    joint: NDArray[Any], flags: int, state: NDArray[Any], volts: float, speed: float, h: float, since: float
+) -> Any:
+    """Torque of a motor at its joint; warms its winding, and advances its current where that lags. since: the record's
+    start, s.
 
     The settled current of a sample is held for the interval before it, and the interval's mean current is given: of a
     settled current that rises evenly it lags behind by the winding's time constant.
     """
+    timed = risen(since, joint)
     if joint[at.HEATING] != 0.0:
-        state[RISE] = warmed(state[RISE], state[RISE], volts, speed, speed, speed, h, joint)
-    current = steady_current(joint, state[RISE], volts, speed)
+        state[RISE] = warmed(state[RISE], state[RISE] + timed, volts, speed, speed, speed, h, joint)
+    rise = state[RISE] + timed
+    current = steady_current(joint, rise, volts, speed)
     if flags & at.HAS_INDUCTANCE:
-        turns = joint[at.RESISTANCE] * (1.0 + state[RISE]) / joint[at.INDUCTANCE] * h
+        turns = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE] * h
         share, _, _ = winding_functions(turns)
         excess = state[CURRENT] - current
         state[CURRENT] = current + excess * (1.0 - turns * share)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from model import layout as at
 from model.arrays import Floats
+from model.drives.piecewise import EDGE
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
@@ -37,6 +38,8 @@ CONTACT_SHARE = 0.02
 HOLDING_ROUNDS = 4
 """Rounds in which friction of a slow joint takes up what is left below the cutoff: without any, steps of a set point
 left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
+THRESHOLD = ".amplifier_threshold.width"
+"""End of the names of parameters at which the residual jumps."""
 LEAST_KEPT = 0.05
 """Least share of a torque that gears are taken to pass on: two losses together may exceed one."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
@@ -114,8 +117,14 @@ class TorqueBalance:
     def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
         """Derivative (m, n) of every record's residual by one unknown: a difference towards the inside of its bounds.
 
+        A threshold jumps from sample to sample; its derivative is the difference over an edge about it.
+
         residual: what `residual` gives for the same values.
         """
+        if unknown.name.endswith(THRESHOLD) and values[unknown.name] > 0:
+            half = 0.5 * EDGE * values[unknown.name]
+            sides = (self.residual({**values, unknown.name: values[unknown.name] + s * half}) for s in (1, -1))
+            return [(above - below) / (2 * half) for above, below in zip(*sides, strict=True)]
         step = DIFFERENCE * unknown.scale
         if values[unknown.name] + step > unknown.high:
             step = -step
@@ -155,19 +164,20 @@ class TorqueBalance:
         return kept[1]
 
     def _volts(self, index: int, vector: Floats, joints: Floats, samples: Floats) -> Floats:
-        """Volts at the motors at the grid's times, after delay and limit; `_lost_in_dead_zone` has what a zone takes.
+        """Volts at the motors at the grid's times, after delay, threshold and limit; `_lost_in_dead_zone` has what a
+        zone takes.
 
         samples: (n,) that drives are late by.
         """
         delays = vector[at.DELAY] + joints[:, at.EXTRA_DELAY]
         if holds_drive_between_samples(self.model.machine):
             delays = delays + 0.5 * vector[at.PERIOD]
-        limit = joints[:, at.SUPPLY]
+        limit, threshold = joints[:, at.SUPPLY], joints[:, at.THRESHOLD]
         return self._cached(
             "drive",
-            delays.tobytes() + samples.tobytes() + limit.tobytes(),
+            delays.tobytes() + samples.tobytes() + limit.tobytes() + threshold.tobytes(),
             lambda i: np.ascontiguousarray(
-                self.records[i].driven(delays + samples * self.records[i].sampled, limit), dtype=np.float64
+                self.records[i].driven(delays + samples * self.records[i].sampled, limit, threshold), dtype=np.float64
             ),
         )[index]
 

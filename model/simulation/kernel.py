@@ -113,8 +113,8 @@ def batch(kind: Any, first: int, last: int, records: RecordArrays, runs: RunArra
                     pieces = steps if warms(joints) else 1
                     duration = (until - done) / pieces
                     for piece in range(pieces):
-                        begin_stretch(state, volts, duration, joints, modes, begun)
                         start = k * period + done + piece * duration
+                        begin_stretch(state, volts, start, duration, joints, modes, begun)
                         advance_of(kind, state, volts, start, duration, steps // pieces, arm, work)
                         end_stretch(state, volts, duration, joints, modes, begun)
                 done = until

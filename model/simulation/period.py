@@ -8,7 +8,7 @@ import numpy as np
 
 from model import layout as at
 from model.arrays import Array
-from model.drives.amplifier import warmed
+from model.drives.amplifier import risen, warmed
 from model.drives.controller import (
     LAST_ERROR,
     LAST_READING,
@@ -36,6 +36,7 @@ EXTRA_TORQUES = (
     at.RIPPLE_SINE,
     at.RIPPLE_COSINE,
     at.SPRING,
+    at.CABLE,
     at.DISTURBANCE_SINE,
     at.DISTURBANCE_COSINE,
 )
@@ -169,21 +170,31 @@ def warms(joints: Array) -> bool:
     """Whether any winding warms: then each step of integration has its own resistance, and the steps stay the same."""
     found = False
     for j in range(joints.shape[0]):
-        found = found or joints[j, at.HEATING] != 0.0
+        found = found or joints[j, at.HEATING] != 0.0 or joints[j, at.TIMED_RISE] != 0.0
     return found
 
 
 @borrowing
-def begin_stretch(state: Array, volts: Array, duration: complex, joints: Array, flags: Array, begun: Array) -> None:
-    """Remembers in `begun` (BEGUN, n) where each motor is; gives windings the resistance of the stretch's middle."""
+def begin_stretch(
+    state: Array, volts: Array, start: complex, duration: complex, joints: Array, flags: Array, begun: Array
+) -> None:
+    """Remembers in `begun` (BEGUN, n) where each motor is; gives windings the resistance of the middle of the stretch,
+    which begins `start` s after the run. Between stretches RISE is what the current has done, without what time does.
+    """
     for j in range(joints.shape[0]):
+        by_time = joints[j, at.TIMED_RISE] != 0.0
+        if by_time:
+            begun[BEGUN_RISE, j] = state[j, RISE]
         if joints[j, at.HEATING] != 0.0:
             gives = flags[j] & at.HAS_FLEXIBILITY != 0
             speed = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
             rise = state[j, RISE]
             begun[BEGUN_POSITION, j] = state[j, ROTOR_POSITION] if gives else state[j, POSITION]
             begun[BEGUN_SPEED, j], begun[BEGUN_RISE, j] = speed, rise
-            state[j, RISE] = warmed(rise, rise, volts[j], speed, speed, speed, 0.5 * duration, joints[j])
+            hot = rise + risen(start, joints[j]) if by_time else rise
+            state[j, RISE] = warmed(rise, hot, volts[j], speed, speed, speed, 0.5 * duration, joints[j])
+        if by_time:
+            state[j, RISE] += risen(start + 0.5 * duration, joints[j])
 
 
 @borrowing
@@ -196,6 +207,8 @@ def end_stretch(state: Array, volts: Array, duration: complex, joints: Array, fl
             moved = (state[j, ROTOR_POSITION] if gives else state[j, POSITION]) - begun[BEGUN_POSITION, j]
             rise, hot, start = begun[BEGUN_RISE, j], state[j, RISE], begun[BEGUN_SPEED, j]
             state[j, RISE] = warmed(rise, hot, volts[j], start, ended, moved / duration, duration, joints[j])
+        elif joints[j, at.TIMED_RISE] != 0.0:
+            state[j, RISE] = begun[BEGUN_RISE, j]
 
 
 @internal

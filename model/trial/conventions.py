@@ -67,6 +67,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "weakened_magnet": _same(loss="loss"),
     "motor_inductance": _same(inductance="inductance"),
     "dead_zone": _same(width="width"),
+    "amplifier_threshold": _same(width="width"),
     "supply_limit": _supply,
     "torque_ripple": _same(cycles="periods"),
     "gear_loss": _same(loss="loss"),
@@ -77,6 +78,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "centre_of_mass": _same(shift="shift"),
     "base_tilt": _tilt,
     "spring_torque": _same(stiffness="stiffness", rest="neutral"),
+    "one_sided_spring": _same(stiffness="stiffness", rest="slack"),
     "periodic_disturbance": _same(frequency="frequency"),
     "potentiometer_gain": _same(relative="error"),
     "potentiometer_offset": _same(offset="angle"),
@@ -89,6 +91,7 @@ TRANSLATIONS: dict[str, Translation] = {
 LEFT_OUT: dict[str, str] = {
     "stiction": "the mock's bond fades with speed, the model's breaks: their breakaway torques are not one quantity",
     "resistance_drift": "the mock's winding heats with its risen resistance, the model's with the cold one",
+    "resistance_rise": "the rise begins with the mock there, with every record here",
     "payload": "the mock's load has its centre up to 8 cm off, the model's has not: the masses that fit best differ",
     "potentiometer_nonlinearity": "a loaded divider there, a sine series here",
     "torque_ripple: sine, cosine": "their phase is that of a reading that potentiometers bend by up to ±0.25 %",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError
 from model import layout as at
 from model.arrays import Floats
-from model.drives.amplifier import motor_volts
+from model.drives.amplifier import motor_volts, risen
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
 from model.machine_model.model import Model
@@ -167,10 +167,11 @@ def _along(kind: Any, signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -
             load[:] = gravity_of(kind, position[k], joints, body)
         for j in range(n):
             q, v, z, u = position[k, j], speed[k, j], friction[k, j], volts[k, j]
-            pull = motor_gain(joints[j], cold) * u
-            torque[j] = pull - motor_damping(joints[j], cold) * v - z * level[j]
+            rise = risen(time[k] - time[0] + cold, joints[j])
+            pull, damping = motor_gain(joints[j], rise) * u, motor_damping(joints[j], rise)
+            torque[j] = pull - damping * v - z * level[j]
             if modes[j] & at.HAS_EXTRA_TORQUE:
-                motor = pull - (motor_damping(joints[j], cold) - joints[j, at.VISCOUS] * joints[j, at.GEAR] ** 2) * v
+                motor = pull - (damping - joints[j, at.VISCOUS] * joints[j, at.GEAR] ** 2) * v
                 torque[j] += extra_torque(joints[j], modes[j], time[k] + cold, q, v, z, cold, motor)
             if modes[j] & at.HAS_USER_EFFECT:
                 torque[j] += own_torque(own[j], joints[j], q, v, u, load[j], time[k] + cold)

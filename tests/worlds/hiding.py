@@ -12,7 +12,7 @@ from numpy.random import Generator
 from tests.worlds.bodies import Bodies
 from tests.worlds.engine import Motion
 from tests.worlds.kinds import CURRENT
-from tests.worlds.parameters import BRISTLE, BY_CURRENT, SWITCH, Records
+from tests.worlds.parameters import BRISTLE, BY_CURRENT, JUMP, ONE_SIDED, SWITCH, Records
 from tests.worlds.rig import Hidden, Rig
 
 WEAKENED_MAGNET = "weakened_magnet"
@@ -34,6 +34,9 @@ OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
     "load_dependent_friction": dict.fromkeys((1, 2), ("gravity_torque_friction", ())),
     # it is larger one way and smaller the other than what the file states: a coefficient and a difference
     "viscous_friction": dict.fromkeys((1, 2), ("direction_dependent_viscous_friction", ("viscous_friction",))),
+    "dead_zone": {JUMP: ("amplifier_threshold", ())},
+    "resistance_drift": {2: ("resistance_rise", ())},
+    "spring_torque": {ONE_SIDED: ("one_sided_spring", ())},
 }
 """By name and law: the library's name, and what is part of it, of effects that are another one of the library."""
 

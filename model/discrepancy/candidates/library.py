@@ -21,6 +21,7 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
     "joint_compliance": (0.15, 0.5, 1.5),
     "dead_zone": (0.1, 0.4, 1.5),
+    "amplifier_threshold": (0.2, 0.6, 1.5, 4.0),
     "supply_limit": (0.3, 0.8, 1.3),
     "input_delay": (0.1, 0.4, 1.2, 2.5),
     "motor_inductance": (0.6, 2.0, 8.0),
@@ -30,6 +31,7 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "direction_dependent_friction": (0.3, 2.0),
     "direction_dependent_viscous_friction": (0.3, 2.0),
     "direction_dependent_gear_loss": (0.3, 2.0),
+    "one_sided_spring": (0.3, 2.0),
 }
 """Trial sizes, in expected deviations, of effects whose response is not proportional to their parameter."""
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
@@ -48,6 +50,9 @@ STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
 """Trial values of the speed over which friction falls, rad/s."""
 
 
+TAUT_QUANTILES, TAUT_WITHIN = (0.25, 0.5, 0.75), (0.05, 0.95)
+"""Quantiles of a joint's recorded positions at which a cable is tried to become taut, and between which it must: one
+that is taut in the whole record is a spring, and one that never is, is nothing."""
 GRAVITY_FRICTION = "gravity_torque_friction"
 """Friction in proportion to a gravity torque."""
 POSTURES, LEAST_CHANGE = 16, 1e-6
@@ -219,7 +224,9 @@ def _variants(place: _Place) -> list[Hypothesis]:
         found.append(_sized(place))
     elif place.name == "resistance_drift":
         found.append(_sized(place, ({"time_constant": 10.0}, {"time_constant": 30.0})))
-    elif place.name == "spring_torque":
+    elif place.name == "resistance_rise":
+        found.append(_sized(place, ({"time_constant": 15.0}, {"time_constant": 60.0})))
+    elif place.name in ("spring_torque", "one_sided_spring"):
         rest = place.model.machine.rest_posture
         found.append(_sized(place, ({"rest": 0.0 if rest is None else rest[place.joints[0] - 1]},)))
     else:

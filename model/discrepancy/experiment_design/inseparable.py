@@ -52,12 +52,13 @@ LAWS: Mapping[SharedLaw, _Law] = {
     # The moment of all weights beyond a joint is one number per link: mass times distance.
     "torque-of-weight": _Law(_WEIGHT, ("weighed-parts",), one_joint=False),
     # A sliding joint's dry friction at one load; a dead zone takes its width off the drive in the same direction.
-    "torque-against-motion": _Law(_FRICTION | {"dead_zone"}, ("force-gauge", "current-clamp")),
+    "torque-against-motion": _Law(_FRICTION | {"dead_zone", "amplifier_threshold"}, ("force-gauge", "current-clamp")),
     "torque-per-volt": _Law(
         frozenset(
             {
                 "weakened_magnet",
                 "resistance_drift",
+                "resistance_rise",
                 "gear_loss",
                 "direction_dependent_gear_loss",
                 "wrong_gain",
@@ -68,7 +69,7 @@ LAWS: Mapping[SharedLaw, _Law] = {
     ),
     "torque-at-one-rate": _Law(frozenset({"torque_ripple", "periodic_disturbance"}), ("stopped-arm",)),
     "torque-with-position": _Law(
-        _WEIGHT | _READING | {"spring_torque", "base_tilt"},
+        _WEIGHT | _READING | {"spring_torque", "one_sided_spring", "base_tilt"},
         ("loosened-cables", "spirit-level", "protractor", "weighed-parts"),
         one_joint=False,
     ),
@@ -76,13 +77,23 @@ LAWS: Mapping[SharedLaw, _Law] = {
 """Laws and the effects that have them, the narrowest first."""
 SHOWS: Mapping[Measurement, frozenset[str]] = {
     # The current is (u − K_b n q̇)/R as the model has it, unless something electrical is another.
-    "current-clamp": frozenset({"weakened_magnet", "resistance_drift", "wrong_gain", "supply_limit", "dead_zone"}),
+    "current-clamp": frozenset(
+        {
+            "weakened_magnet",
+            "resistance_drift",
+            "resistance_rise",
+            "wrong_gain",
+            "supply_limit",
+            "dead_zone",
+            "amplifier_threshold",
+        }
+    ),
     # Without a current, friction alone slows the joint.
     "coast-with-drive-open": frozenset({"viscous_friction", "direction_dependent_viscous_friction"}),
     "force-gauge": _FRICTION,
     "weighed-parts": _WEIGHT,
     "spirit-level": frozenset({"base_tilt"}),
-    "loosened-cables": frozenset({"spring_torque"}),
+    "loosened-cables": frozenset({"spring_torque", "one_sided_spring"}),
     "protractor": _READING,
     "dial-gauge": frozenset({"backlash", "joint_compliance"}),
     "oscilloscope": frozenset({"motor_inductance", "input_delay"}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -10,7 +11,7 @@ import numpy as np
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.candidates.library import is_beside
+from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN, is_beside
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -46,6 +47,11 @@ SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
 """Quantiles of a joint's speed in magnitude: speeds at which Stribeck friction may have faded."""
 DRIVE_QUANTILES = (0.2, 0.5, 0.8)
 """Quantiles of the drive in magnitude that are tried as dead zones."""
+THRESHOLD_SHARES = tuple(float(share) for share in np.geomspace(0.02, 0.6, 16))
+"""Thresholds of an amplifier that are tried, as shares of the largest drive, each a quarter larger than the one before:
+a search goes from sample to sample, and finds a threshold only from near it."""
+PASSED = 0.3
+"""Least share of the record in which the drive is above a threshold that is tried."""
 LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
 """Limits of the drive that are tried, as shares of its largest value."""
 UNLIMITED = 0.7
@@ -54,6 +60,10 @@ DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 """Delays, and time constants of windings, that are tried, s."""
 WARMING_TIMES = (10.0, 40.0, 200.0)
 """Thermal time constants that are tried, s."""
+LARGEST_HEATING = 0.2
+"""Largest rise of a winding's resistance in a second of the record's own current: copper 50 K warmer in a second."""
+RISE = 0.2
+"""Rise of a winding's resistance in a record that is tried: copper 50 K warmer."""
 WINDING_SHARES = (0.01, 0.1)
 """Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
 are tried."""
@@ -116,6 +126,24 @@ class _Place:
     def drives(self) -> Floats:
         """Magnitudes of the joint's drive where it moves."""
         return self._magnitudes(lambda r: r.drive)
+
+    @property
+    def positions(self) -> Floats:
+        """The joint's positions in all records, rad (m)."""
+        return np.concatenate([r.position[r.rows, self.column] for r in self.records])
+
+    @property
+    def current(self) -> float:
+        """Root mean square of the motor's settled current where the joint moves, A."""
+        joint = self.numbers
+        per_speed = joint[at.GEAR] * joint[at.BACK_EMF]
+        currents = self._magnitudes(lambda r: (r.drive - per_speed * r.speed) / joint[at.RESISTANCE])
+        return float(np.sqrt(np.mean(currents**2)))
+
+    @property
+    def duration(self) -> float:
+        """Of the longest record, s."""
+        return max(float(np.ptp(r.time)) for r in self.records)
 
     @property
     def torque(self) -> float:
@@ -224,12 +252,20 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
 def _narrowed(p: Parameter, place: _Place) -> Parameter:
     """The parameter, with bounds narrowed to what the record allows.
 
-    A limit of the drive must leave most of the record below it: a drive that hardly ever acts would explain any motion,
-    with bodies without mass. Friction must not change within the speeds at which its direction is not resolved.
+    A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
+    ever acts would explain any motion, with bodies without mass. Friction must not change within the speeds at which
+    its direction is not resolved. A spring on one side must begin to pull within the recorded positions.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
         return replace(p, low=min(p.high, max(p.low, slowest)))
+    if p.effect == "one_sided_spring" and p.null is None:
+        low, high = np.quantile(place.positions, TAUT_WITHIN)
+        return replace(p, low=float(low), high=float(high))
+    if p.effect == "resistance_drift" and p.null is not None:
+        return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
+    if p.effect == "amplifier_threshold":
+        return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
     if p.effect != "supply_limit":
         return p
     return replace(p, low=min(p.high, max(p.low, float(np.quantile(place.drives, UNLIMITED)))))
@@ -253,6 +289,13 @@ def _dead_zone(place: _Place) -> Iterator[Start]:
     drive = place.drives
     for width in (0.05 * float(drive.max()), *np.quantile(drive, DRIVE_QUANTILES)):
         yield {"width": float(width)}
+
+
+def _threshold(place: _Place) -> Iterator[Start]:
+    largest, highest = float(place.drives.max()), float(np.quantile(place.drives, 1 - PASSED))
+    for width in (share * largest for share in THRESHOLD_SHARES):
+        if width <= highest:
+            yield {"width": width}
 
 
 def _limit(place: _Place) -> Iterator[Start]:
@@ -280,9 +323,13 @@ def _inductance(place: _Place) -> Iterator[Start]:
 
 
 def _warming(place: _Place) -> Iterator[Start]:
-    current = float(np.sqrt(np.mean(place.drives**2))) / float(place.numbers[at.RESISTANCE])
     for time in WARMING_TIMES:
-        yield {"heating": 0.2 / max(current**2 * time, 1e-12), "time_constant": time}
+        yield {"heating": RISE / max(place.current**2 * min(time, place.duration), 1e-12), "time_constant": time}
+
+
+def _timed_warming(place: _Place) -> Iterator[Start]:
+    for time, side in itertools.product(WARMING_TIMES, (1.0, -1.0)):
+        yield {"rise": side * RISE / (1.0 - float(np.exp(-place.duration / time))), "time_constant": time}
 
 
 def _ripple(place: _Place) -> Iterator[Start]:
@@ -311,10 +358,15 @@ def _disturbance(place: _Place) -> Iterator[Start]:
 
 
 def _spring(place: _Place) -> Iterator[Start]:
-    position = np.concatenate([r.position[r.rows, place.column] for r in place.records])
-    middle, span = float(np.mean(position)), float(np.ptp(position))
+    middle, span = float(np.mean(place.positions)), float(np.ptp(place.positions))
     for rest in (middle, middle - 2 * span, middle + 2 * span):
         yield {"stiffness": place.torque / max(span, 1e-9), "rest": rest}
+
+
+def _cable(place: _Place) -> Iterator[Start]:
+    stiffness = place.torque / max(float(np.ptp(place.positions)), 1e-9)
+    for rest, side in itertools.product(np.quantile(place.positions, TAUT_QUANTILES), (1.0, -1.0)):
+        yield {"stiffness": side * stiffness, "rest": float(rest)}
 
 
 def _compliance(place: _Place) -> Iterator[Start]:
@@ -367,13 +419,16 @@ def _peaks(rates: Floats, along: Sequence[Floats], place: _Place) -> list[float]
 _SEARCHED: dict[str, Callable[[_Place], Iterator[Start]]] = {
     "stribeck_friction": _stribeck,
     "dead_zone": _dead_zone,
+    "amplifier_threshold": _threshold,
     "supply_limit": _limit,
     "input_delay": _delay,
     "motor_inductance": _inductance,
     "resistance_drift": _warming,
+    "resistance_rise": _timed_warming,
     "torque_ripple": _ripple,
     "periodic_disturbance": _disturbance,
     "spring_torque": _spring,
+    "one_sided_spring": _cable,
     "base_tilt": _tilt,
     "joint_compliance": _compliance,
     "backlash": _play,

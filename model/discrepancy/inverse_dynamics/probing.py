@@ -16,10 +16,12 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 NONLINEAR = frozenset(
     {
         "dead_zone",
+        "amplifier_threshold",
         "supply_limit",
         "input_delay",
         "motor_inductance",
         "resistance_drift",
+        "resistance_rise",
         "backlash",
         "joint_compliance",
     }

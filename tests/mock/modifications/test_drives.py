@@ -47,6 +47,25 @@ def test_a_stalled_motor_warms_to_where_its_loss_leaves_through_its_case() -> No
     assert warm.resistance == cold
 
 
+@pytest.mark.parametrize("rise", [0.5, -0.3])
+def test_a_winding_warmed_from_outside_loses_torque_with_time_and_not_with_current(rise: float) -> None:
+    outside = effect("resistance_rise", joint=1, rise=rise, time_constant=20.0)
+    plant_with(outside, parameters=without_friction())
+    for time in (0.0, 10.0, 60.0):
+        resistance = 1.0 + rise * (1.0 - math.exp(-time / 20.0))
+        assert [outside.torque_change(torque, time, 0.0, 0.0) for torque in (0.0, 1.0, -4.0)] == pytest.approx(
+            [0.0, 1.0 / resistance - 1.0, 4.0 - 4.0 / resistance]
+        )
+
+
+def test_a_threshold_passes_nothing_below_it_and_all_above() -> None:
+    plant = plant_with(effect("amplifier_threshold", joint=2, width=2.0))
+    plant.advance([0.0, 0.07, 0.0, 0, 0, 0], 1000)
+    assert plant.motor_volts[1] == 0.0
+    plant.advance([0.0, -0.5, 0.07, 0, 0, 0], 1000)
+    assert plant.motor_volts[1:3] == pytest.approx((-14.0, 1.96))
+
+
 def test_supply_limit_cuts_its_joint_and_no_other() -> None:
     plant = plant_with(effect("supply_limit", joint=2, reduction=10.0))
     plant.advance([1.25, 1.25, -1.25, 0, 0, 0], 1000)

@@ -59,6 +59,14 @@ def test_a_spring_pulls_towards_its_neutral_angle() -> None:
     assert plant.joint_angles[2] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("stiffness", [5.0, -5.0])
+def test_a_cable_pulls_on_one_side_of_where_it_is_slack(stiffness: float) -> None:
+    cable = effect("one_sided_spring", joint=2, stiffness=stiffness, slack=0.4)
+    side = math.copysign(1.0, stiffness)
+    assert cable.joint_torque(0.0, 0.4 + side * 0.2, 9.0) == pytest.approx(-side)
+    assert cable.joint_torque(0.0, 0.4 - side * 0.2, 9.0) == 0.0
+
+
 def test_a_disturbance_keeps_its_frequency_whatever_the_arm_does() -> None:
     push = effect("periodic_disturbance", joint=1, amplitude=3.0, frequency=2.0, phase=0.0)
     assert push.joint_torque(0.125, 1.0, 2.0) == pytest.approx(3.0)

@@ -37,6 +37,8 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     GEAR,
     HEATING,
     COOLING,
+    TIMED_RISE,
+    RISING,
     VISCOUS,
     COULOMB,
     ARM,
@@ -57,13 +59,15 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     RIPPLE_N,
     SPRING,
     REST,
+    CABLE,
+    SLACK,
     SHAKE_S,
     SHAKE_C,
     SHAKE_F,
     LAGS,
     GIVES,
     STICKS,
-) = range(34)
+) = range(38)
 # Columns of the state. X is the relative rise of the resistance.
 Q, V, Z, I, M, W, X, STUCK = range(8)  # noqa: E741 (a current)
 
@@ -128,7 +132,7 @@ def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Fl
         a, q, v = p[j], s[j, Q], s[j, V]
         z = min(max(s[j, Z], -1.0), 1.0)
         turning = s[j, W] if a[GIVES] else v
-        resistance = a[R] * (1 + s[j, X])
+        resistance = a[R] * (1 + s[j, X] + a[TIMED_RISE] * (1 - exp(-t / a[RISING])))
         settled = (volts[j] - a[KB] * a[GEAR] * turning) / resistance
         current = s[j, I] if a[LAGS] else settled
         motor = a[GEAR] * a[KT] * current - a[GEAR] ** 2 * a[VISCOUS] * turning
@@ -140,6 +144,7 @@ def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Fl
         if a[LOSS_DIRECTION] * motor * z > 0:
             link -= abs(a[LOSS_DIRECTION] * motor) * z
         link += a[RIPPLE_S] * sin(a[RIPPLE_N] * q) + a[RIPPLE_C] * cos(a[RIPPLE_N] * q) - a[SPRING] * (q - a[REST])
+        link -= max(a[CABLE], 0.0) * max(q - a[SLACK], 0.0) - min(a[CABLE], 0.0) * min(q - a[SLACK], 0.0)
         turn = 2 * np.pi * a[SHAKE_F] * t
         link += a[SHAKE_S] * sin(turn) + a[SHAKE_C] * cos(turn)
         rate[j, W], rotor[j] = 0.0, a[J] * a[GEAR] ** 2
@@ -265,8 +270,10 @@ class _Joint:
         return float(np.clip(power, -127, 127) * self._supply / 127)
 
     def volts(self, command: float) -> float:
-        """At the motor: what lies outside the dead zone, within the limit."""
+        """At the motor: what lies outside the dead zone, within the limit; nothing up to a threshold."""
         outside = max(abs(command) - self.of("dead_zone.width"), 0.0)
+        if abs(command) <= self.of("amplifier_threshold.width"):
+            outside = 0.0
         return float(np.sign(command) * min(outside, self.of("supply_limit.voltage", self._supply)))
 
     @property
@@ -277,7 +284,7 @@ class _Joint:
 
 
 def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
-    """(3, 34), in the order of the columns above."""
+    """(3, 38), in the order of the columns above."""
     rows = []
     for j in (1, 2, 3):
         drive, sensor = model.machine.joint(j).dc_motor, model.machine.joint(j).sensor
@@ -300,6 +307,8 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
                 drive.gear_ratio.value,
                 of("resistance_drift.heating"),
                 of("resistance_drift.time_constant", 1.0),
+                of("resistance_rise.rise"),
+                of("resistance_rise.time_constant", 1.0),
                 of("viscous_friction.coefficient"),
                 of("coulomb_friction.torque"),
                 of("load_dependent_friction.arm"),
@@ -320,6 +329,8 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
                 of("torque_ripple.cycles", 1.0),
                 of("spring_torque.stiffness"),
                 of("spring_torque.rest"),
+                of("one_sided_spring.stiffness"),
+                of("one_sided_spring.rest"),
                 of("periodic_disturbance.sine"),
                 of("periodic_disturbance.cosine"),
                 of("periodic_disturbance.frequency"),

@@ -51,8 +51,10 @@ CASES = (
     _of("direction_dependent_viscous_friction", "difference", (-2e-5, 1.2e-4, -1.2e-4), 3),
     _of("weakened_magnet", "loss", (0.2, 0.2, 0.2), 1),
     _of("resistance_drift", "heating", (0.2, 0.05, 0.2), 2, time_constant=10.0),
+    _of("resistance_rise", "rise", (0.5, 0.5, 0.5), 2, time_constant=1.0),
     _of("motor_inductance", "inductance", (0.017, 0.042, 0.014), 1),
     _of("dead_zone", "width", (0.5, 0.7, 0.5), 3),
+    _of("amplifier_threshold", "width", (2.5, 1.5, 1.0), 3),
     _of("supply_limit", "voltage", (14.0, 24.0, 9.0), 2),
     _of("torque_ripple", "sine", (0.6, 1.5, 0.4), 1, cosine=0.1, cycles=24.0),
     _of("gear_loss", "loss", (0.12, 0.19, 0.11), 3),
@@ -64,6 +66,9 @@ CASES = (
     _of("centre_of_mass", "shift", (0.03, 0.14, 0.08), 3),
     Case("base_tilt", ({"about_y": 0.15, "about_x": 0.05},), 2),
     _of("spring_torque", "stiffness", (1.5, 5.0, 1.5), 1, rest=0.5),
+    Case(
+        "one_sided_spring", tuple({"stiffness": k, "rest": q + 0.1} for k, q in zip((9, -40, 9), START, strict=True)), 1
+    ),
     _of("periodic_disturbance", "sine", (0.6, 1.8, 0.4), 2, cosine=0.3, frequency=2.0),
     _of("potentiometer_gain", "relative", (0.06, 0.06, 0.06), 2),
     _of("potentiometer_offset", "offset", (0.067, 0.067, 0.067), 3),

@@ -36,6 +36,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "weakened_magnet": (2, {"loss": 0.3}),
     "motor_inductance": (3, {"inductance": 0.03}),
     "dead_zone": (1, {"width": 2.0}),
+    "amplifier_threshold": (2, {"width": 4.0}),
     "supply_limit": (2, {"reduction": 12.0}),
     "torque_ripple": (3, {"amplitude": 0.9, "periods": 20.0, "phase": 0.0}),
     "gear_loss": (2, {"loss": 0.4}),
@@ -46,6 +47,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "centre_of_mass": (2, {"shift": 0.1}),
     "base_tilt": (None, {"about_x": 0.1, "about_y": 0.15}),
     "spring_torque": (2, {"stiffness": 20.0, "neutral": 0.79}),
+    "one_sided_spring": (2, {"stiffness": -20.0, "slack": 0.79}),
     "periodic_disturbance": (3, {"amplitude": 1.2, "frequency": 2.5, "phase": 0.0}),
     "potentiometer_gain": (3, {"error": -0.1}),
     "potentiometer_offset": (2, {"angle": 0.15}),
@@ -63,6 +65,7 @@ DECIDES = {
     "stribeck_friction": "torque",
     "torque_ripple": "cycles",
     "spring_torque": "stiffness",
+    "one_sided_spring": "stiffness",
 }
 """The parameter that is varied, where there are several."""
 

@@ -23,10 +23,19 @@ from tests.worlds.folder import write_world
             *("planar-torques", 551, "load_dependent_friction", "gravity_torque_friction", (2,), "share", 0.0605),
             marks=pytest.mark.slow,
         ),
+        pytest.param("planar-cascade", 709, None, "one_sided_spring", (2,), "stiffness", 0.7155),
+        pytest.param(*("planar-pid", 711, None, "amplifier_threshold", (2,), "width", 2.0008), marks=pytest.mark.slow),
     ],
 )
 def test_a_law_is_named_and_its_size_found(
-    kind: str, seed: int, drawn: str, effect: str, joints: tuple[int, ...], part: str, value: float, tmp_path: Path
+    kind: str,
+    seed: int,
+    drawn: str | None,
+    effect: str,
+    joints: tuple[int, ...],
+    part: str,
+    value: float,
+    tmp_path: Path,
 ) -> None:
     write_world(tmp_path, kind, seed, effect=drawn)
     lab = tmp_path / "lab"
