@@ -50,6 +50,9 @@ FAR_OFF = 4.0
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
+SUSPECTED_SHARE = 0.05
+"""Least share by which a suspected effect must make the mean square smaller on records not fitted to. Two thousandths
+of the viscous friction, as Coulomb friction, took 1 to 3 % of what was left of a sound axis."""
 FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
@@ -292,7 +295,7 @@ class TorqueWorkflow:
             if not self._is_beyond_noise(reference, chosen):
                 continue
             elsewhere = self._predicted(reference, chosen.fit)
-            if self._removed(reference, chosen, *elsewhere) < self.case.options.least_share:
+            if self._removed(reference, chosen, *elsewhere) < max(SUSPECTED_SHARE, self.case.options.least_share):
                 continue
             recorded = sum(float(np.ptp(r.time)) for r in (*self.case.records, *self.case.held_out))
             seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)

@@ -13,8 +13,8 @@ from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis, RemainingShape
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_distance
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed
+from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_distance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
