@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.machine import DcMotor, Machine
 from model.arrays import Floats, Mask
@@ -11,6 +12,8 @@ AT_LIMIT = 1e-6
 """Share of its largest value within which a drive stands at it."""
 RUN = 3
 """Samples in a row at the largest value that show a limit: a motion passes its largest value once."""
+LATER = 2
+"""Samples by which a drive may act later than it is recorded, at most (`drive_timing`)."""
 MOST = 0.9
 """Share of the samples beyond which a drive only switches, and is taken as it was recorded."""
 
@@ -33,9 +36,12 @@ def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
     return found
 
 
-def spread(mask: Mask, samples: int) -> Mask:
-    """(r, n) the mask, and so many samples before and after."""
-    counts = np.concatenate([np.zeros((1, mask.shape[1]), dtype=int), np.cumsum(mask, axis=0)])
-    rows = np.arange(len(mask))
-    high = np.minimum(rows + samples + 1, len(mask))
-    return np.asarray(counts[high] > counts[np.maximum(rows - samples, 0)])
+def pieces_of(at_limit: NDArray[np.bool_], longest: int) -> list[slice]:
+    """The stretches (r,) of one joint at its limit, in pieces of `longest` samples at most; each a little longer than
+    the limit, since what is asked for acts later."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], at_limit, [False])).astype(int)))
+    return [
+        slice(first, min(first + longest, int(end) + LATER))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True)
+        for first in range(int(begin), int(end), longest)
+    ]

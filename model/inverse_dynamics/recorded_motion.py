@@ -16,7 +16,7 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
-from model.inverse_dynamics.drive_limits import spread, stands_at_limit
+from model.inverse_dynamics.drive_limits import pieces_of, stands_at_limit
 from model.inverse_dynamics.readings import Readings, readings_of
 
 Rows = NDArray[np.int64]
@@ -34,8 +34,12 @@ KEPT = 3.0
 """Samples per period of the cutoff that are compared: closer ones are not independent."""
 EDGE = 1.0
 """Periods of the cutoff at both ends that are left out, where the low-pass lacks samples on one side."""
-BESIDE_LIMIT = 1.5
-"""Periods of the cutoff before and after a drive at an unknown limit that are left out: the low-pass spreads it."""
+PIECE = 0.25
+"""Longest piece of a drive at an unknown limit that lacks one torque, in periods of the cutoff."""
+LEAST_SHAPE = 1e-3
+"""Least size of such a torque's shape beside the largest that is told apart."""
+MOST_UNKNOWN = 0.4
+"""Most such pieces on a joint, as a share of its compared samples; with more, its torque is not known at all."""
 SHORTEST = 1.0
 """Shortest duration of a record, s."""
 TURNING_NOISE = 2.0
@@ -65,8 +69,8 @@ class RecordedMotion:
         cutoff: of the torques' low-pass, Hz.
         edge, every: samples of the grid left out at both ends, and distance of the compared ones.
         moving: (m, n) False where a joint rests: friction then takes whatever value holds it, so the torque says
-            nothing. So it is beside a limit of the drive that the machine file does not state (`drive_limits`).
-        at_limit: (n,) share of the samples that are left out beside such a limit.
+            nothing. at_limit: (r, n) where the drive is at a limit that the machine file does not state
+            (`drive_limits`), so that less may act than is recorded.
         own_speed: (n,) whether a joint's speed has a sensor of its own, without the errors of the position's.
     """
 
@@ -86,13 +90,42 @@ class RecordedMotion:
     edge: int
     every: int
     moving: Mask
-    at_limit: Floats
+    at_limit: Mask
     own_speed: Mask
 
     def compared(self, torque: Floats) -> Floats:
         """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
         smooth = low_pass(torque, self.cutoff, self.period)
         return np.ascontiguousarray(smooth[self.rows])
+
+    def less_unknown(self, torque: Floats) -> Floats:
+        """Compared torques (m, n) less what a drive at a limit that no file states explains of them: there it gives
+        less than is recorded, and how much less is not known."""
+        if not self.at_limit.any():
+            return torque
+        left = torque.copy()
+        for j, basis in enumerate(self._unknown_drives):
+            moving = self.moving[:, j]
+            left[moving, j] -= basis @ (basis.T @ left[moving, j])
+        return left
+
+    @cached_property
+    def _unknown_drives(self) -> list[Floats]:
+        """By joint, an orthonormal basis (moving, p) of the torques of `less_unknown`: all of them, where there are too
+        many pieces to know anything."""
+        found = []
+        wide, longest = _wide(self.cutoff, self.sampled), max(1, round(PIECE / self.cutoff / self.sampled))
+        for j, moving in enumerate(self.moving.T):
+            pieces = pieces_of(self.at_limit[:, j], longest)
+            pulses = np.zeros((len(self.at_limit), len(pieces)))
+            for column, rows in enumerate(pieces):
+                pulses[rows, column] = 1.0
+            shapes = self.compared(self._on_grid(low_pass(pulses, wide, self.sampled)))[moving]
+            axes, sizes, _ = np.linalg.svd(shapes, full_matrices=False)
+            basis = axes[:, sizes > LEAST_SHAPE * sizes[:1].max(initial=1.0)]
+            known = basis.shape[1] <= MOST_UNKNOWN * moving.sum()
+            found.append(basis if known else np.eye(int(moving.sum())))
+        return found
 
     def driven(self, late: Floats, limit: Floats, threshold: Floats) -> Floats:
         """The drive (k, n) that acts at the grid's times, where it acts so long (n,), s, after its sample, no more than
@@ -237,12 +270,9 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
     edge = max(1, int(EDGE / cutoff / period))
     noise = readings.speed_noise(wide)
     turning = np.maximum(TURNING_NOISE * noise, 0.5 * period * np.median(np.abs(acceleration), axis=0)) + 1e-12
-    limited = spread(stands_at_limit(readings.drive, machine), round(BESIDE_LIMIT / cutoff / readings.period))[::thin]
-    moving = (_moving(speed, noise, period) & ~limited)[edge : len(time) - edge : every]
+    moving = _moving(speed, noise, period)[edge : len(time) - edge : every]
     if not moving.any():
-        raise TraceError(
-            f"trace {readings.name}: no joint moves beyond the noise of its readings, and below its drive's limit"
-        )
+        raise TraceError(f"trace {readings.name}: no joint moves beyond the noise of its readings")
     return RecordedMotion(
         name=readings.name,
         time=time,
@@ -260,7 +290,7 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
         edge=edge,
         every=every,
         moving=moving,
-        at_limit=limited.mean(axis=0),
+        at_limit=stands_at_limit(readings.drive, machine),
         own_speed=readings.has_own_speed,
     )
 

@@ -106,7 +106,7 @@ class TorqueBalance:
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
             torque = _held_by_friction(torque, levels[i], motion.contact, record)
-            result.append(record.compared(torque * self._told_per_torque(joints)))
+            result.append(record.less_unknown(record.compared(torque * self._told_per_torque(joints))))
         return result
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:

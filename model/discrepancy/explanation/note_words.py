@@ -23,10 +23,10 @@ def _cutoff(v: Values) -> str:
 
 
 def _drive_at_limit(v: Values) -> str:
-    shares = ", ".join(f"{share:.0%} of joint {joint}" for joint, share in v["shares"])
+    shares = ", ".join(f"{share:.0%} of joint {joint}'s time" for joint, share in v["shares"])
     return (
-        f"samples beside the largest recorded drive are left out ({shares}): it stands there for several samples, and "
-        "what acts at such a limit may be less than what is recorded"
+        f"the recorded drive stands at its largest value ({shares}), where less may act than is recorded: how much "
+        "less is found beside all else, and nothing is concluded from it"
     )
 
 

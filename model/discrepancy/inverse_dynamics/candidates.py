@@ -335,7 +335,7 @@ def _timed_warming(place: _Place) -> Iterator[Start]:
 def _ripple(place: _Place) -> Iterator[Start]:
     column, records = place.column, place.records
     every = np.concatenate([r.position[r.rows, column][r.moving[:, column]] for r in records])
-    travel = float(np.ptp(every))
+    travel = float(np.ptp(every)) if every.size else 0.0
     if travel <= 0:
         return
     slow = float(np.quantile(place.speeds, 0.25))

@@ -335,9 +335,11 @@ class TorqueWorkflow:
         return (Note(kind="drive-timing", values={"late": list(map(float, late)), "samples": MOST}),)
 
     def _at_limits(self) -> tuple[Note, ...]:
-        """What was left out beside limits of the drives that no file states."""
+        """Where drives were at limits that no file states."""
         records = (*self.case.records, *self.case.held_out)
-        shares = np.average([r.at_limit for r in records], axis=0, weights=[np.ptp(r.time) for r in records])
+        shares = np.average(
+            [r.at_limit.mean(axis=0) for r in records], axis=0, weights=[np.ptp(r.time) for r in records]
+        )
         joints = self.model.machine.modelled_joints
         found = [(joint, float(share)) for joint, share in zip(joints, shares, strict=True) if share > 0.0]
         return (Note(kind="drive-at-limit", values={"shares": found}),) if found else ()
