@@ -1,4 +1,4 @@
-"""Whether a record resolves what a fitted effect claims: four things that a sound rig imitates (decision 0053)."""
+"""Whether a record resolves what a fitted effect claims: what a sound rig imitates (decision 0053)."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ SLOWER = 0.5
 the fifth power of the cutoff, so 3 % of it is left there."""
 AT_BOUND = 1.01
 """Ratio to its lower bound below which a speed is the bound's."""
+AT_END = 1e-6
+"""Share of a bound within which a size is at it."""
 FAR = 4.0
 """Distance from what the file states, in stated deviations, beyond which a number is not a tolerance any more."""
 
@@ -37,6 +39,8 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     if found.effect == DELAY and _may_be_timing(found):
         return False
     if any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
+        return False
+    if any(_ends_at_bound(p, found.fit.values[p.name]) for p in found.parameters):
         return False
     if not is_far_everywhere(found.stated, found.fit.values):
         return False
@@ -72,6 +76,15 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
     """Whether friction fades at the lowest speed that is looked at: then it fades below, where a smoothed speed does
     not tell whether the joint stands."""
     return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
+
+
+def _ends_at_bound(p: Parameter, value: float) -> bool:
+    """Whether a size ended at the end of what it may be, where a fit would go on: no machine has it, and what it takes
+    is something else."""
+    if p.null is None or p.effect == "supply_limit":  # whose records bound it
+        return False
+    ends = [bound for bound in (p.low, p.high) if math.isfinite(bound) and bound != p.null]
+    return any(abs(value - end) <= AT_END * abs(end) for end in ends)
 
 
 def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) -> bool:

@@ -27,6 +27,8 @@ REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
 LARGER_PART = 0.5
 """Share of a joint's residual from which an effect that explains it is fitted, whatever it promises in evidence."""
+OF_A_JOINT = 3
+"""Most of these effects on one joint."""
 ALIKE = 0.97
 """Correlation of the torques of two effects above which they count as the same."""
 JOINT_GAIN = 12.0
@@ -149,7 +151,7 @@ def _joints(probes: Sequence[Probe]) -> tuple[int, ...]:
 
 def _shortlist(probes: Sequence[Probe], now: BalanceFit) -> list[list[Probe]]:
     """For the most promising effects, the best joint alone, and all joints on which there is something to explain; and
-    for every joint the effect that explains most of it, where that is the larger part.
+    for every joint the effects that explain most of it, where that is the larger part.
 
     On a joint whose residual is large and slow, few samples count as independent, and no effect promises much there as
     long as it is not fitted.
@@ -170,11 +172,8 @@ def _shortlist(probes: Sequence[Probe], now: BalanceFit) -> list[list[Probe]]:
             chosen.append(sorted(several, key=lambda p: p.trial.joints))
     listed = {(p.trial.effect, p.trial.joints) for own in chosen for p in own}
     for joint, whole in zip(now.balance.model.machine.modelled_joints, _weighted_squares(now), strict=True):
-        largest = max((p for p in probes if p.trial.joints == (joint,)), key=lambda p: p.gain, default=None)
-        if largest is None or largest.gain <= LARGER_PART * whole:
-            continue
-        if (largest.trial.effect, largest.trial.joints) not in listed:
-            chosen.append([largest])
+        large = [p for p in probes if p.trial.joints == (joint,) and p.gain > LARGER_PART * whole]
+        chosen += [[p] for p in large[:OF_A_JOINT] if (p.trial.effect, p.trial.joints) not in listed]
     return chosen
 
 

@@ -41,6 +41,9 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
 
+BESIDE_REFUSED = 0.5
+"""Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
+something else."""
 CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
 SHOWN = 12
@@ -57,6 +60,8 @@ FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
 2.6, where friction turns (docs/worlds.md)."""
+MOST_OF_IT = 0.6
+"""Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 SLOW = 4.0
 """Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
 the low-pass, that of accelerations to 2.7."""
@@ -190,6 +195,8 @@ class TorqueWorkflow:
             told = self._evidence_held_out(chosen)
             if chosen.evidence <= 0 or chosen.evidence + told < self._needed(chosen):
                 continue
+            if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
+                continue
             reference = self._reference(chosen)
             if not self._is_beyond_noise(reference, chosen):
                 continue
@@ -210,7 +217,7 @@ class TorqueWorkflow:
             return Refusal(kind="falls-too-little", numbers={"share": removed})
         if grown := self._grown_held_out(chosen):
             return Refusal(kind="worse-than-given", numbers={"share": grown})
-        if tolerances(self.model)[1] != "stated":
+        if tolerances(self.model)[1] != "stated" or self._explains_most(chosen):
             return None
         before = {u.name: abs(prior_distance(u, self.now.values[u.name])[0]) for u in self.now.unknowns}
         stated = [
@@ -228,7 +235,7 @@ class TorqueWorkflow:
         given = holdout.held_out_squares(self.begin, {}, self.case.held_out)
         after = holdout.held_out_squares(chosen.model, chosen.fit.values, self.case.held_out)
         own = [j in chosen.joints or not chosen.joints for j in self.model.machine.modelled_joints]
-        growth = after[own] / given[own] - 1.0
+        growth = after[own] / np.maximum(given[own], 1e-300) - 1.0
         return max(0.0, float(np.min(growth))) if np.isfinite(growth).all() else 0.0
 
     def _reference(self, chosen: Fitted) -> BalanceFit:
@@ -260,8 +267,28 @@ class TorqueWorkflow:
         larger least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
         """
         least = self.case.options.least_evidence
+        if self._explains_most(chosen):
+            least = min(least, SUSPECTED)
         least -= chosen.relief * max(least - SUSPECTED, 0.0)
         return least + self.case.options.echo * self._collected(chosen.joints)
+
+    def _explains_most(self, chosen: Fitted) -> bool:
+        """Whether an effect takes most of a residual far above noise, on the records fitted to and on held-out ones.
+
+        A slow residual has few independent samples, so that evidence alone would ask for a longer record of what is
+        plain to see: a square wave, of which a sine takes four fifths, or a spring that gets stiffer.
+        """
+        held = self.case.held_out
+        if not held or not chosen.joints:
+            return False
+        fitted = [holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit)]
+        other = [holdout.held_out_squares(f.balance.model, f.values, held) for f in (self.now, chosen.fit)]
+        own = np.array([j in chosen.joints for j in self.model.machine.modelled_joints])
+        far = (FAR_ABOVE_NOISE * self.case.noise[own]) ** 2
+        return all(
+            bool((before[own] > far).all() and (after[own] < (1 - MOST_OF_IT) * before[own]).all())
+            for before, after in (fitted, other)
+        )
 
     def _margin(self, chosen: Fitted, rival: Fitted) -> float:
         """Lead in evidence over a rival with which a candidate is named alone: as `_needed`, less where the evidence of
