@@ -38,8 +38,8 @@ CONTACT_SHARE = 0.02
 HOLDING_ROUNDS = 4
 """Rounds in which friction of a slow joint takes up what is left below the cutoff: without any, steps of a set point
 left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
-THRESHOLD = ".amplifier_threshold.width"
-"""End of the names of parameters at which the residual jumps."""
+THRESHOLD = "amplifier_threshold"
+"""The effect whose parameter makes the residual jump."""
 LEAST_KEPT = 0.05
 """Least share of a torque that gears are taken to pass on: two losses together may exceed one."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
@@ -121,7 +121,7 @@ class TorqueBalance:
 
         residual: what `residual` gives for the same values.
         """
-        if unknown.name.endswith(THRESHOLD) and values[unknown.name] > 0:
+        if unknown.parameter.effect == THRESHOLD and values[unknown.name] > 0:
             half = 0.5 * EDGE * values[unknown.name]
             sides = (self.residual({**values, unknown.name: values[unknown.name] + s * half}) for s in (1, -1))
             return [(above - below) / (2 * half) for above, below in zip(*sides, strict=True)]
