@@ -162,10 +162,6 @@ REPORTED: dict[str, Kind] = {
         motions=("ramps", "via points"),
         known_loop=False,
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "six-volts": replace(
         _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
     ),
@@ -192,6 +188,48 @@ REPORTING: dict[str, Kind] = {
         contacts=(BRISTLE,),
         body=True,
         motions=("sweep", "via points"),
+        known_loop=False,
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-volts-body": replace(
+        _AXIS, rate=(300.0,), bits=(17,), contacts=(TANH, BRISTLE), body=True, motions=("via points", "sweep")
+    ),
+    "planar-cascade-steps": replace(
+        _PLANAR, controller=CASCADE, rate=(400.0,), bits=(16,), contacts=(SWITCH,), motions=("steps", "sines")
+    ),
+    "planar-volts-rounded": replace(
+        _PLANAR, rate=(250.0,), bits=(17,), rounding=0.002, limit=0.7, contacts=(BRISTLE,), motions=("via points",)
+    ),
+    "arm-cascade": replace(
+        _ANTHROPOMORPHIC,
+        controller=CASCADE,
+        rate=(250.0,),
+        bits=(17,),
+        contacts=(TANH,),
+        motions=("via points", "sines"),
+    ),
+    "planar-current-sweep": replace(
+        _PLANAR,
+        drive=CURRENT,
+        rate=(400.0,),
+        bits=(18,),
+        contacts=(SWITCH,),
+        motions=("sweep", "ramps"),
+        recorded=("drive",),
+        known_loop=False,
+    ),
+    "six-current": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(18,),
+        contacts=(SWITCH,),
+        body=True,
+        motions=("sines", "via points"),
         known_loop=False,
     ),
 }

@@ -126,7 +126,7 @@ def _largest_output(machine: Machine, joint: int) -> float:
 def _shown_step(drive: Floats) -> float:
     """The step in which a recorded drive changes; 0 where its values are not all whole numbers of one."""
     values = np.unique(drive)
-    if len(values) > ROUNDED_SHARE * len(drive):
+    if len(values) < 3 or len(values) > ROUNDED_SHARE * len(drive):
         return 0.0
     apart = np.diff(values)
     step = float(apart[apart > 1e-9 * np.abs(values).max()].min(initial=np.inf))
