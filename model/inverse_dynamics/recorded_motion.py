@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfreqz
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine, NoController
@@ -18,13 +16,10 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
 from model.inverse_dynamics.drive_limits import pieces_of, stands_at_limit
 from model.inverse_dynamics.readings import Readings, readings_of
+from model.inverse_dynamics.smoothing import derivative, low_pass
 
 Rows = NDArray[np.int64]
 
-ORDER = 4
-"""Order of the Butterworth low-pass, which runs forwards and backwards."""
-CONTINUED = 4.0
-"""Periods of the cutoff by which a signal is continued at both ends before it is low-passed."""
 WIDER = 3.0
 """Cutoff of the motion's low-pass, in cutoffs of the torques. Wider, so that a torque that changes with direction is
 formed of a motion whose reversals are still sharp; the torque is then low-passed to the cutoff."""
@@ -202,44 +197,6 @@ class RecordedMotion:
     def rows(self) -> slice:
         """The samples of the grid that are compared."""
         return slice(self.edge, len(self.time) - self.edge, self.every)
-
-
-def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
-    """Butterworth's low-pass forwards and backwards along the first axis, so without delay.
-
-    It is the gain of `scipy.signal.sosfiltfilt` at every frequency, of a signal that is continued oddly at both ends,
-    and takes a quarter of the time: a diagnosis does little else. The signal is unchanged where the sampling ends below
-    the cutoff.
-    """
-    if cutoff >= 0.45 / period:
-        return signal
-    count = len(signal)
-    padding = min(count - 1, int(CONTINUED / (cutoff * period)))
-    whole = next_fast_len(count + 2 * padding, real=True)
-    after = min(count - 1, whole - count - padding)
-    whole = count + padding + after
-    before = 2 * signal[0] - signal[padding:0:-1]
-    behind = 2 * signal[-1] - signal[-2 : -after - 2 : -1]
-    gain = _gain(2 * cutoff * period, whole).reshape(-1, *([1] * (signal.ndim - 1)))
-    spectrum = rfft(np.concatenate([before, signal, behind]), axis=0)
-    return np.asarray(irfft(spectrum * gain, whole, axis=0)[padding : padding + count])
-
-
-@lru_cache(maxsize=64)
-def _gain(share: float, count: int) -> Floats:
-    """Gain of both passes at the frequencies of `count` samples, for a cutoff that is this share of half their rate."""
-    sections = butter(ORDER, share, output="sos")
-    _, response = sosfreqz(sections, 2 * np.pi * np.arange(count // 2 + 1) / count)
-    return np.asarray(np.abs(response) ** 2)
-
-
-def derivative(signal: Floats, period: float) -> Floats:
-    """Derivative along the first axis of a signal (k, …) by cubic splines.
-
-    Central differences take (2πf·period)²/6 of what moves at f: 1.5 % at 12 Hz of 250 samples a second, and twice that
-    of an acceleration. Splines take the fourth power of that over 180, so a ten-thousandth.
-    """
-    return np.asarray(CubicSpline(period * np.arange(len(signal)), signal)(period * np.arange(len(signal)), 1))
 
 
 def recorded_motions(traces: Sequence[Trace], machine: Machine, cutoff: float) -> tuple[RecordedMotion, ...]:

@@ -16,7 +16,8 @@ from model.drives.piecewise import EDGE
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
-from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, holds_drive_between_samples, low_pass
+from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
+from model.inverse_dynamics.smoothing import derivative, low_pass
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm, nominal_vector

@@ -1,0 +1,171 @@
+"""The answer of a diagnosis by inverse dynamics: its last fit, steps, errors and notes as one record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Suspicion
+from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers
+from model.discrepancy.grounds import Note
+from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.inverse_dynamics.gap import torque_gap
+from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
+from model.discrepancy.inverse_dynamics.left_over import joints_left_over
+from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
+from model.discrepancy.inverse_dynamics.standing import Standing
+from model.discrepancy.verdict import verdict
+from model.fitting.unknowns import Unknown
+from model.inverse_dynamics.drive_timing import MOST, samples_late
+from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.machine_model.model import Lineage, Model
+from model.machine_model.parameter import Parameter
+
+SLIGHTLY_LATE = 0.1
+"""Least lateness of a drive that is told, in samples."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a diagnosis has come to.
+
+    first: the fit of the model as given. added: parameters of the effects that are named. stated: numbers that steps
+    have named although the file states them, as it states them. tried: ranking of the step that added nothing.
+    suspicion: the effect that is suspected. notes: what was noted on the way.
+    """
+
+    standing: Standing
+    controller: JudgedController
+    first: BalanceFit
+    added: Mapping[str, Parameter]
+    stated: Mapping[str, Parameter]
+    tried: tuple[Candidate, ...]
+    suspicion: Suspicion | None
+    notes: tuple[Note, ...]
+
+    @property
+    def unknowns(self) -> list[Unknown]:
+        """The unknowns of the last fit that are of the model."""
+        return [u for u in self.standing.now.unknowns if not u.nuisance]
+
+
+def answer_of(outcome: Outcome, traces: Sequence[str], held_out: Sequence[str], cutoff: float) -> Diagnosis:
+    """The whole answer, except for its sentences and the times that it took.
+
+    Args:
+        traces, held_out: identities of the traces that were fitted to, and that were not. cutoff: of the torques, Hz.
+    """
+    standing, controller, case = outcome.standing, outcome.controller, outcome.standing.case
+    shapes = remaining_shapes(standing.now, case)
+    proved, steps = controller.steps(standing.given, case.noise), _as_last_fitted(standing)
+    named = any(step.adopted for step in steps)
+    missing = bool(shapes) or bool(joints_left_over(standing))
+    fit_errors, held_errors = (_errors(standing, records) for records in (case.records, case.held_out))
+    return Diagnosis(
+        verdict=verdict((*proved, *steps), unexplained=missing and not named, suspected=outcome.suspicion is not None),
+        suspicion=None if named else outcome.suspicion,
+        summary=UNWRITTEN,
+        method="inverse-dynamics",
+        steps=(*proved, *steps),
+        rmse_fit=fit_errors,
+        rmse_holdout=held_errors,
+        gap=torque_gap(fit_errors, held_errors, steps),
+        where=locate(standing.now, case),
+        candidates=outcome.tried,
+        remaining=shapes,
+        model_before=standing.given,
+        model_after=_resulting_model(outcome, traces),
+        traces=tuple(traces),
+        holdout=tuple(held_out),
+        seconds=0.0,
+        robot_seconds=0.0,
+        significant=case.options.least_evidence,
+        notes_data=_notes(outcome, cutoff),
+    )
+
+
+def _as_last_fitted(standing: Standing) -> tuple[Step, ...]:
+    """The steps with the parameters of the last fit: a step's own values are biased by effects that were found after
+    it."""
+    steps = []
+    for step in standing.steps:
+        own = [standing.model.parameter(name) for name in step.parameters] if step.adopted else []
+        steps.append(step.model_copy(update={"parameters": found_values(standing.now, own)}) if own else step)
+    return tuple(steps)
+
+
+def _errors(standing: Standing, records: tuple[RecordedMotion, ...]) -> tuple[SignalError, ...]:
+    """Errors of every joint on these records, by the given model and by the one that comes out."""
+    if not records:
+        return ()
+    before = holdout.held_out_squares(standing.given, {}, records)
+    after = holdout.held_out_squares(standing.model, standing.now.values, records)
+    return signal_errors(standing.model, before, after, standing.case.noise)
+
+
+def _resulting_model(outcome: Outcome, traces: Sequence[str]) -> Model:
+    """The model that comes out, with what the controller's numbers prove, and where it comes from."""
+    standing = outcome.standing
+    lineage = Lineage(
+        parent=standing.given.identity,
+        traces=tuple(traces),
+        fit={"fitted": [u.name for u in outcome.unknowns]},
+        note="diagnosis",
+    )
+    found = standing.model.with_values(standing.now.model_values)
+    return outcome.controller.with_findings(found).with_lineage(lineage)
+
+
+def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
+    """What an answer notes, below a cutoff in Hz."""
+    standing = outcome.standing
+    values = standing.now.values
+    return (
+        *on_stated_numbers((u for u in outcome.unknowns if u.name not in outcome.added), values),
+        *on_named_numbers((p for name, p in outcome.stated.items() if name in outcome.added), values),
+        _torque_left(outcome),
+        *_assumptions(cutoff, outcome.controller.not_looked_for),
+        *_at_limits(standing),
+        *_timing(standing),
+        *outcome.notes,
+    )
+
+
+def _torque_left(outcome: Outcome) -> Note:
+    """Residual as a share of the recorded torque, before and after: the figure that the literature usually gives."""
+    standing = outcome.standing
+    held = standing.case.held_out
+    records = held or standing.case.records
+    before = holdout.relative_torque_error(standing.given, outcome.first.values, records)
+    after = holdout.relative_torque_error(standing.model, standing.now.values, records)
+    return Note(kind="torque-left", values={"held_out": bool(held), "before": before, "after": after})
+
+
+def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note, ...]:
+    return (
+        Note(kind="cutoff", values={"cutoff": cutoff}),
+        Note(kind="resting-left-out"),
+        Note(kind="not-looked-for", values={"effects": dict(not_looked_for)}),
+        Note(kind="positions-of-links"),
+    )
+
+
+def _at_limits(standing: Standing) -> tuple[Note, ...]:
+    """Where drives were at limits that no file states."""
+    records = (*standing.case.records, *standing.case.held_out)
+    shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=[np.ptp(r.time) for r in records])
+    joints = standing.model.machine.modelled_joints
+    found = [(joint, float(share)) for joint, share in zip(joints, shares, strict=True) if share > 0.0]
+    return (Note(kind="drive-at-limit", values={"shares": found}),) if found else ()
+
+
+def _timing(standing: Standing) -> tuple[Note, ...]:
+    """How late the drives were found to act, which is taken for the way in which they are formed and held."""
+    late = samples_late(standing.model, standing.now.values)
+    if late.max() < SLIGHTLY_LATE:
+        return ()
+    return (Note(kind="drive-timing", values={"late": list(map(float, late)), "samples": MOST}),)

@@ -1,0 +1,161 @@
+"""Whether a fitted candidate is taken: the evidence that it needs, and what it is refused for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.discrepancy.grounds import Refusal
+from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
+from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.priors import prior_distance
+from model.discrepancy.inverse_dynamics.search import Fitted
+from model.discrepancy.inverse_dynamics.standing import Standing
+from model.discrepancy.inverse_dynamics.tolerances import tolerances
+
+BESIDE_REFUSED = 0.5
+"""Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
+something else."""
+CHANCES = 3
+"""Candidates of a step that may fail on records not fitted to before the search ends."""
+FAR_OFF = 4.0
+"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
+SUSPECTED = 10.0
+"""Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
+and still short of what naming it takes."""
+MOST_OF_IT = 0.6
+"""Share of a residual far above noise with which an effect that takes it is named on less evidence."""
+LEAD = 4.0
+"""Lead with which an effect is named alone where all evidence, its own and the rival's, comes from priors: that of the
+other method."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What was made of a candidate that has the evidence it needs.
+
+    told: what held-out records say for it, as evidence. refusal: why it is not taken; None where it is.
+    """
+
+    comparison: Comparison
+    told: float
+    refusal: Refusal | None
+
+    @property
+    def chosen(self) -> Fitted:
+        """The candidate."""
+        return self.comparison.chosen
+
+
+def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judgement | None:
+    """Whether a candidate is taken; None where it is none to speak of: it lacks evidence, has little beside a rival
+    that was refused, or explains noise.
+
+    Args:
+        refused: candidates of the same step that were not taken before it.
+    """
+    told = evidence_held_out(standing, chosen)
+    if chosen.evidence <= 0 or chosen.evidence + told < needed_evidence(standing, chosen):
+        return None
+    if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
+        return None
+    comparison = compare(standing, chosen)
+    if comparison is None:
+        return None
+    return Judgement(comparison, told, _refusal(standing, comparison))
+
+
+def evidence_held_out(standing: Standing, chosen: Fitted) -> float:
+    """What held-out records say for an effect, beside its evidence on the fitted ones; 0 where there are none."""
+    if not standing.case.held_out:
+        return 0.0
+    return holdout.evidence(standing.now, chosen.fit, standing.case.held_out)
+
+
+def needed_evidence(standing: Standing, chosen: Fitted) -> float:
+    """Evidence from which a candidate is named.
+
+    How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
+    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
+    """
+    options = standing.case.options
+    least = options.least_evidence
+    if _explains_most(standing, chosen):
+        least = min(least, SUSPECTED)
+    least -= chosen.relief * max(least - SUSPECTED, 0.0)
+    return least + options.echo * _collected(standing, chosen.joints)
+
+
+def needed_lead(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> float:
+    """Lead in evidence over a rival with which a candidate is named alone: as `needed_evidence`, less where the
+    evidence of both comes from priors. What one of them takes off a residual counts no more for being compared with a
+    prior."""
+    least = options.least_margin
+    return least - min(chosen.relief, rival.relief) * max(least - LEAD, 0.0)
+
+
+def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
+    """Evidence of the steps adopted so far on these joints, or on any for an effect of the whole machine."""
+    near = (s for s in standing.steps if s.adopted and (not joints or not s.joints or set(s.joints) & set(joints)))
+    return sum(s.evidence + (s.evidence_held_out or 0.0) for s in near)
+
+
+def _explains_most(standing: Standing, chosen: Fitted) -> bool:
+    """Whether an effect takes most of a residual far above noise, on the records fitted to and on held-out ones.
+
+    A slow residual has few independent samples, so that evidence alone would ask for a longer record of what is plain
+    to see: a square wave, of which a sine takes four fifths, or a spring that gets stiffer.
+    """
+    case = standing.case
+    if not case.held_out or not chosen.joints:
+        return False
+    fits = (standing.now, chosen.fit)
+    fitted = [holdout.mean_squares(case.stretches, f.residual) for f in fits]
+    other = [holdout.held_out_squares(f.balance.model, f.values, case.held_out) for f in fits]
+    own = np.array([j in chosen.joints for j in standing.model.machine.modelled_joints])
+    far = (FAR_ABOVE_NOISE * case.noise[own]) ** 2
+    return all(
+        bool((before[own] > far).all() and (after[own] < (1 - MOST_OF_IT) * before[own]).all())
+        for before, after in (fitted, other)
+    )
+
+
+def _refusal(standing: Standing, comparison: Comparison) -> Refusal | None:
+    """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
+    for another machine than the file describes. An effect that is there brings stated numbers back."""
+    chosen = comparison.chosen
+    if comparison.removed < standing.case.options.least_share:
+        return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
+    if grown := _grown_held_out(standing, chosen):
+        return Refusal(kind="worse-than-given", numbers={"share": grown})
+    if tolerances(standing.model)[1] != "stated" or _explains_most(standing, chosen):
+        return None
+    farthest = _farthest_newly_off(standing, chosen)
+    return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
+
+
+def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:
+    """Distance of the farthest of the numbers that the file states, in stated deviations, with a candidate: of those
+    that were not far off without it; 0 where there are none."""
+    now = standing.now
+    before = {u.name: abs(prior_distance(u, now.values[u.name])[0]) for u in now.unknowns}
+    stated = [u for u in chosen.fit.unknowns if u.parameter.effect is None and before.get(u.name, FAR_OFF) < FAR_OFF]
+    return max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
+
+
+def _grown_held_out(standing: Standing, chosen: Fitted) -> float:
+    """By which share the held-out variance is larger with an effect than with the model as given, on every joint of the
+    effect; 0 where it is not. What the fit of the stated numbers has followed is then nothing that the machine does
+    again, and an effect that only makes up for a part of that is none."""
+    held = standing.case.held_out
+    if not held:
+        return 0.0
+    given = holdout.held_out_squares(standing.given, {}, held)
+    after = holdout.held_out_squares(chosen.model, chosen.fit.values, held)
+    own = [j in chosen.joints or not chosen.joints for j in standing.model.machine.modelled_joints]
+    growth = after[own] / np.maximum(given[own], 1e-300) - 1.0
+    return max(0.0, float(np.min(growth))) if np.isfinite(growth).all() else 0.0

@@ -1,0 +1,59 @@
+"""What is left over where a diagnosis ends: joints with more than noise, and the steps that this contradicts."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from model.discrepancy.diagnosis import RemainingShape, Step
+from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, remaining_shapes
+from model.discrepancy.inverse_dynamics.standing import Standing
+from model.effects.library import effect
+
+FAR_ABOVE_NOISE = 10.0
+"""Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
+friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
+2.6, where friction turns (docs/worlds.md)."""
+SLOW = 4.0
+"""Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
+the low-pass, that of accelerations to 2.7."""
+VISCOUS = "viscous_friction"
+
+
+def joints_left_over(standing: Standing) -> tuple[int, ...]:
+    """Joints whose residual is far above noise on fitted and on held-out records, and slower than noise is."""
+    case, now = standing.case, standing.now
+    fitted = [np.sqrt(holdout.mean_squares(case.stretches, now.residual))]
+    if case.held_out:
+        held = holdout.held_out_squares(standing.model, now.values, case.held_out)
+        fitted.append(np.sqrt(held))
+    least = np.min(np.nan_to_num(fitted), axis=0) / case.noise
+    beyond = (least > FAR_ABOVE_NOISE) & (now.noise.memory > SLOW)
+    return tuple(j for j, left in zip(standing.model.machine.modelled_joints, beyond, strict=True) if left)
+
+
+def first_contradicted(standing: Standing, lowered: Collection[int]) -> int | None:
+    """Index of the first step that the residual contradicts; None where it contradicts none.
+
+    Args:
+        lowered: indices of the steps that lower what the file states.
+    """
+    shapes, left = remaining_shapes(standing.now, standing.case), set(joints_left_over(standing))
+    for index, step in enumerate(standing.steps):
+        joints = left & set(step.joints) if step.adopted else ()
+        if any(index in lowered or _bends(standing.steps, step, j, shapes) for j in joints):
+            return index
+    return None
+
+
+def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
+    """Whether a step is viscous friction, the only friction named on a joint, and another law is left there."""
+    return step.effect == VISCOUS and _only_viscous(steps, joint) and bends_with_speed(shapes, joint)
+
+
+def _only_viscous(steps: Sequence[Step], joint: int) -> bool:
+    """Whether viscous friction is the only friction that was named on a joint."""
+    named = {s.effect for s in steps if s.adopted and joint in s.joints and s.effect is not None}
+    return {name for name in named if effect(name).shared_name.family == "friction"} == {VISCOUS}

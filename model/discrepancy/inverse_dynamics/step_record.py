@@ -1,0 +1,125 @@
+"""A step of a diagnosis and its candidates, as an answer records them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from model.arrays import Floats
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step
+from model.discrepancy.grounds import Reason
+from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
+from model.discrepancy.inverse_dynamics.judging import Judgement, needed_lead
+from model.discrepancy.inverse_dynamics.localisation import locate
+from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
+from model.discrepancy.inverse_dynamics.search import Findings, Fitted
+from model.discrepancy.inverse_dynamics.standing import Standing
+from model.machine_model.model import Model
+
+SHOWN = 12
+"""Most candidates that a step lists."""
+ABOVE_NOISE = 1.2
+"""Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
+removed."""
+
+
+def record_step(standing: Standing, found: Findings, judgement: Judgement, refused: Sequence[Fitted]) -> Step:
+    """The step that a judged candidate is.
+
+    Args:
+        standing: before the step. found: what the step's search found.
+        refused: candidates of this step that were not taken before; they are no rivals.
+    """
+    model, case, chosen, compared = standing.model, standing.case, judgement.chosen, judgement.comparison
+    rivals = _rivals(standing, found, chosen, refused)
+    return Step(
+        effect=chosen.effect,
+        joints=chosen.joints,
+        parameters=found_values(chosen.fit, chosen.parameters),
+        evidence=chosen.evidence,
+        evidence_held_out=judgement.told if case.held_out else None,
+        margin=chosen.evidence - max([0.0, *(r.evidence for r in rivals)]),
+        candidates=list_candidates(case, found),
+        group=_group(case, chosen, rivals),
+        rmse_fit=signal_errors(model, compared.fitted_before, compared.fitted_after, case.noise),
+        rmse_holdout=signal_errors(model, compared.before, compared.after, case.noise) if case.held_out else (),
+        excess_removed_holdout=(
+            _excess_removed(case.noise, compared.fitted_before, compared.before, compared.after)
+            if case.held_out
+            else None
+        ),
+        where=locate(standing.now, case),
+        reason=UNWRITTEN,
+        reason_data=Reason(removed=compared.removed, slides=_slides(model, chosen.joints)),
+        adopted=judgement.refusal is None,
+        refusal=judgement.refusal,
+    )
+
+
+def list_candidates(case: TorqueCase, found: Findings) -> tuple[Candidate, ...]:
+    """The candidates of a step: fitted ones, best first, then those that were probed alone, `SHOWN` at most."""
+    fitted = [_candidate(case, c) for c in found.fitted[:SHOWN]]
+    done = {(c.effect, c.joints) for c in found.fitted}
+    cost = float(np.log(max(case.stretches.samples, 2)))
+    others = [
+        Candidate(effect=p.trial.effect, joints=p.trial.joints, evidence=p.gain - p.trial.size * cost)
+        for p in found.probed
+        if (p.trial.effect, p.trial.joints) not in done
+    ]
+    return (*fitted, *others[: max(0, SHOWN - len(fitted))])
+
+
+def _candidate(case: TorqueCase, c: Fitted) -> Candidate:
+    squares = holdout.mean_squares(case.stretches, c.fit.residual)
+    values = {p.name: FoundValue.of(p, c.fit.values[p.name]) for p in c.parameters}
+    return Candidate(
+        effect=c.effect,
+        joints=c.joints,
+        evidence=c.evidence,
+        refitted=True,
+        misfit=float(np.nanmean(squares / case.noise**2)),
+        parameters=values,
+    )
+
+
+def _rivals(standing: Standing, found: Findings, chosen: Fitted, refused: Sequence[Fitted]) -> list[Fitted]:
+    """Other effects that may explain the same torques: those that stand, and where changes of a torque are followed,
+    those of which the records do not tell."""
+    rivals = [c for c in found.fitted if not any(c is one for one in refused)]
+    if chosen.effect in OF_CHANGES:
+        rivals += [c for c in found.unresolved if c.effect in OF_CHANGES and c.joints == chosen.joints]
+    return [c for c in rivals if c.rivals(chosen) and not c.imitates(chosen, standing.now)]
+
+
+def _group(case: TorqueCase, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[Candidate, ...]:
+    """The candidate and the rivals that are too near to name it alone, the best one of each effect; none without."""
+    near = [r for r in rivals if chosen.evidence - r.evidence < needed_lead(case.options, chosen, r)]
+    if not near:
+        return ()
+    group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
+    return tuple(_candidate(case, c) for c in group)
+
+
+def _excess_removed(noise: Floats, fitted: Floats, before: Floats, after: Floats) -> float | None:
+    """Share of the held-out variance above noise that is gone, joints weighted by their fitted mean square.
+
+    Args:
+        noise: (n,) standard deviation of a residual of which only noise is left. fitted: (n,) mean squares on the
+            fitted records. before, after: (n,) on held-out ones.
+    """
+    variance = noise**2
+    excess = np.maximum(before - variance, 1e-300)
+    usable = np.isfinite(before) & np.isfinite(after) & (before > ABOVE_NOISE * variance)
+    if not usable.any():
+        return None
+    weight = np.where(usable, 1 / np.maximum(fitted, 1e-300), 0.0)
+    return float((weight * (before - after))[usable].sum() / (weight * excess)[usable].sum())
+
+
+def _slides(model: Model, joints: tuple[int, ...]) -> bool:
+    """Whether all joints of an effect, or of the machine for an effect without any, are prismatic."""
+    machine = model.machine
+    return all(machine.joint(j).kind == "prismatic" for j in joints or machine.modelled_joints)
