@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.inverse_dynamics.holdout import mean_squares
 from model.discrepancy.inverse_dynamics.likelihood import minus_twice_log_likelihood, noise_model
 from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
 from model.inverse_dynamics.drive_timing import DELAY, MOST
@@ -22,6 +25,10 @@ accelerations, or a gear that rattles, is fast."""
 SLOWER = 0.5
 """Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
 the fifth power of the cutoff, so 3 % of it is left there."""
+NO_NOISE = 5.0
+"""Residual, in noise floors, that is not noise: sound rigs leave up to 2.3."""
+HALF = 0.5
+"""Share of its mean square that such an effect leaves at most."""
 AT_BOUND = 1.01
 """Ratio to its lower bound below which a speed is the bound's."""
 AT_END = 1e-6
@@ -38,13 +45,24 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     """
     if found.effect == DELAY and _may_be_timing(found):
         return False
-    if any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
+    plain = _takes_half_of_what_is_no_noise(found, before, case)
+    if not plain and any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
         return False
     if any(_ends_at_bound(p, found.fit.values[p.name]) for p in found.parameters):
         return False
     if not is_far_everywhere(found.stated, found.fit.values):
         return False
-    return found.effect not in OF_CHANGES or slower_evidence(found, before, case) >= case.options.least_evidence
+    if found.effect not in OF_CHANGES or plain:
+        return True
+    return slower_evidence(found, before, case) >= case.options.least_evidence
+
+
+def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
+    """Whether on every joint of an effect five times the noise is left without it, and half of that with it: no noise
+    imitates that, however fast it is."""
+    own = np.array([j in found.joints for j in found.model.machine.modelled_joints])
+    first, last = (mean_squares(case.stretches, fit.residual)[own] for fit in (before, found.fit))
+    return bool(own.any() and (first > (NO_NOISE * case.noise[own]) ** 2).all() and (last < HALF * first).all())
 
 
 def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> float:
@@ -79,9 +97,9 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
 
 
 def _ends_at_bound(p: Parameter, value: float) -> bool:
-    """Whether a size ended at the end of what it may be, where a fit would go on: no machine has it, and what it takes
-    is something else."""
-    if p.null is None or p.effect == "supply_limit":  # whose records bound it
+    """Whether a size, or the rate of a tone, ended at the end of what it may be, where a fit would go on: no machine
+    has it, and what it takes is something else. The slowest ripple is a spring."""
+    if p.effect == "supply_limit" or (p.null is None and p.rate_of is None):  # records bound a limit
         return False
     ends = [bound for bound in (p.low, p.high) if math.isfinite(bound) and bound != p.null]
     return any(abs(value - end) <= AT_END * abs(end) for end in ends)
