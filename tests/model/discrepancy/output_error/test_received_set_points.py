@@ -152,7 +152,7 @@ def test_lost_set_points_are_counted_though_the_drive_stands_at_its_limit_a_thir
 def test_of_any_controller_nothing_but_its_lost_set_points_is_proved_to_a_factor_of_two(
     seed: int, lost: float, p: float, share: float
 ) -> None:
-    """At its limit a drive hides some of them, which count as arrived; slow ones differ by little more than its step."""
+    """At its limit a drive hides some of them, which count as arrived; slow ones differ by about its step."""
     loop = limited(Loop(gains=(p, 0.0, 0.03 * p), lost=lost), seed, 500, share)
     trace, true = recorded(loop, seed, 500)
     found = checked(trace, machine_of(loop))
