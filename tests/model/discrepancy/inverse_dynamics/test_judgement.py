@@ -53,6 +53,16 @@ def test_most_of_a_residual_far_above_noise_is_named_on_less_evidence() -> None:
     assert slide(large[0], None, asked).steps == (), "on no other record has it been seen"
 
 
+@pytest.mark.parametrize(("coulomb", "suspected"), [(0.006, False), (0.014, True)])
+def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
+    """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
+    found = slide(*traces(coulomb=coulomb), TorqueOptions(effects=FRICTION, least_evidence=1e6))
+    assert found.candidates[0].effect == "coulomb_friction"
+    assert found.candidates[0].evidence > 12.0
+    assert (found.suspicion is not None) is suspected, found.summary
+    assert found.verdict == ("suspected" if suspected else "nothing-significant")
+
+
 @pytest.mark.parametrize("share", [LEAST_OF_TORQUE, 0.05])
 def test_noise_is_a_share_of_the_torque_of_the_drive_at_least(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(diagnose, "LEAST_OF_TORQUE", share)
