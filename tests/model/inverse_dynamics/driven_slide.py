@@ -11,7 +11,7 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_moti
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine, trace_of
 
 PERIOD, CUTOFF = 0.004, 6.0
-TIME = PERIOD * np.arange(2000)
+TIME: Floats = np.arange(2000, dtype=np.float64) * PERIOD
 
 
 def controlled(period: float = PERIOD) -> Machine:

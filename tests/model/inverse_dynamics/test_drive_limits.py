@@ -21,7 +21,7 @@ def at_limit(drive: Floats) -> list[int]:
 
 def with_runs(*runs: tuple[int, int, float]) -> Floats:
     """A wave with stretches (first, count) of one value."""
-    drive = WAVE.copy()
+    drive: Floats = WAVE.copy()
     for first, count, value in runs:
         drive[first : first + count] = value
     return drive

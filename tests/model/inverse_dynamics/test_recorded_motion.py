@@ -123,7 +123,7 @@ def test_a_limit_acts_on_a_drive_that_acts_late_as_well(late: float) -> None:
 
 def standing(stretch: float, every: float, size: float = 9.0) -> Floats:
     """A drive (k,) that swings, and stands at ± `size` for `stretch` s once in `every` s."""
-    drive = 4.0 * np.sin(2.7 * TIME)
+    drive: Floats = 4.0 * np.sin(2.7 * TIME)
     for number, begin in enumerate(np.arange(0.5, TIME[-1] - 0.5, every)):
         drive[(begin <= TIME) & (begin + stretch > TIME)] = size * (-1) ** number
     return drive

@@ -84,7 +84,8 @@ def asking_for_more(trace: Trace) -> Trace:
 
 
 def test_what_a_drive_at_a_limit_does_not_give_is_no_effect_and_is_told() -> None:
-    found = slide(*(asking_for_more(trace) for trace in traces()))
+    training, held_out = (asking_for_more(trace) for trace in traces())
+    found = slide(training, held_out)
     assert not any(s.adopted for s in found.steps), found.summary
     assert found.verdict == "nothing-significant", found.summary
     (note,) = [note for note in found.notes_data if note.kind == "drive-at-limit"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ def recorded(loop: Loop, seed: int, count: int = 600) -> tuple[Trace, float]:
     drive = loop.outputs(used, position)
     record = TraceRecord(
         trace_id=f"made-{seed}",
-        created=outside_arm.record(outside_arm.drawn(1), 1, 1.0).record.created,
+        created=datetime(2020, 1, 1, tzinfo=UTC),
         software="-",
         source="imported",
         robot="outside",
@@ -101,8 +102,8 @@ def recorded(loop: Loop, seed: int, count: int = 600) -> tuple[Trace, float]:
     )
     moved = np.abs(np.diff(sent, prepend=sent[0])) > 3 * outside_arm.COUNT
     share = float((used != sent)[moved].sum() / max(1, moved.sum()))
-    columns = {"set_point": sent[:, None], "drive": drive[:, None]}
-    return Trace(record, (1,), PERIOD * np.arange(count), position[:, None], **columns), share
+    time: Floats = np.arange(count, dtype=np.float64) * PERIOD
+    return Trace(record, (1,), time, position[:, None], set_point=sent[:, None], drive=drive[:, None]), share
 
 
 def machine_of(loop: Loop, *, stated: bool = True) -> Machine:
