@@ -15,6 +15,10 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
+DIFFERENCE = 1e-3
+"""Step of the finite differences, as a share of a parameter's natural size. With less, derivatives by what takes no
+part, as the mass of a link that only turns about itself, are rounding, and a fit without priors ends where it began."""
+
 
 @dataclass(frozen=True)
 class TorqueProblem:
@@ -28,7 +32,7 @@ class TorqueProblem:
     @cached_property
     def balance(self) -> TorqueBalance:
         """The torque balance of all records."""
-        return TorqueBalance(self.model, self.records)
+        return TorqueBalance(self.model, self.records, difference=DIFFERENCE)
 
     @property
     def runs(self) -> Sequence[Sequence[slice]]:

@@ -68,6 +68,8 @@ class TorqueBalance:
     model: Model
     records: tuple[RecordedMotion, ...]
     _kept: dict[str, tuple[bytes, list[Any]]] = field(default_factory=dict, repr=False)
+    difference: float = DIFFERENCE
+    """Step of the finite differences, as a share of a parameter's natural size."""
 
     def residual(self, values: Mapping[str, float]) -> list[Floats]:
         """Torque needed of the motors less torque that they were driven with, N·m (N), low-passed, compared samples.
@@ -126,7 +128,7 @@ class TorqueBalance:
             half = 0.5 * EDGE * values[unknown.name]
             sides = (self.residual({**values, unknown.name: values[unknown.name] + s * half}) for s in (1, -1))
             return [(above - below) / (2 * half) for above, below in zip(*sides, strict=True)]
-        step = DIFFERENCE * unknown.scale
+        step = self.difference * unknown.scale
         if values[unknown.name] + step > unknown.high:
             step = -step
         moved = self.residual({**values, unknown.name: values[unknown.name] + step})

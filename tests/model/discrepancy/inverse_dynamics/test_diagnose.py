@@ -182,12 +182,14 @@ def test_the_refusal_of_an_effect_that_contradicts_the_file_says_by_how_much() -
 
 @pytest.mark.parametrize(("resistance", "constant"), [(2.4, 0.05), (2.3, 0.045)])
 def test_a_motors_stated_resistance_and_torque_constant_are_tolerances(resistance: float, constant: float) -> None:
-    """Both scale every torque. Without them the rotor's inertia, stated to 5 %, would have to be 20 % off and more."""
+    """Both scale every torque. Without them the rotor's inertia, stated to 5 %, would have to be 20 % off and more. Its
+    back-EMF constant is of the same magnet."""
     stated = rigs.bench_machine().model_dump()
     drive = stated["joints"][0]["drive"]
     drive["resistance"].update(deviation=0.2, low=0.1)
     drive["torque_constant"].update(deviation=0.005, low=0.001)
-    traces = [rigs.bench_trace(seed, {"resistance": resistance, "constant": constant}) for seed in (1, 2)]
+    magnet = {"constant": constant, "back_emf": constant}
+    traces = [rigs.bench_trace(seed, {"resistance": resistance, **magnet}) for seed in (1, 2)]
     found = diagnose_torques(base_model(Machine.model_validate(stated)), traces[:1], traces[1:])
     assert (found.verdict, found.steps) == ("nothing-significant", ()), found.summary
     names = ("motor.resistance", "motor.torque_constant", "motor.rotor_inertia")

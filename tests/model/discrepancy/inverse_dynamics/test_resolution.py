@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.resolution import is_far, is_far_everywhere
+from model.discrepancy.inverse_dynamics.resolution import _ends_at_bound, is_far, is_far_everywhere
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -140,6 +140,33 @@ def test_a_group_is_far_only_where_every_joint_of_it_is() -> None:
 def test_a_joint_is_far_where_one_of_its_numbers_is() -> None:
     own = [stated(0.3), replace(stated(0.3), name="joint1.coulomb_friction.other", part="other")]
     assert is_far_everywhere(own, {own[0].name: 50.0, own[1].name: 10.0})
+
+
+def sized(low: float, high: float, null: float | None = 0.0, effect: str = "coulomb_friction") -> Parameter:
+    """A size of an effect with these bounds."""
+    return replace(stated(0.3), low=low, high=high, null=null, effect=effect)
+
+
+@pytest.mark.parametrize(
+    ("p", "value", "at_end"),
+    [
+        (sized(0.0, 5.0), 5.0, True),
+        (sized(0.0, 5.0), 5.0 * (1 - 1e-7), True),
+        (sized(0.0, 5.0), 5.0 * (1 - 1e-5), False),
+        (sized(0.0, 5.0), 0.0, False),
+        (sized(-5.0, 5.0), -5.0, True),
+        (sized(-2.0, 5.0, null=5.0), 5.0, False),
+        (sized(-2.0, 5.0, null=5.0), -2.0, True),
+        (sized(0.0, np.inf), 1e12, False),
+        (sized(-np.inf, np.inf), -1e12, False),
+        (sized(-np.inf, 5.0), 5.0, True),
+        (sized(0.0, 5.0, null=None), 5.0, False),
+        (sized(1.0, 12.0, effect="supply_limit"), 1.0, False),
+    ],
+)
+def test_a_size_at_the_end_of_what_it_may_be_is_not_resolved(p: Parameter, value: float, at_end: bool) -> None:
+    """An end at which the effect does nothing, none at infinity, and numbers that only shape an effect do not count."""
+    assert _ends_at_bound(p, value) is at_end
 
 
 def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> None:

@@ -1,0 +1,100 @@
+"""When an effect that has the evidence is taken, and when it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq.contracts.trace import Trace
+from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.explanation.renderer import refusal_words
+from model.discrepancy.inverse_dynamics import diagnose
+from model.discrepancy.inverse_dynamics.diagnose import LEAST_OF_TORQUE, diagnose_torques
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.machine_model.model import base_model
+from tests.model.discrepancy.inverse_dynamics import rigs
+
+FRICTION = ("coulomb_friction",)
+
+
+def slide(training: Trace, held_out: Trace | None = None, options: TorqueOptions | None = None) -> Diagnosis:
+    other = [] if held_out is None else [held_out]
+    return diagnose_torques(base_model(rigs.slide_machine()), [training], other, options)
+
+
+def traces(**hidden: float) -> tuple[Trace, Trace]:
+    return rigs.slide_trace(1, hidden), rigs.slide_trace(2, hidden)
+
+
+def test_an_effect_that_leaves_more_held_out_than_the_model_as_given_is_refused() -> None:
+    """The axis carried a kilogram in the training record alone. The fit of its stated mass follows that, and friction,
+    which both records have, makes up for a part of what the mass then costs held out."""
+    training, held_out = rigs.slide_trace(1, {"mass": 13.0, "coulomb": 3.0}), rigs.slide_trace(2, {"coulomb": 3.0})
+    found = slide(training, held_out, TorqueOptions(effects=FRICTION))
+    (step,) = found.steps
+    assert (step.effect, step.adopted) == ("coulomb_friction", False), found.summary
+    assert step.refusal is not None
+    assert step.refusal.kind == "worse-than-given"
+    assert step.refusal.numbers["share"] > 0.0
+    assert "larger than with the model as given" in refusal_words(step.refusal)
+    assert found.model_after.effects == found.model_before.effects
+
+
+def test_most_of_a_residual_far_above_noise_is_named_on_less_evidence() -> None:
+    """So much evidence is asked for that no record of this length could bring it."""
+    asked = TorqueOptions(effects=FRICTION, least_evidence=1e6)
+    large, small = traces(coulomb=8.0), traces(coulomb=0.5)
+    found = slide(*large, asked)
+    assert [(s.effect, s.adopted) for s in found.steps] == [("coulomb_friction", True)], found.summary
+    assert found.steps[0].evidence < 1e6
+    assert slide(*small, asked).steps == (), "a residual near noise is explained as well, and is not plain to see"
+    assert slide(large[0], None, asked).steps == (), "on no other record has it been seen"
+
+
+@pytest.mark.parametrize(("coulomb", "suspected"), [(0.006, False), (0.014, True)])
+def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
+    """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
+    found = slide(*traces(coulomb=coulomb), TorqueOptions(effects=FRICTION, least_evidence=1e6))
+    assert found.candidates[0].effect == "coulomb_friction"
+    assert found.candidates[0].evidence > 12.0
+    assert (found.suspicion is not None) is suspected, found.summary
+    assert found.verdict == ("suspected" if suspected else "nothing-significant")
+
+
+@pytest.mark.parametrize("share", [LEAST_OF_TORQUE, 0.05])
+def test_noise_is_a_share_of_the_torque_of_the_drive_at_least(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnose, "LEAST_OF_TORQUE", share)
+    training, held_out = traces()
+    assert training.drive is not None
+    found = slide(training, held_out, TorqueOptions(effects=FRICTION))
+    floor, least = found.rmse_fit[0].floor, share * float(np.sqrt(np.mean(training.drive**2)))
+    assert floor >= 0.95 * least
+    if share > 0.01:
+        assert floor == pytest.approx(least, rel=0.05)
+
+
+def asking_for_more(trace: Trace) -> Trace:
+    """The record of a drive that asked for its largest force, 1.3 times what acted, wherever much was needed."""
+    assert trace.drive is not None
+    limit = float(np.quantile(np.abs(trace.drive), 0.93))
+    at = np.abs(trace.drive) > limit
+    return replace(trace, drive=np.where(at, np.sign(trace.drive) * 1.3 * limit, trace.drive))
+
+
+def test_what_a_drive_at_a_limit_does_not_give_is_no_effect_and_is_told() -> None:
+    training, held_out = (asking_for_more(trace) for trace in traces())
+    found = slide(training, held_out)
+    assert not any(s.adopted for s in found.steps), found.summary
+    assert found.verdict == "nothing-significant", found.summary
+    (note,) = [note for note in found.notes_data if note.kind == "drive-at-limit"]
+    ((joint, share),) = note.values["shares"]
+    assert joint == 1
+    assert share == pytest.approx(0.07, abs=0.02)
+    assert any("stands at its largest value" in text and "of joint 1's time" in text for text in found.notes)
+
+
+def test_without_a_limit_no_note_speaks_of_one() -> None:
+    found = slide(*traces(), TorqueOptions(effects=FRICTION))
+    assert not [note for note in found.notes_data if note.kind == "drive-at-limit"]

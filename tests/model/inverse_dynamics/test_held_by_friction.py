@@ -1,0 +1,90 @@
+"""Friction of a joint that hardly moves takes whatever holds it, up to its level."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from model.arrays import Floats
+from model.inverse_dynamics import torque_balance
+from model.inverse_dynamics.recorded_motion import RecordedMotion, low_pass
+from model.inverse_dynamics.torque_balance import _held_by_friction
+from tests.model.inverse_dynamics.driven_slide import TIME, motion_of
+
+
+def slow_at_reversals() -> RecordedMotion:
+    """The slide, of which a fifth is too slow to tell which way it moves."""
+    record = motion_of(np.sin(2.7 * TIME))
+    turning = np.array([0.02])
+    return replace(record, turning=turning, contact=np.clip(record.speed / turning, -1.0, 1.0))
+
+
+RECORD = slow_at_reversals()
+TURNS = RECORD.turns[:, 0]
+SHAPE = RECORD.speed.shape
+
+
+def held(left: Floats, level: float) -> Floats:
+    """What friction of this level leaves of a residual torque (k, 1)."""
+    return _held_by_friction(left, np.full(SHAPE, level), RECORD.contact, RECORD)
+
+
+def below_cutoff(torque: Floats) -> float:
+    """Root mean square of a torque (k, 1) below the cutoff, within passages."""
+    return float(np.sqrt(np.mean(low_pass(torque, RECORD.cutoff, RECORD.period)[TURNS] ** 2)))
+
+
+def noise(seed: int) -> Floats:
+    return np.random.default_rng(seed).standard_normal(SHAPE)
+
+
+def test_the_record_has_passages() -> None:
+    assert 0.1 < TURNS.mean() < 0.5
+
+
+@given(seed=st.integers(0, 10_000), level=st.floats(0.0, 5.0), size=st.floats(0.01, 10.0))
+def test_friction_takes_its_level_beside_the_mean_and_no_more_and_acts_at_passages_alone(
+    seed: int, level: float, size: float
+) -> None:
+    left = size * noise(seed) + size * np.sin(3.0 * RECORD.time)[:, None]
+    found = held(left, level)
+    assert np.array_equal(found[~TURNS], left[~TURNS])
+    asked = RECORD.mean_in_turn(left - level * RECORD.contact)
+    assert np.abs(found - asked)[TURNS].max() <= level + 1e-9
+
+
+def test_what_noise_leaves_at_passages_is_taken_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    def left_on_average() -> float:
+        return float(np.mean([below_cutoff(held(noise(seed), 2.0)) for seed in range(8)]))
+
+    taken = left_on_average()
+    monkeypatch.setattr(torque_balance, "HOLDING_ROUNDS", 0)
+    assert taken < 0.8 * left_on_average()
+
+
+def test_a_joint_that_friction_holds_leaves_nothing_at_all() -> None:
+    """A torque within the level at passages, and none elsewhere."""
+    left = np.where(RECORD.turns, 1.5 + 2.0 * RECORD.contact, 0.0)
+    assert below_cutoff(held(left, 2.0)) < 1e-9
+    assert below_cutoff(left) > 1.0
+
+
+def test_a_torque_beyond_the_level_is_left_less_the_level() -> None:
+    level, torque = 2.0, 9.0
+    found = held(np.full(SHAPE, torque) + level * RECORD.contact, level)
+    assert found[TURNS] == pytest.approx(torque - level)
+
+
+def test_friction_of_no_level_takes_nothing_of_the_mean() -> None:
+    left = np.sin(3.0 * RECORD.time)[:, None] + 0.1 * noise(4)
+    np.testing.assert_allclose(held(left, 0.0), np.where(RECORD.turns, RECORD.mean_in_turn(left), left))
+
+
+def test_a_joint_that_never_turns_leaves_what_it_left() -> None:
+    fast = replace(RECORD, speed=np.full(SHAPE, 1.0))
+    left = noise(5)
+    assert _held_by_friction(left, np.full(SHAPE, 2.0), RECORD.contact, fast) is left
