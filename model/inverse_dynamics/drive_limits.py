@@ -41,7 +41,7 @@ def pieces_of(at_limit: NDArray[np.bool_], longest: int) -> list[slice]:
     the limit, since what is asked for acts later."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], at_limit, [False])).astype(int)))
     return [
-        slice(first, min(first + longest, int(end) + LATER))
+        slice(first, first + longest if first + longest < end else int(end) + LATER)
         for begin, end in zip(edges[::2], edges[1::2], strict=True)
         for first in range(int(begin), int(end), longest)
     ]
