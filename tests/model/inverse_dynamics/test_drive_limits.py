@@ -75,7 +75,7 @@ def test_pieces_cover_every_stretch_and_little_else(mask: list[bool], longest: i
     covered = np.zeros(len(at) + LATER, dtype=bool)
     for piece in pieces:
         assert at[piece.start]
-        assert 1 <= piece.stop - piece.start <= longest
+        assert 1 <= piece.stop - piece.start <= longest + LATER
         covered[piece] = True
     later = np.zeros_like(covered)
     for lag in range(LATER + 1):
