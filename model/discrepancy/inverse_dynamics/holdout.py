@@ -88,9 +88,9 @@ def relative_torque_error(model: Model, values: Mapping[str, float], records: tu
 
 def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:
     """Share of the mean square that is gone on records not fitted to, over the joints whose mean square fell in the
-    fit."""
+    fit; 0 where nothing is known of these joints there, as where their drives are at limits all the time."""
     with np.errstate(invalid="ignore"):
-        affected = (fitted_after < (1 - AFFECTED) * fitted_before) & np.isfinite(before) & np.isfinite(after)
+        affected = (fitted_after < (1 - AFFECTED) * fitted_before) & (before > 0.0) & np.isfinite(after)
     if not affected.any():
         return 0.0
     return float(1 - np.mean(after[affected] / before[affected]))
