@@ -9,7 +9,7 @@ import pytest
 
 from daq.contracts.trace import Trace
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.holdout import held_out_squares
+from model.discrepancy.inverse_dynamics.holdout import held_out_squares, share_removed
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.machine_model.model import Model, base_model
@@ -64,3 +64,10 @@ def test_held_out_records_speak_for_an_effect_that_is_there_and_not_for_one_that
     assert told[6.0] is not None
     assert told[6.0] > 100.0
     assert told[0.0] is None or told[0.0] < 5.0
+
+
+def test_a_held_out_record_that_tells_nothing_of_a_joint_confirms_nothing() -> None:
+    """A drive at a limit all the time: nothing is left there, with an effect or without, since nothing is known."""
+    fitted_before, fitted_after = np.array([4.0, 1.0]), np.array([1.0, 1.0])
+    assert share_removed(fitted_before, fitted_after, np.array([0.0, 1.0]), np.array([0.0, 1.0])) == 0.0
+    assert share_removed(fitted_before, fitted_after, np.array([2.0, 1.0]), np.array([0.5, 1.0])) == pytest.approx(0.75)

@@ -169,6 +169,14 @@ def test_a_size_at_the_end_of_what_it_may_be_is_not_resolved(p: Parameter, value
     assert _ends_at_bound(p, value) is at_end
 
 
+def test_the_slowest_ripple_is_no_ripple() -> None:
+    """The rate of a tone only shapes it, yet at its bound a fit would go on: half a wave a turn is a spring."""
+    model = base_model(rigs.slide_machine()).with_effect("torque_ripple", (1,))
+    rate = model.parameter("joint1.torque_ripple.cycles")
+    assert _ends_at_bound(rate, rate.low)
+    assert not _ends_at_bound(rate, 2.0 * rate.low)
+
+
 def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> None:
     """White noise of the recorded force, which no file states and no reading shows."""
     draw = np.random.default_rng(5)
