@@ -64,7 +64,7 @@ class RecordedMotion:
         cutoff: of the torques' low-pass, Hz.
         edge, every: samples of the grid left out at both ends, and distance of the compared ones.
         moving: (m, n) False where a joint rests: friction then takes whatever value holds it, so the torque says
-            nothing. at_limit: (r, n) where the drive is at a limit that the machine file does not state
+            nothing. at_limit: (r, n) where the joint moves and its drive is at a limit that the file does not state
             (`drive_limits`), so that less may act than is recorded.
         own_speed: (n,) whether a joint's speed has a sensor of its own, without the errors of the position's.
     """
@@ -101,25 +101,31 @@ class RecordedMotion:
         left = torque.copy()
         for j, basis in enumerate(self._unknown_drives):
             moving = self.moving[:, j]
-            left[moving, j] -= basis @ (basis.T @ left[moving, j])
+            left[moving, j] -= left[moving, j] if basis is None else basis @ (basis.T @ left[moving, j])
         return left
 
+    @property
+    def not_known(self) -> Mask:
+        """(n,) joints whose drive is at such a limit for so much of the time that nothing is known of their torque."""
+        return np.array([basis is None for basis in self._unknown_drives])
+
     @cached_property
-    def _unknown_drives(self) -> list[Floats]:
-        """By joint, an orthonormal basis (moving, p) of the torques of `less_unknown`: all of them, where there are too
-        many pieces to know anything."""
-        found = []
+    def _unknown_drives(self) -> list[Floats | None]:
+        """By joint, an orthonormal basis (moving, p) of the torques of `less_unknown`; None where there are too many
+        pieces to know anything."""
+        found: list[Floats | None] = []
         wide, longest = _wide(self.cutoff, self.sampled), max(1, round(PIECE / self.cutoff / self.sampled))
         for j, moving in enumerate(self.moving.T):
             pieces = pieces_of(self.at_limit[:, j], longest)
+            if len(pieces) > MOST_UNKNOWN * moving.sum():
+                found.append(None)
+                continue
             pulses = np.zeros((len(self.at_limit), len(pieces)))
             for column, rows in enumerate(pieces):
                 pulses[rows, column] = 1.0
             shapes = self.compared(self._on_grid(low_pass(pulses, wide, self.sampled)))[moving]
             axes, sizes, _ = np.linalg.svd(shapes, full_matrices=False)
-            basis = axes[:, sizes > LEAST_SHAPE * sizes[:1].max(initial=1.0)]
-            known = basis.shape[1] <= MOST_UNKNOWN * moving.sum()
-            found.append(basis if known else np.eye(int(moving.sum())))
+            found.append(axes[:, sizes > LEAST_SHAPE * sizes[:1].max(initial=1.0)])
         return found
 
     def driven(self, late: Floats, limit: Floats, threshold: Floats) -> Floats:
@@ -227,7 +233,8 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
     edge = max(1, int(EDGE / cutoff / period))
     noise = readings.speed_noise(wide)
     turning = np.maximum(TURNING_NOISE * noise, 0.5 * period * np.median(np.abs(acceleration), axis=0)) + 1e-12
-    moving = _moving(speed, noise, period)[edge : len(time) - edge : every]
+    moves = _moving(speed, noise, period)
+    moving = moves[edge : len(time) - edge : every]
     if not moving.any():
         raise TraceError(f"trace {readings.name}: no joint moves beyond the noise of its readings")
     return RecordedMotion(
@@ -247,7 +254,7 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
         edge=edge,
         every=every,
         moving=moving,
-        at_limit=stands_at_limit(readings.drive, machine),
+        at_limit=stands_at_limit(readings.drive, machine) & np.repeat(moves, thin, axis=0)[: len(readings.drive)],
         own_speed=readings.has_own_speed,
     )
 

@@ -34,11 +34,14 @@ def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
     whole = next_fast_len(count + 2 * padding, real=True)
     after = min(count - 1, whole - count - padding)
     whole = count + padding + after
-    before = 2 * signal[0] - signal[padding:0:-1]
-    behind = 2 * signal[-1] - signal[-2 : -after - 2 : -1]
+    # a line passes both ways unchanged; what is continued then ends where it begins, however far a wheel has turned
+    share = np.linspace(0.0, 1.0, count).reshape(-1, *([1] * (signal.ndim - 1)))
+    line = signal[0] + (signal[-1] - signal[0]) * share
+    level = signal - line
+    before, behind = -level[padding:0:-1], -level[-2 : -after - 2 : -1]
     gain = _gain(2 * cutoff * period, whole).reshape(-1, *([1] * (signal.ndim - 1)))
-    spectrum = rfft(np.concatenate([before, signal, behind]), axis=0)
-    return np.asarray(irfft(spectrum * gain, whole, axis=0)[padding : padding + count])
+    spectrum = rfft(np.concatenate([before, level, behind]), axis=0)
+    return np.asarray(line + irfft(spectrum * gain, whole, axis=0)[padding : padding + count])
 
 
 def derivative(signal: Floats, period: float) -> Floats:

@@ -24,10 +24,11 @@ def _cutoff(v: Values) -> str:
 
 def _drive_at_limit(v: Values) -> str:
     shares = ", ".join(f"{share:.0%} of joint {joint}'s time" for joint, share in v["shares"])
+    unknown = ", ".join(map(str, v["not_examined"]))
     return (
         f"the recorded drive stands at its largest value ({shares}), where less may act than is recorded: how much "
         "less is found beside all else, and nothing is concluded from it"
-    )
+    ) + (f"; a record tells nothing of joint {unknown}, which is not examined there" if unknown else "")
 
 
 def _drive_timing(v: Values) -> str:

@@ -160,7 +160,10 @@ def _at_limits(standing: Standing) -> tuple[Note, ...]:
     shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=[np.ptp(r.time) for r in records])
     joints = standing.model.machine.modelled_joints
     found = [(joint, float(share)) for joint, share in zip(joints, shares, strict=True) if share > 0.0]
-    return (Note(kind="drive-at-limit", values={"shares": found}),) if found else ()
+    unknown = [
+        joint for joint, some in zip(joints, np.any([r.not_known for r in records], axis=0), strict=True) if some
+    ]
+    return (Note(kind="drive-at-limit", values={"shares": found, "not_examined": unknown}),) if found else ()
 
 
 def _timing(standing: Standing) -> tuple[Note, ...]:

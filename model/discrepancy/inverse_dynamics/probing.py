@@ -27,6 +27,8 @@ NONLINEAR = frozenset(
     }
 )
 """Effects whose torque is far from linear in their size."""
+ONE_SIDED = "one_sided_spring"
+"""The effect whose size changes its law with its sign."""
 SMALL = 1e-4
 """Share of its size at which any other effect is probed besides. What the tolerances took over of an effect would be
 there twice at its full size, and friction would hold a different part of it where a joint turns."""
@@ -111,6 +113,8 @@ class Prober:
         return float(-2 * change @ left - change @ change), shares
 
     def _outside(self, trial: Trial, name: str, share: float, start: Start, null: Start) -> bool:
+        if trial.effect == ONE_SIDED and share < 0.0:
+            return True  # a cable on the other side begins to pull elsewhere: another start
         p = next(p for p in trial.parameters if p.name == name)
         value = null[name] + share * (start[name] - null[name])
         room = 1e-9 * max(1.0, abs(value))

@@ -129,7 +129,7 @@ def _recorded(trace: Trace, machine: Machine, controller: SampledPid, joint: int
     drive = trace.drive[:, column]
     stated = of_joint(controller.drive_resolution, joint)
     resolution = max(FINEST * float(np.abs(drive).max()), _shown_step(drive)) if stated is None else stated.value
-    limited = np.abs(drive) >= min(_largest_output(machine, joint), _shown_limit(drive)) - 0.5 * resolution
+    limited = np.abs(drive) >= _largest_output(machine, joint, drive) - 0.5 * resolution
     sent = _rounded(trace.set_point[:, column], controller, joint)
     return _Recorded(sent, trace.position[:, column], drive, limited, resolution)
 
@@ -180,13 +180,15 @@ def _last_best(found: Sequence[_Found]) -> _Found:
     return max(reversed(found), key=lambda one: one.share)
 
 
-def _largest_output(machine: Machine, joint: int) -> float:
-    """The largest drive that the controller gives: as stated, else the largest voltage of its joint's motor."""
+def _largest_output(machine: Machine, joint: int, recorded: Floats) -> float:
+    """The largest drive that the controller gives: as stated, else the largest voltage of its joint's motor, or less
+    where the recorded drive (k,) shows a limit below that."""
     controller, drive = machine.controller, machine.joint(joint).drive
     stated = of_joint(controller.output_limit, joint) if isinstance(controller, SampledPid) else None
     if stated is not None:
         return stated.value
-    return abs(drive.dac_full_scale.value * drive.amplifier_gain.value) if isinstance(drive, DcMotor) else np.inf
+    most = abs(drive.dac_full_scale.value * drive.amplifier_gain.value) if isinstance(drive, DcMotor) else np.inf
+    return min(most, _shown_limit(recorded))
 
 
 def _shown_step(drive: Floats) -> float:

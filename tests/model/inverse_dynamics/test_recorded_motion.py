@@ -169,3 +169,12 @@ def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:
     assert share_left(record, np.sin(2.0 * TIME)) < 1e-20
     resting = record.less_unknown(np.ones((len(record.moving), 1)))[~record.moving[:, 0]]
     assert (resting == 1.0).all(), "samples at rest are not touched"
+
+
+def test_a_wheel_that_turns_many_times_is_low_passed_like_one_that_does_not() -> None:
+    """What the low-pass continues at one end must not reach the other: 100 rad of travel were 12 % of an acceleration."""
+    time = np.arange(0.0, 25.0, 0.004)
+    wave = 0.1 * np.sin(2 * np.pi * 0.7 * time)
+    inside = slice(100, -100)
+    turning = low_pass(wave + 4.0 * time, 36.0, 0.004) - 4.0 * time
+    assert np.abs(turning - low_pass(wave, 36.0, 0.004))[inside].max() < 1e-9
