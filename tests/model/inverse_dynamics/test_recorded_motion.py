@@ -172,7 +172,7 @@ def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:
 
 
 def test_a_wheel_that_turns_many_times_is_low_passed_like_one_that_does_not() -> None:
-    """What the low-pass continues at one end must not reach the other: 100 rad of travel were 12 % of an acceleration."""
+    """What is continued at one end must not reach the other: 100 rad of travel were 12 % of an acceleration."""
     time = np.arange(0.0, 25.0, 0.004)
     wave = 0.1 * np.sin(2 * np.pi * 0.7 * time)
     inside = slice(100, -100)
