@@ -12,6 +12,10 @@ AT_LIMIT = 1e-6
 """Share of its largest value within which a drive stands at it."""
 RUN = 3
 """Samples in a row at the largest value that show a limit: a motion passes its largest value once."""
+JUMP = 1.5
+"""Least jump to a limit or from it, in the smallest step between two sizes of the record."""
+SEVERAL = 10
+"""Fewest sizes of a drive that may be those of rounding; one that switches has a few, far apart."""
 LATER = 2
 """Samples by which a drive may act later than it is recorded, at most (`drive_timing`)."""
 MOST = 0.9
@@ -26,14 +30,32 @@ def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
     """
     found = np.zeros(drive.shape, dtype=bool)
     for column, joint in enumerate(machine.modelled_joints):
-        size = np.abs(drive[:, column])
-        if isinstance(machine.joint(joint).drive, DcMotor) or not size.any():
+        if isinstance(machine.joint(joint).drive, DcMotor):
             continue
-        at = size >= (1 - AT_LIMIT) * size.max()
-        runs = np.lib.stride_tricks.sliding_window_view(at, RUN).all(axis=1)
-        if runs.any() and at.mean() <= MOST:
+        at = at_shown_limit(drive[:, column])
+        if at.mean() <= MOST:
             found[:, column] = at
     return found
+
+
+def at_shown_limit(drive: Floats) -> NDArray[np.bool_]:
+    """(r,) where one recorded drive (r,) is at a limit that it shows itself; nowhere where it shows none.
+
+    It shows one by standing at its largest size for several samples, and by a jump to it or from it. A drive that is
+    rounded also stands at the top of a smooth motion, and comes there step by step.
+    """
+    size = np.abs(drive)
+    at = size >= (1 - AT_LIMIT) * size.max()
+    sizes = np.unique(size)
+    if len(sizes) < 2 or sizes[-1] == 0.0:
+        return np.zeros(len(drive), dtype=bool)
+    jump = JUMP * np.diff(sizes).min() if len(sizes) >= SEVERAL else 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], at, [False])).astype(int)))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        beside = size[max(begin - 1, 0)], size[min(end, len(size) - 1)]
+        if end - begin >= RUN and sizes[-1] - min(beside) > jump:
+            return np.asarray(at)
+    return np.zeros(len(drive), dtype=bool)
 
 
 def pieces_of(at_limit: NDArray[np.bool_], longest: int) -> list[slice]:

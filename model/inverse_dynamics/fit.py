@@ -35,7 +35,8 @@ from model.machine_model.model import Lineage, Model
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
 LEAST_LEFT = 1e-4
-"""Least residual that weighs the last round, as a share of the first: a record without noise leaves next to none."""
+"""Least residual that weighs a round, as a share of the drive's torque in the first and of the first in the last: a
+record without noise leaves next to none."""
 LONGEST_MEMORY = 40
 """Samples over which the whitening of residual torques looks back, at most: a low-passed residual is correlated."""
 
@@ -128,10 +129,13 @@ def fit_torques(
         progress(0.9 * (1 - float(np.exp(-count / 10))), f"{count} evaluations, residual {rms:.3g} of the first")
 
     search = Search(options.robust, options.tolerance, options.most_evaluations or 60, report_search)
-    found = solve(problem, [white(size) for size in _rms(first)], begin, cancel, search, coordinates)
+    # a joint of which no record tells anything has a residual of 0, which nothing is to be divided by
+    torques = np.array(_rms(np.concatenate(problem.balance.supplied_by_drive())))
+    begun = np.maximum(_rms(first), LEAST_LEFT * np.where(torques > 0.0, torques, 1.0))
+    found = solve(problem, [white(float(size)) for size in begun], begin, cancel, search, coordinates)
     # again, weighed by what is left: by the residual of the given model, priors would count too much
     left = np.concatenate([e.residual for e in problem.evaluate(found.values, derivatives=False)])
-    sizes = np.maximum(_rms(left), LEAST_LEFT * np.array(_rms(first)))
+    sizes = np.maximum(_rms(left), LEAST_LEFT * begun)
     found = solve(problem, [white(float(size)) for size in sizes], found.values, cancel, search, coordinates)
     parameters, report = _judge_parameters(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})

@@ -99,10 +99,12 @@ def _as_last_fitted(standing: Standing) -> tuple[Step, ...]:
 
 
 def _errors(standing: Standing, records: tuple[RecordedMotion, ...]) -> tuple[SignalError, ...]:
-    """Errors of every joint on these records, by the given model and by the one that comes out."""
+    """Errors of every joint on these records, by the given model and by the one that comes out; none of a joint of
+    which no record tells anything."""
     if not records:
         return ()
-    before = holdout.held_out_squares(standing.given, {}, records)
+    untold = np.all([r.not_known for r in records], axis=0)
+    before = np.where(untold, np.nan, holdout.held_out_squares(standing.given, {}, records))
     after = holdout.held_out_squares(standing.model, standing.now.values, records)
     return signal_errors(standing.model, before, after, standing.case.noise)
 

@@ -58,15 +58,17 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     Args:
         refused: candidates of the same step that were not taken before it.
     """
-    told = evidence_held_out(standing, chosen)
-    if chosen.evidence <= 0 or chosen.evidence + told < needed_evidence(standing, chosen):
+    if chosen.evidence <= 0:
+        return None
+    told, most = evidence_held_out(standing, chosen), explains_most(standing, chosen)
+    if chosen.evidence + told < needed_evidence(standing, chosen, explains_most=most):
         return None
     if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
         return None
     comparison = compare(standing, chosen)
     if comparison is None:
         return None
-    return Judgement(comparison, told, _refusal(standing, comparison))
+    return Judgement(comparison, told, _refusal(standing, comparison, explains_most=most))
 
 
 def evidence_held_out(standing: Standing, chosen: Fitted) -> float:
@@ -76,15 +78,15 @@ def evidence_held_out(standing: Standing, chosen: Fitted) -> float:
     return holdout.evidence(standing.now, chosen.fit, standing.case.held_out)
 
 
-def needed_evidence(standing: Standing, chosen: Fitted) -> float:
-    """Evidence from which a candidate is named.
+def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) -> float:
+    """Evidence from which a candidate is named. explains_most: whether it takes most of what is left.
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
     least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
     """
     options = standing.case.options
     least = options.least_evidence
-    if _explains_most(standing, chosen):
+    if explains_most:
         least = min(least, SUSPECTED)
     least -= chosen.relief * max(least - SUSPECTED, 0.0)
     return least + options.echo * _collected(standing, chosen.joints)
@@ -104,7 +106,7 @@ def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
     return sum(s.evidence + (s.evidence_held_out or 0.0) for s in near)
 
 
-def _explains_most(standing: Standing, chosen: Fitted) -> bool:
+def explains_most(standing: Standing, chosen: Fitted) -> bool:
     """Whether an effect takes most of a residual far above noise, on the records fitted to and on held-out ones.
 
     A slow residual has few independent samples, so that evidence alone would ask for a longer record of what is plain
@@ -124,15 +126,16 @@ def _explains_most(standing: Standing, chosen: Fitted) -> bool:
     )
 
 
-def _refusal(standing: Standing, comparison: Comparison) -> Refusal | None:
+def _refusal(standing: Standing, comparison: Comparison, *, explains_most: bool) -> Refusal | None:
     """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
-    for another machine than the file describes. An effect that is there brings stated numbers back."""
+    for another machine than the file describes. An effect that is there brings stated numbers back; one that explains
+    most of what is left is there, whatever it does to them."""
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})
-    if tolerances(standing.model)[1] != "stated" or _explains_most(standing, chosen):
+    if tolerances(standing.model)[1] != "stated" or explains_most:
         return None
     farthest = _farthest_newly_off(standing, chosen)
     return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None

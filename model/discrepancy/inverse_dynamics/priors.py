@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,17 +20,14 @@ believed to that difference."""
 
 
 def prior_cost(unknowns: Sequence[Unknown], values: Mapping[str, float]) -> float:
-    """Σ d², with d the distance of every number from what is expected, in deviations (`prior_distance`)."""
-    tied = _magnets(unknowns)
-    alone = sum(
-        prior_distance(u, values[u.name])[0] ** 2
-        for k, u in enumerate(unknowns)
-        if u.deviation is not None and k not in tied
-    )
-    return alone + sum(
-        _magnet_distance(unknowns[c], unknowns[k], values[unknowns[c].name], values[unknowns[k].name])[0] ** 2
-        for k, c in tied.items()
-    )
+    """Σ d², with d the distance of every number from what is expected, in deviations (`prior_distance`), and of the two
+    constants of a magnet from each other."""
+    magnets = _magnets(unknowns)
+    replaced = {magnet.loose for magnet in magnets}
+    alone = (u for k, u in enumerate(unknowns) if u.deviation is not None and k not in replaced)
+    at = np.array([values[u.name] for u in unknowns])
+    own = sum(prior_distance(u, values[u.name])[0] ** 2 for u in alone)
+    return own + sum(_distance_apart(unknowns, magnet, at)[0] ** 2 for magnet in magnets)
 
 
 def prior_distance(u: Unknown, value: float) -> tuple[float, float]:
@@ -51,41 +49,56 @@ def prior_distance(u: Unknown, value: float) -> tuple[float, float]:
 
 def prior_rows(unknowns: Sequence[Unknown], at: Floats) -> tuple[Floats, Floats]:
     """Rows (c, p) and right-hand sides (c,) that hold unknowns near their expected values, linearised at `at` (p,)."""
-    claimed = [k for k, u in enumerate(unknowns) if u.deviation is not None]
-    tied = _magnets(unknowns)
-    rows, aims = np.zeros((len(claimed), len(unknowns))), np.zeros(len(claimed))
+    magnets = _magnets(unknowns)
+    replaced = {magnet.loose for magnet in magnets}
+    claimed = [k for k, u in enumerate(unknowns) if u.deviation is not None and k not in replaced]
+    count = len(claimed) + len(magnets)
+    rows, aims = np.zeros((count, len(unknowns))), np.zeros(count)
     for row, k in enumerate(claimed):
-        if k in tied:
-            c = tied[k]
-            distance, rows[row, c], rows[row, k] = _magnet_distance(
-                unknowns[c], unknowns[k], float(at[c]), float(at[k])
-            )
-        else:
-            distance, rows[row, k] = prior_distance(unknowns[k], float(at[k]))
+        distance, rows[row, k] = prior_distance(unknowns[k], float(at[k]))
+        aims[row] = -distance
+    for row, magnet in enumerate(magnets, start=len(claimed)):
+        distance, rows[row, magnet.torque], rows[row, magnet.back] = _distance_apart(unknowns, magnet, at)
         aims[row] = -distance
     return rows, aims
 
 
-def _magnets(unknowns: Sequence[Unknown]) -> dict[int, int]:
-    """By index of a back-EMF constant that is expected, the index of the torque constant of the same motor."""
-    of_torque = {
-        u.parameter.joints: k
-        for k, u in enumerate(unknowns)
-        if u.parameter.part == "torque_constant" and u.parameter.component == "motor" and u.expected > 0.0
-    }
-    return {
-        k: of_torque[u.parameter.joints]
-        for k, u in enumerate(unknowns)
-        if u.parameter.part == "back_emf_constant"
-        and u.parameter.component == "motor"
-        and u.deviation is not None
-        and u.expected > 0.0
-        and u.parameter.joints in of_torque
-    }
+class _Magnet(NamedTuple):
+    """Indices of a motor's torque constant and back-EMF constant, and of the one that is stated less exactly: being of
+    one magnet says of that one what the other's deviation says of both."""
+
+    torque: int
+    back: int
+    loose: int
 
 
-def _magnet_distance(torque: Unknown, back: Unknown, constant: float, back_emf: float) -> tuple[float, float, float]:
-    """Distance between both constants of a magnet, in deviations, and its derivatives by both."""
+def _magnets(unknowns: Sequence[Unknown]) -> list[_Magnet]:
+    """The magnets of which both constants are unknowns and something is expected of the back-EMF constant."""
+    of_motors = {
+        (u.parameter.part, u.parameter.joints): k
+        for k, u in enumerate(unknowns)
+        if u.parameter.component == "motor" and u.expected > 0.0
+    }
+    found = []
+    for (part, joints), torque in of_motors.items():
+        back = of_motors.get(("back_emf_constant", joints))
+        if part != "torque_constant" or back is None or unknowns[back].deviation is None:
+            continue
+        looser = _share(unknowns[torque]) > _share(unknowns[back])
+        found.append(_Magnet(torque, back, torque if looser else back))
+    return found
+
+
+def _share(u: Unknown) -> float:
+    """Deviation of a number as a share of what is expected; infinite where nothing is stated of it."""
+    return math.inf if u.deviation is None else u.deviation / u.expected
+
+
+def _distance_apart(unknowns: Sequence[Unknown], magnet: _Magnet, at: Floats) -> tuple[float, float, float]:
+    """Distance between both constants of a magnet at `at` (p,), in deviations, and its derivatives by torque constant
+    and back-EMF constant."""
+    torque, back = unknowns[magnet.torque], unknowns[magnet.back]
+    constant, back_emf = float(at[magnet.torque]), float(at[magnet.back])
     apart = max(SAME_MAGNET, abs(math.log(back.expected / torque.expected)))
     least = max(back_emf, NEXT_TO_NONE * back.expected)
     distance = math.log(least / back.expected) - math.log(constant / torque.expected)

@@ -26,7 +26,8 @@ SLOWER = 0.5
 """Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
 the fifth power of the cutoff, so 3 % of it is left there."""
 NO_NOISE = 5.0
-"""Residual, in noise floors, that is not noise: sound rigs leave up to 2.3."""
+"""Residual, in noise floors, that is not noise. Sound rigs leave up to 2.6, but for those whose current loop runs out
+of voltage: what is left there is no noise either (decision 0065)."""
 HALF = 0.5
 """Share of its mean square that such an effect leaves at most."""
 AT_BOUND = 1.01

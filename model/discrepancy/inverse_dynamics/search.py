@@ -106,23 +106,24 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    found = _refined(_weigh(found, now, places))
+    found = _refined(_weigh(found, now, places), cancel)
     weighed = _weigh(found, now, places)
     while weighed and len(weighed[0].joints) > 1:
         stop_if(cancel)
         fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        found += _refined([_fit_effect(fitted_model, now, slopes, p) for p in fewer])
+        found += _refined([_fit_effect(fitted_model, now, slopes, p) for p in fewer], cancel)
         weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
 
 
-def _refined(found: Sequence[Fitted]) -> list[Fitted]:
+def _refined(found: Sequence[Fitted], cancel: Cancel) -> list[Fitted]:
     """The candidates, of which the first have been fitted on with derivatives of their own: those that were reused are
     of another place, and a number that the tolerances had taken far off does not come back by them."""
     refined = []
     for one in found[:REFINED]:
+        stop_if(cancel)
         last = one.fit
         fitted = fit(last.balance, last.unknowns, last.values, last.data, last.noise.memory)
         refined.append(replace(one, fit=fitted))

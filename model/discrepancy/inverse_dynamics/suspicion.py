@@ -6,7 +6,13 @@ import numpy as np
 
 from model.discrepancy.diagnosis import Suspicion
 from model.discrepancy.inverse_dynamics.comparison import compare
-from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, evidence_held_out, needed_evidence
+from model.discrepancy.inverse_dynamics.judging import (
+    CHANCES,
+    SUSPECTED,
+    evidence_held_out,
+    explains_most,
+    needed_evidence,
+)
 from model.discrepancy.inverse_dynamics.search import Findings
 from model.discrepancy.inverse_dynamics.standing import Standing
 
@@ -24,9 +30,11 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
     """
     case = standing.case
     for chosen in found.fitted[:CHANCES]:
+        if chosen.evidence <= 0:
+            continue
         total = chosen.evidence + evidence_held_out(standing, chosen)
-        needed = needed_evidence(standing, chosen)
-        if chosen.evidence <= 0 or not SUSPECTED <= total < needed:
+        needed = needed_evidence(standing, chosen, explains_most=explains_most(standing, chosen))
+        if not SUSPECTED <= total < needed:
             continue
         comparison = compare(standing, chosen)
         if comparison is None or comparison.removed < max(SUSPECTED_SHARE, case.options.least_share):

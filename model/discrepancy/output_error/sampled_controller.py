@@ -17,6 +17,7 @@ from daq.contracts.machine import DcMotor, Machine, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.output_error.controller_law import ControllerLaw, Scale
+from model.inverse_dynamics.drive_limits import SEVERAL, at_shown_limit
 
 LEAST_AGREEMENT = 0.95
 """Least share of samples whose drive must be the controller's, to rounding, for a record to prove anything: below it
@@ -188,26 +189,18 @@ def _largest_output(machine: Machine, joint: int, recorded: Floats) -> float:
     if stated is not None:
         return stated.value
     most = abs(drive.dac_full_scale.value * drive.amplifier_gain.value) if isinstance(drive, DcMotor) else np.inf
-    return min(most, _shown_limit(recorded))
+    return min(most, float(np.abs(recorded).max())) if at_shown_limit(recorded).any() else most
 
 
 def _shown_step(drive: Floats) -> float:
     """The step in which a recorded drive changes; 0 where its values are not all whole numbers of one."""
     values = np.unique(drive)
-    if len(values) < 3 or len(values) > ROUNDED_SHARE * len(drive):
+    if len(values) < SEVERAL or len(values) > ROUNDED_SHARE * len(drive):
         return 0.0
     apart = np.diff(values)
     step = float(apart[apart > 1e-9 * np.abs(values).max()].min(initial=np.inf))
     whole = values / step
     return step if np.abs(whole - np.round(whole)).max() < 0.01 else 0.0
-
-
-def _shown_limit(drive: Floats) -> float:
-    """The largest drive of a record, where it stands there for several samples; else none."""
-    size = np.abs(drive)
-    at = size >= (1 - 1e-6) * size.max()
-    runs = at[2:] & at[1:-1] & at[:-2]
-    return float(size.max()) if runs.any() and size.max() > 0.0 else np.inf
 
 
 def _line(drive: Floats, formed: Floats, resolution: float, *, offset: bool) -> Scale:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from model.arrays import Floats
-from model.inverse_dynamics.drive_limits import LATER, pieces_of, stands_at_limit
+from model.inverse_dynamics.drive_limits import LATER, at_shown_limit, pieces_of, stands_at_limit
 from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, six_machine, slide_machine
 
 WAVE = np.sin(0.05 * np.arange(600))
@@ -91,3 +91,19 @@ def test_a_stretch_is_cut_into_pieces_that_reach_a_little_beyond_its_end() -> No
     assert pieces_of(at, 6) == [slice(4, 10), slice(10, 14 + LATER), slice(20, 21 + LATER)]
     assert pieces_of(at, 20) == [slice(4, 14 + LATER), slice(20, 21 + LATER)]
     assert pieces_of(np.zeros(5, dtype=bool), 4) == []
+
+
+def test_the_rounded_top_of_a_smooth_motion_is_no_limit_and_a_cut_one_is() -> None:
+    """A drive that is rounded comes to the top of a swing step by step; where it is cut off, it jumps there."""
+    time = np.arange(0.0, 4.0, 0.001)
+    swing = 3.0 * np.sin(2 * np.pi * 0.9 * time) + 0.5 * np.sin(2 * np.pi * 5.0 * time)
+    rounded = 0.01 * np.round(swing / 0.01)
+    assert (np.abs(rounded) == np.abs(rounded).max()).sum() > 3
+    assert not at_shown_limit(rounded).any()
+    steep = 0.01 * np.round(np.clip(40.0 * swing, -3.0, 3.0) / 0.01)
+    assert at_shown_limit(steep).mean() > 0.5
+
+
+@pytest.mark.parametrize("drive", [np.zeros(20), np.full(20, 2.0)])
+def test_a_drive_of_one_size_shows_no_limit(drive: Floats) -> None:
+    assert not at_shown_limit(drive).any()

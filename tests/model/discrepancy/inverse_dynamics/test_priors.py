@@ -55,11 +55,11 @@ def test_a_back_emf_constant_that_moves_alone_costs_far_more_than_is_stated_of_i
 
 
 def test_a_file_that_states_two_different_numbers_is_believed_to_that_difference() -> None:
-    two = [constant(TORQUE, 0.05), constant(BACK, 0.06)]
+    two = [constant(TORQUE, 0.05), constant(BACK, 0.06, deviation=0.007)]
     assert cost(two, 0.05, 0.06) == 0.0
     assert cost(two, 0.05, 0.05) == pytest.approx(1.0)
     assert cost(two, 0.05, 0.072) == pytest.approx(1.0)
-    nearly = [constant(TORQUE, 0.05), constant(BACK, 0.05 * 1.002)]
+    nearly = [constant(TORQUE, 0.05), constant(BACK, 0.05 * 1.002, deviation=0.006)]
     assert cost(nearly, 0.05, 0.05 * 1.002 * 1.02) == pytest.approx((math.log(1.02) / SAME_MAGNET) ** 2)
 
 
@@ -82,10 +82,17 @@ def test_a_back_emf_constant_of_which_nothing_is_stated_is_free() -> None:
     assert prior_rows(free, np.array([0.05, 0.08]))[0].tolist() == [[pytest.approx(200.0), 0.0]]
 
 
-def test_a_free_torque_constant_still_leads_its_back_emf_constant() -> None:
+def test_of_a_torque_constant_of_which_nothing_is_stated_the_back_emf_constant_says_how_large_it_is() -> None:
     led = [constant(TORQUE, 0.05, deviation=None), constant(BACK, 0.05)]
-    assert cost(led, 0.08, 0.08) == pytest.approx(0.0, abs=1e-20)
+    assert cost(led, 0.08, 0.08) == pytest.approx((0.03 / 0.005) ** 2)
     assert cost(led, 0.08, 0.05) == pytest.approx((math.log(1.6) / SAME_MAGNET) ** 2)
+
+
+def test_the_constant_that_is_stated_more_exactly_speaks_for_both() -> None:
+    """A torque constant to 10 % and a back-EMF constant to 1 %: both 10 % high are ten deviations of the latter."""
+    exact = [constant(TORQUE, 0.05, deviation=0.005), constant(BACK, 0.05, deviation=0.0005)]
+    assert cost(exact, 0.055, 0.055) == pytest.approx(100.0)
+    assert cost(exact, 0.05, 0.05) == 0.0
 
 
 SEVERAL = [
