@@ -2,12 +2,12 @@
 
     python -m benchmarks worlds_trial --hashes                                                      # for a registration
     python -m benchmarks worlds_trial --registration docs/trial/worlds-1.toml --folder FOLDER --seconds 500
-    python -m benchmarks worlds_trial --folder FOLDER --detectability|--sharpness --seconds 500
+    python -m benchmarks worlds_trial --folder FOLDER --sharpness --seconds 500
     python -m benchmarks worlds_trial --table docs/trial/worlds-1.csv
 
 The second is given again until there are enough arms: each goes on where the last one stopped. Seeds are drawn from the
 commit that registered the file, cases take turns, and the kind on which the least time was spent comes next. The third
-works out from the truth which effects a sound arm can imitate, and for those not named strictly which rivals can.
+works out from the truth which effects a sound arm can imitate, and which those can that were named in their place.
 Every arm is a line of FOLDER/cases.csv; the last prints the table of such lines. docs/worlds.md has the rules.
 """
 
@@ -57,6 +57,10 @@ LEAST_CASES = {"strict": 200, "sharp": 200, "alarm": 200, "both": 60}
 """Arms with fewer of which a rate is said to have too few."""
 
 
+DETECTABLE = "the same without those of which d′ is known to be below 5"
+"""Second line of a question, of effects that a record shows."""
+
+
 class WorldsRegistration(RegisteredCode):
     """Arms of kinds of world. `cases` take turns; an answer that takes more than `longest` s is none."""
 
@@ -87,7 +91,7 @@ class Row:
     honest: bool | None
     alarm: bool | None
     d_prime: float | None
-    """Between the arm with and without its effect; None where it was not computed."""
+    """Between the arm with and without its effect, the least of several; None where it was not computed."""
     sharp: bool | None
     """None where it was not worked out, and where the sound arm can imitate the effect."""
     excess_removed: float | None
@@ -165,9 +169,7 @@ def row_of(folder: Path, kind: str, number: int) -> Row | None:
     truth, answer = json.loads((place_of(folder, kind, number) / "truth.json").read_text("utf-8")), kept["answer"]
     worth = score(truth, answer)
     names = [" | ".join(sorted(names)) for names in names_of(answer or {"steps": []})]
-    rivals = truth.get("sharpness", [])
-    none = [rival["d_prime"] for rival in rivals if rival["name"] == "none"]
-    known = worth.strict or any(rival["name"] not in ("none", "own") for rival in rivals)
+    alone = [rival["d_prime"] for rival in truth.get("sharpness", []) if rival["name"] == "none"]
     return Row(
         *(kind, number, kept["seed"], kept["case"]),
         hidden="; ".join(f"{one['name']} {one['joint'] or ''}".strip() for one in truth["hidden"]),
@@ -179,31 +181,43 @@ def row_of(folder: Path, kind: str, number: int) -> Row | None:
         both=worth.both,
         honest=worth.honest,
         alarm=None if kept["late"] else worth.alarm,
-        d_prime=none[0] if none else None,
-        sharp=worth.sharp if known else None,
+        d_prime=min(truth.get("detectability", alone), default=None),
+        sharp=worth.sharp,
         excess_removed=excess_removed_whole(Diagnosis.model_validate(answer)) if answer else None,
         seconds=kept["seconds"],
     )
 
 
-def add_sharpness(folder: Path, seconds: float, *, rivals_too: bool) -> None:
-    """Adds d′ against the sound arm to single effects of arms of one and two joints; with `rivals_too`, d′ against
-    every rival to those of them that were not named strictly."""
-    from tests.worlds.sharpness import sharpness
+def add_sharpness(folder: Path, seconds: float) -> None:
+    """Adds d′ to hidden effects: against the arm without them, and of single ones against whatever else was named."""
+    from tests.worlds.sharpness import detectability, sharpness
 
     end = monotonic() + seconds
-    for kind in (kind for kind in KINDS if KINDS[kind].joints <= 2):
+    for kind in KINDS:
         for row in filter(None, (row_of(folder, kind, number) for number in numbers(folder, kind))):
-            if row.case != "single" or (row.d_prime is not None if not rivals_too else row.strict or row.resolved):
+            if row.case == "sound" or (row.d_prime is not None and (row.resolved or row.case != "single")):
                 continue
             if monotonic() > end:
                 return
-            rivals = sharpness(hidden_rig(kind, row.seed, row.case), None if rivals_too else ())
-            file = place_of(folder, kind, row.number) / "truth.json"
-            truth = json.loads(file.read_text("utf-8")) | {"sharpness": [asdict(rival) for rival in rivals]}
-            file.write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
-            untold = [rival.name for rival in rivals if rival.d_prime < TOLD_APART and rival.name != "own"]
-            print(f"{kind} {row.number}: d′ {rivals[0].d_prime:.1f}; not told apart: {untold}", flush=True)
+            rig = hidden_rig(kind, row.seed, row.case)
+            if row.case != "single":
+                found = detectability(rig)
+                _add(place_of(folder, kind, row.number), {"detectability": found})
+                print(f"{kind} {row.number}: d′ {', '.join(f'{one:.1f}' for one in found)}", flush=True)
+                continue
+            answer = (kept_in(folder, kind, row.number) or {})["answer"]
+            named = () if row.strict or answer is None else sorted(set().union(*names_of(answer)))
+            rivals = sharpness(rig, named)
+            _add(place_of(folder, kind, row.number), {"sharpness": [asdict(rival) for rival in rivals]})
+            others = [f"{rival.name} {rival.d_prime:.1f}" for rival in rivals[2:]]
+            print(f"{kind} {row.number}: d′ {rivals[0].d_prime:.1f}; {', '.join(others)}", flush=True)
+
+
+def _add(place: Path, found: dict[str, Any]) -> None:
+    """Adds to what an arm's folder keeps of the truth."""
+    file = place / "truth.json"
+    truth = json.loads(file.read_text("utf-8")) | found
+    file.write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 def rows_of(folder: Path) -> list[Row]:
@@ -251,14 +265,16 @@ def table(rows: Sequence[Row]) -> list[str]:
         lines.append(f"| {words} | {reach} | {whole}{few} | {parts} |")
 
     line("named right, strict, of all single effects", TO_REACH["strict"], "strict", rows)
-    line("the same without those of which d′ is known to be below 5", TO_REACH["strict"], "strict", seen)
+    line(DETECTABLE, TO_REACH["strict"], "strict", seen)
     open_ = sum(row.case == "single" and (row.d_prime is None or not row.resolved) for row in rows)
     line(f"as sharp as the record allows ({open_} not worked out)", TO_REACH["sharp"], "sharp", rows)
     line("right one among what is named", "", "in_answer", rows)
     line("joint right, where the right one is named", "", "joints", rows)
     line("false alarm on sound arms", TO_REACH["alarm"], "alarm", rows)
     line(QUESTIONS["both"], TO_REACH["both"], "both", rows)
+    line(DETECTABLE, TO_REACH["both"], "both", seen)
     line(QUESTIONS["honest"], TO_REACH["honest"], "honest", rows)
+    line(DETECTABLE, TO_REACH["honest"], "honest", seen)
     late = {kind: sum(row.verdict == "late" for row in rows if row.kind == kind) for kind in kinds}
     lines.append(f"| no answer in the time | | {sum(late.values())} | {' | '.join(map(str, late.values()))} |")
     medians = [f"{np.median([row.seconds for row in rows if row.kind == kind]):.0f}" for kind in kinds]
@@ -285,8 +301,7 @@ def main() -> int:
     parser.add_argument("--registration", type=Path)
     parser.add_argument("--folder", type=Path, help="keeps the rigs and answers")
     parser.add_argument("--seconds", type=float, default=500.0, help="no arm is begun after this time")
-    parser.add_argument("--detectability", action="store_true", help="add d′ against the sound arm")
-    parser.add_argument("--sharpness", action="store_true", help="add d′ against every rival, where a name was wrong")
+    parser.add_argument("--sharpness", action="store_true", help="add d′ against the sound arm and against wrong names")
     parser.add_argument("--table", type=Path, help="print the table of these lines, and run nothing")
     parser.add_argument("--hashes", action="store_true", help="print what a registration has to hold of the code")
     asked = parser.parse_args()
@@ -298,11 +313,10 @@ def main() -> int:
     if asked.table is not None:
         print("\n".join(table(read_rows(asked.table))))
         return 0
-    afterwards = asked.detectability or asked.sharpness
-    if asked.folder is None or (asked.registration is None) == (not afterwards):
-        parser.error("--folder with --registration, --detectability or --sharpness; or --table; or --hashes")
-    if afterwards:
-        add_sharpness(asked.folder, asked.seconds, rivals_too=asked.sharpness)
+    if asked.folder is None or (asked.registration is None) == (not asked.sharpness):
+        parser.error("--folder with --registration or --sharpness; or --table; or --hashes")
+    if asked.sharpness:
+        add_sharpness(asked.folder, asked.seconds)
     else:
         registration = WorldsRegistration.model_validate(
             parse_toml(read_text(asked.registration, str(asked.registration)), str(asked.registration))

@@ -40,6 +40,9 @@ OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
 }
 """By name and law: the library's name, and what is part of it, of effects that are another one of the library."""
 
+NAMED_BY_LAW = {"direction_dependent_gear_loss": ("gear_loss", 1)}
+"""Laws of an effect that the library has a name of its own for, beside the effect's."""
+
 PRESSING_ARM = 0.3
 """m at which a pressing weight rubs, for a share of 1."""
 
@@ -123,6 +126,15 @@ def known(name: str, law: int) -> tuple[str, tuple[str, ...]]:
     that a seed gives the rig that it always gave.
     """
     return OTHER_NAMES.get(name, {}).get(law, (name, ()))
+
+
+def drawn_as(known_as: str) -> tuple[str, int]:
+    """The name by which an effect of the library is drawn, and the first law that the library calls so."""
+    for name, others in OTHER_NAMES.items():
+        for law, (other, _) in others.items():
+            if other == known_as:
+                return name, law
+    return NAMED_BY_LAW.get(known_as, (known_as, 0))
 
 
 def drawn(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Generator) -> tuple[int, dict[str, float]]:

@@ -6,13 +6,15 @@ rounding. χ² is what remains, over the variance of the noise, and what the tol
 rival is √(χ² of the rival − χ² of the effect's own plainest law), and that of `none` is √χ² of the sound arm. Below 5
 the record does not tell.
 
-What this first version leaves out:
-- arms of three and six joints, and pairs: no answer;
+Of several effects, d′ of each is that of the arm without it, with the others as they are; rivals are told of one alone.
+
+What this version leaves out:
 - rivals on other joints than the effect's; held-out records; recorded speeds;
 - the closed loop hides a part of what a recorded drive shows: d′ is rather too small; coloured noise counts as white
   with its density at low frequencies, outliers do not count;
-- sizes are sought from a few starts, with tolerances that answer linearly, before tolerances are refitted: for ripple,
-  disturbance and the gears that give d′ may be too large.
+- sizes are sought from a few starts, with tolerances that answer linearly, before tolerances are refitted, and the
+  refit ends after some steps. Whatever was tried is an upper bound of the least χ², so d′ may be too large, never too
+  small: for ripple, disturbance and the gears that give it is.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from scipy.optimize import least_squares
 from tests.worlds.bodies import Bodies
 from tests.worlds.drawing import generator
 from tests.worlds.engine import Floats, simulate
-from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, hide, joints_of
+from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, drawn_as, effects_of, hide, joints_of
 from tests.worlds.parameters import Records
 from tests.worlds.rig import Rig, Tolerance
 from tests.worlds.world import COLOURED_CORNER, TRAINING, wanted, without_settling
@@ -38,14 +40,16 @@ DECIDES = 300.0
 """d′ by linear tolerances above which they are not refitted: no tolerance brings it below 5."""
 NOT_TOLD = 4.9
 """d′ at which a refit of tolerances ends, since the record does not tell."""
-REFITTED = 6
-"""Steps of a refit of tolerances."""
+REFITTED = 40
+"""Steps of a refit of tolerances, at most."""
+DERIVATIVES = 2
+"""Times that a refit forms its derivatives anew, where those it has lead no further."""
 FARTHEST = 3.0
 """Deviations at which a refit begins at the most; it may go twice as far."""
 DIFFERENCE = 0.05
 """Step of differences in a refit, deviations."""
-ORIGIN = 20.0
-"""What a search adds to steps, which are around zero: its own differences are shares of its numbers."""
+LEAST_FALL = 1e-3
+"""Share by which a step has to lower χ² for the derivatives that led to it to be kept."""
 EVALUATIONS = 6
 """Of sizes, at most, after the starts."""
 STARTS = (0.2, 0.6, 1.6)
@@ -71,14 +75,6 @@ KEPT = ("current", "duration", "cooling_time")
 """Sizes that are not refitted: little depends on them. Nor is the stiffness of a contact behind a gap."""
 
 
-class _NotToldError(Exception):
-    """A search has come to a χ² at which the record does not tell."""
-
-    def __init__(self, chi_square: float) -> None:
-        super().__init__(chi_square)
-        self.chi_square = chi_square
-
-
 @dataclass(frozen=True)
 class Rival:
     """`none` is the sound arm, `own` the effect itself in its plainest law."""
@@ -88,18 +84,33 @@ class Rival:
 
 
 def sharpness(rig: Rig, names: Collection[str] | None = None) -> list[Rival]:
-    """Rivals (all, or those of `names`) of the one effect hidden in a rig of one or two joints; empty for others."""
-    if len(rig.hidden) != 1 or rig.kind.joints > 2:
+    """Rivals (all that can be hidden in the rig, or those that the library calls by `names`) of the one effect of
+    a rig; empty where there is not one."""
+    if len(rig.hidden) != 1:
         return []
     return _Comparison(rig).rivals(effects_of(rig) if names is None else names)
 
 
-class _Comparison:
-    """The true arm's readings, and what tolerances can do about a difference from them."""
+def detectability(rig: Rig) -> list[float]:
+    """d′ of each hidden effect: of the arm without it from the arm as it is."""
+    return [_Comparison(rig, k).rivals(())[0].d_prime for k in range(len(rig.hidden))]
 
-    def __init__(self, rig: Rig) -> None:
+
+def _without(rig: Rig, effect: int) -> Rig:
+    """The rig without one of its hidden effects."""
+    left = replace(rig, joints=rig.sound_joints.copy(), bodies=rig.sound, hidden=())
+    for k, hidden in enumerate(rig.hidden):
+        if k != effect:
+            left = hide(left, hidden.name, hidden.joint, hidden.law, hidden.sizes)
+    return left
+
+
+class _Comparison:
+    """The true arm's readings, and what tolerances can do about a difference from them without one of its effects."""
+
+    def __init__(self, rig: Rig, effect: int = 0) -> None:
         self.rig = rig
-        self.sound = replace(rig, joints=rig.sound_joints.copy(), bodies=rig.sound, hidden=())
+        self.sound = _without(rig, effect)
         self.asked = wanted(rig, TRAINING)
         self.sigma = _noise(rig)
         self.true = self._readings(rig.bodies, rig.joints, rig.loop)
@@ -117,21 +128,23 @@ class _Comparison:
         hidden = self.rig.hidden[0]
         none = self._least(lambda _: self.sound, 0, ())
         own, known_as = 0.0, hidden.known_as or hidden.name
-        if hidden.law != 0 and hidden.in_library and known_as == hidden.name:
-            own = self._fitted(hidden.name, hidden.joint)
-        found = [Rival("none", math.sqrt(none)), Rival("own", math.sqrt(own))]
-        for name in names:
-            if name in OPEN or name == known_as:
+        found = [Rival("none", math.sqrt(none))]
+        if names and hidden.law != 0 and hidden.in_library and known_as == hidden.name:
+            own = self._fitted(hidden.name, 0, hidden.joint)
+        found.append(Rival("own", math.sqrt(own)))
+        for known in names:
+            name, law = drawn_as(known)
+            if name in OPEN or known == known_as:
                 continue
             places = joints_of(self.rig, name)
             if name not in WHOLE_MACHINE and hidden.joint is not None:
                 places = tuple(place for place in places if place == hidden.joint)
-            least = min([none, *(self._fitted(name, place) for place in places)])
-            found.append(Rival(name, math.sqrt(max(0.0, least - own))))
+            least = min([none, *(self._fitted(name, law, place) for place in places)])
+            found.append(Rival(known, math.sqrt(max(0.0, least - own))))
         return found
 
-    def _fitted(self, name: str, joint: int | None) -> float:
-        """Least χ² of the sound arm with an effect in its plainest law."""
+    def _fitted(self, name: str, law: int, joint: int | None) -> float:
+        """Least χ² of the sound arm with an effect in one of its laws."""
         draw = generator(self.rig.kind_name, self.rig.seed, f"rival {name} {joint}")
         _, size = drawn(self.sound, self.motion, name, joint, draw)
         if joint is not None and self.rig.hidden[0].name == name:
@@ -140,9 +153,9 @@ class _Comparison:
 
         def rival(factors: Floats) -> Rig:
             changed = dict(size)
-            for field, factor in zip(free, factors, strict=True):
+            for field, factor in zip(free, factors.tolist(), strict=True):
                 changed[field] = size[field] + MOVED * (factor - 1) if field in SHIFTED else size[field] * factor
-            return hide(self.sound, name, joint, 0, changed)
+            return hide(self.sound, name, joint, law, changed)
 
         return self._least(rival, len(free), free)
 
@@ -182,27 +195,40 @@ class _Comparison:
         from the stated numbers; not searched further once the record does not tell."""
         best = math.inf
         for start in (np.clip(linear, -FARTHEST, FARTHEST), np.zeros(linear.size)):
-            try:
-                found = self._searched(made, start)
-            except _NotToldError as untold:
-                return untold.chi_square
-            best = min(best, found)
+            best = min(best, self._searched(made, start))
+            if best < NOT_TOLD**2:
+                break
         return best
 
     def _searched(self, made: Rig, start: Floats) -> float:
-        """Least χ² of a search that begins at steps (in deviations of the tolerances)."""
+        """Least χ² that a search finds which begins at `start` (deviations of the tolerances).
 
-        def left(moved_by: Floats) -> Floats:
-            steps = moved_by - ORIGIN
+        Steps of Gauss and Newton by the derivatives at the true arm, which are corrected by what each step shows
+        (Broyden 1965), and formed anew where they lead no further: a simulation for a step, not one for each number.
+        """
+
+        def left(steps: Floats) -> Floats:
             by = {t: float(s) * t.share for t, s in zip(self.rig.tolerances, steps, strict=True)}
-            residual = np.concatenate([self._readings(*moved(made, by)) - self.true, steps])
-            if _square(residual) < NOT_TOLD**2:
-                raise _NotToldError(_square(residual))
-            return residual
+            return np.concatenate([self._readings(*moved(made, by)) - self.true, steps])
 
-        bounds = (ORIGIN - 2 * FARTHEST, ORIGIN + 2 * FARTHEST)
-        fit = least_squares(left, start + ORIGIN, diff_step=DIFFERENCE / ORIGIN, bounds=bounds, max_nfev=REFITTED)
-        return 2.0 * float(fit.cost)
+        at, residual, formed = start, left(start), 0
+        slopes = np.vstack([self.answers, np.eye(start.size)])
+        for _ in range(REFITTED):
+            wished = at - np.linalg.lstsq(slopes, residual, rcond=None)[0]
+            step = np.clip(wished, -2 * FARTHEST, 2 * FARTHEST) - at
+            after = left(at + step)
+            fell = _square(after) < (1.0 - LEAST_FALL) * _square(residual)
+            if step.any():
+                slopes = slopes + np.outer(after - residual - slopes @ step, step) / _square(step)
+            if _square(after) < _square(residual):
+                at, residual = at + step, after
+            if _square(residual) < NOT_TOLD**2:
+                break
+            if not fell:
+                if formed == DERIVATIVES:
+                    break
+                slopes, formed = _slopes(left, at, residual), formed + 1
+        return _square(residual)
 
     def _less_tolerances(self, difference: Floats) -> Floats:
         """What of a difference the tolerances cannot take away, with what they cost."""
@@ -252,6 +278,11 @@ def _loop(loop: Records) -> Records:
     coarse = loop.copy()
     coarse["step"] = STEP
     return coarse
+
+
+def _slopes(left: Callable[[Floats], Floats], at: Floats, residual: Floats) -> Floats:
+    """Derivatives (m, n) of a residual (m,) at `at` (n,), by differences."""
+    return np.column_stack([(left(at + DIFFERENCE * one) - residual) / DIFFERENCE for one in np.eye(at.size)])
 
 
 def _square(values: Floats) -> float:

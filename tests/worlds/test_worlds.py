@@ -23,7 +23,6 @@ from tests.worlds.folder import write_world
 from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, tilted
 from tests.worlds.kinds import KINDS, REPORTED, REPORTING, TUNING
 from tests.worlds.lab import machine_text
-from tests.worlds.sharpness import sharpness
 from tests.worlds.world import hidden_rig, make_world
 
 OURS = Path(__file__).parent
@@ -186,16 +185,3 @@ def test_a_group_is_right_where_the_record_cannot_tell_its_members_apart() -> No
 def test_an_answer_about_a_sound_arm_is_a_false_alarm() -> None:
     assert score(truth("sound"), answered("unknown-effect")).alarm
     assert score(truth("sound"), answered("nothing-significant")).alarm is False
-
-
-@pytest.mark.slow
-def test_sharpness_sees_an_effect_of_some_size_and_none_of_hardly_any() -> None:
-    rig = sound_rig("axis-current", KINDS["axis-current"], 1)
-    assert sharpness(rig) == []
-    rivals = ("viscous_friction",)
-    for size, seen in ((0.2, True), (1e-5, False)):
-        hidden = hide(rig, "coulomb_friction", 1, 0, {"coulomb": size * rig.strongest[0]})
-        found = {rival.name: rival.d_prime for rival in sharpness(hidden, rivals)}
-        assert (found["none"] > 20.0) == seen
-        assert found["own"] == 0.0
-        assert all(found[name] <= found["none"] for name in rivals)
