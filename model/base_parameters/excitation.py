@@ -16,8 +16,9 @@ from model.fitting.covariance import inverse, sandwich
 from model.fitting.problem import Whitened, whitened_residual
 from model.fitting.whitening import fitted_whitener
 from model.inverse_dynamics.fit import CUTOFF, LONGEST_MEMORY
+from model.inverse_dynamics.link_motion import link_motion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
-from model.inverse_dynamics.torque_balance import TorqueBalance, link_motion
+from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.nominal import joint_scale
 from model.simulation.chain_of_model import chain_of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from model import layout as at
 from model.arrays import Floats
@@ -16,8 +18,10 @@ from model.drives.piecewise import EDGE
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
+from model.inverse_dynamics.friction_at_rest import friction_at_rest, less_held
+from model.inverse_dynamics.link_motion import SENSOR_COLUMNS, LinkMotion, link_motion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
-from model.inverse_dynamics.smoothing import derivative, low_pass
+from model.inverse_dynamics.smoothing import derivative
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm, nominal_vector
@@ -36,26 +40,12 @@ step of a thousandth took joints that turn over a corner of their friction, each
 cancel each other then did not, and a fit could not move along them."""
 CONTACT_SHARE = 0.02
 """Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
-HOLDING_ROUNDS = 4
-"""Rounds in which friction of a slow joint takes up what is left below the cutoff: without any, steps of a set point
-left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
 THRESHOLD = "amplifier_threshold"
 """The effect whose parameter makes the residual jump."""
 LEAST_KEPT = 0.05
 """Least share of a torque that gears are taken to pass on: two losses together may exceed one."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
-SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
 FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM, at.GRAVITY_SHARE)
-
-
-@dataclass(frozen=True)
-class LinkMotion:
-    """The links' own motion (k, n), sensor errors taken out. contact: its direction as friction has it, in [−1, 1]."""
-
-    position: Floats
-    speed: Floats
-    acceleration: Floats
-    contact: Floats
 
 
 @dataclass
@@ -108,7 +98,7 @@ class TorqueBalance:
                 gravity[i],
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
-            torque = _held_by_friction(torque, levels[i], motion.contact, record)
+            torque = less_held(torque, friction_at_rest(levels[i], motion, joints), record)
             result.append(record.less_unknown(record.compared(torque * self._told_per_torque(joints))))
         return result
 
@@ -204,32 +194,6 @@ class TorqueBalance:
         return asked - motor + _lost_in_dead_zone(asked, speed, joints)
 
 
-def link_motion(record: RecordedMotion, joints: Floats, model: Model) -> LinkMotion:
-    """The motion for which sensors with these errors would have given the readings."""
-    wrong = joints[:, list(SENSOR_COLUMNS)]
-    if not wrong.any():
-        return LinkMotion(record.position, record.speed, record.acceleration, record.contact)
-    position, slope, bent = record.position.copy(), np.ones_like(record.position), np.zeros_like(record.position)
-    for j in range(model.joint_count):
-        gain, offset, *bends = wrong[j]
-        range_, zero = joints[j, at.RANGE], joints[j, at.AT_ZERO]
-        q = record.position[:, j]
-        error, rate = gain * (q - zero - 0.5 * range_) + offset, np.full_like(q, gain)
-        for k, bend in enumerate(bends, start=1):
-            wave = k * np.pi / range_
-            error += bend * np.sin(wave * (q - zero))
-            rate += bend * wave * np.cos(wave * (q - zero))
-            bent[:, j] -= bend * wave**2 * np.sin(wave * (q - zero))
-        position[:, j] -= error
-        if record.own_speed[j]:
-            bent[:, j] = 0.0
-        else:
-            slope[:, j] -= rate
-    # by the chain rule: differences on this grid would smooth accelerations as soon as any sensor has an error
-    acceleration = record.acceleration * slope - bent * record.speed**2
-    return LinkMotion(position, record.speed * slope, acceleration, record.contact)
-
-
 def levels_along(model: Model, record: RecordedMotion) -> Floats:
     """Levels of Coulomb friction (k, n), N·m, along a record."""
     joints = _joints_of(model.vector, model)
@@ -268,24 +232,6 @@ def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:
     return out
 
 
-def _held_by_friction(left: Floats, level: Floats, contact: Floats, record: RecordedMotion) -> Floats:
-    """Residual torque (k, n) with Coulomb friction set-valued where a joint turns or stops for a moment: there it takes
-    any torque that holds the joint, with a mean up to its level (k, n), in place of a share that follows the speed.
-
-    What it has to hold is taken as a mean over the passage. Sample by sample, friction would take the noise that is
-    within its level and leave what is beyond: rectified noise, on the side to which the joint just turned. What is then
-    left below the cutoff, as of noise that ends where the passage does, friction takes as far as its level allows.
-    """
-    if not record.turns.any():
-        return left
-    asked = record.mean_in_turn(left - contact * level)
-    held = np.where(record.turns, asked - np.clip(asked, -level, level), left)
-    for _ in range(HOLDING_ROUNDS):
-        less = held - low_pass(held, record.cutoff, record.period)
-        held = np.where(record.turns, np.clip(less, asked - level, asked + level), held)
-    return np.asarray(held)
-
-
 def _before_losses(asked: Floats, contact: Floats, joints: Floats) -> Floats:
     """Torque (k, n) into gears that give `asked` (k, n): they lose a share, or take it from a link that drives."""
     loss, difference = joints[:, at.GEAR_LOSS], joints[:, at.GEAR_LOSS_DIRECTION]
@@ -310,9 +256,22 @@ def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
 
 
 def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
-    """Rate (k,) at which rotor and link move apart for a torque through a transmission with compliance and play."""
-    twist = (joint[at.COMPLIANCE] + joint[at.CONTACT_COMPLIANCE]) * through
+    """Rate (k,) at which rotor and link move apart for a torque through a transmission with compliance and play. A gear
+    that gives and damps follows the torque late; a contact does so far above every cutoff."""
+    period = time[1] - time[0]
+    twist = joint[at.COMPLIANCE] * _followed(through, joint[at.COMPLIANCE] * joint[at.TRANSMISSION_DAMPING], period)
+    twist = twist + joint[at.CONTACT_COMPLIANCE] * through
     if joint[at.GAP] > 0:
         soft = CONTACT_SHARE * float(np.sqrt(np.mean(through**2))) + 1e-12
         twist = twist + 0.5 * joint[at.GAP] * np.tanh(through / soft)
-    return derivative(twist, time[1] - time[0])
+    return derivative(twist, period)
+
+
+def _followed(signal: Floats, time_constant: float, period: float) -> Floats:
+    """What follows a signal (k,) with a first-order lag, exactly for one that is straight between its samples."""
+    if time_constant <= 0.0:
+        return signal
+    kept = math.exp(-period / time_constant)
+    new = 1.0 - (1.0 - kept) * time_constant / period
+    followed, _ = lfilter([new, 1.0 - kept - new], [1.0, -kept], signal, zi=[(1.0 - new) * signal[0]])
+    return np.asarray(followed)

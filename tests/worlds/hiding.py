@@ -12,7 +12,7 @@ from numpy.random import Generator
 from tests.worlds.bodies import Bodies
 from tests.worlds.engine import Motion
 from tests.worlds.kinds import CURRENT
-from tests.worlds.parameters import BRISTLE, BY_CURRENT, JUMP, ONE_SIDED, SWITCH, Records
+from tests.worlds.parameters import BRISTLE, BY_CURRENT, JUMP, ONE_SIDED, PRESSING_WEIGHT, SWITCH, Records
 from tests.worlds.rig import Hidden, Rig
 
 WEAKENED_MAGNET = "weakened_magnet"
@@ -40,6 +40,9 @@ OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
 }
 """By name and law: the library's name, and what is part of it, of effects that are another one of the library."""
 
+EVENLY_PRESSED = 3
+"""The axes of the joints up to this one keep their angle to gravity in every posture: a weight presses evenly there, so
+that friction under it is Coulomb friction."""
 NAMED_BY_LAW = {"direction_dependent_gear_loss": ("gear_loss", 1)}
 """Laws of an effect that the library has a name of its own for, beside the effect's."""
 
@@ -109,6 +112,8 @@ def joints_of(rig: Rig, name: str) -> tuple[int | None, ...]:
 def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float]) -> Rig:
     """The rig with an effect in it; sizes are fields of `parameters.JOINT`, or of the bodies."""
     known_as, beside = known(name, law)
+    if name == "load_dependent_friction" and law == PRESSING_WEIGHT and joint is not None and joint <= EVENLY_PRESSED:
+        known_as = "coulomb_friction"
     hidden = Hidden(name, joint, law, size, name not in OPEN, known_as, beside)
     changed, bodies = rig.joints.copy(), rig.bodies
     if joint is None:

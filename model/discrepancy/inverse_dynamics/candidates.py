@@ -27,8 +27,10 @@ from model.machine_model.parameter import Parameter
 
 Start = dict[str, float]
 
-UNSEEN = "damping"
-"""Part of an effect that torques do not show: a transmission's damping acts in its vibration, above every cutoff."""
+UNSEEN = ("backlash", "damping")
+"""Part of an effect that torques do not show: the damping of a contact acts in its vibration, above every cutoff."""
+DAMPED = 0.1
+"""Damping ratio of a rotor on its gear's spring from which damping is tried."""
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
 BENT = "potentiometer_nonlinearity"
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
@@ -185,7 +187,9 @@ def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) ->
     wider = model.with_effect(name, joints)
     place = _Place(wider, joints[0] - 1 if joints else 0, now.balance.records, now.residual)
     sizes = recorded_sizes(wider, now.balance.records)
-    added = (sizes.get(p.name, p) for p in wider.parameters if p.name not in model.by_name and p.part != UNSEEN)
+    added = (
+        sizes.get(p.name, p) for p in wider.parameters if p.name not in model.by_name and (p.effect, p.part) != UNSEEN
+    )
     own = tuple(_narrowed(p, place) for p in added if p.effect != BENT or p.part in FREED_BENDS)
     amplitudes = tuple(p.name for p in own if p.null is not None)
     return Trial(name, joints, wider, own, amplitudes, tuple(_starts(name, own, place)))
@@ -246,7 +250,7 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
         return
     by_part = {p.part: p for p in own}
     for start in search(place):
-        yield {by_part[k].name: _inside(by_part[k], v) for k, v in start.items()}
+        yield {by_part[k].name: _inside(by_part[k], v) for k, v in start.items() if k in by_part}
 
 
 def _narrowed(p: Parameter, place: _Place) -> Parameter:
@@ -378,7 +382,8 @@ def _compliance(place: _Place) -> Iterator[Start]:
     inertia = joint[at.ROTOR_INERTIA] * joint[at.GEAR] ** 2
     whole = float(np.std(np.concatenate(torques)) / max(inertia * np.std(np.concatenate(changes)), 1e-300))
     for share in WINDING_SHARES:
-        yield {"compliance": share * whole}
+        compliance = share * whole
+        yield {"compliance": compliance, "damping": 2 * DAMPED * float(np.sqrt(inertia / max(compliance, 1e-300)))}
 
 
 def _play(place: _Place) -> Iterator[Start]:

@@ -33,6 +33,8 @@ is found. The noise's variance grows with the fifth power of the cutoff, and slo
 show below a lower one as well; gears that give and delays show below the highest alone."""
 FRICTION = "friction"
 """The family of effects that only the highest cutoff tells apart."""
+JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss"})
+"""Effects outside that family whose torque jumps as friction's does, where motion or drive turns."""
 LEAST_OF_TORQUE = 1e-3
 """Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
 a sound rig with 20 bits, gears were said to lose 0.09 % of it."""
@@ -96,13 +98,17 @@ def _finds(answer: Diagnosis) -> bool:
 
 
 def _names_slow_effects(answer: Diagnosis) -> bool:
-    """Whether effects are named of which none is friction: its jump where motion turns is smeared below a low cutoff,
-    and what is left of it looks like friction of another size."""
+    """Whether effects are named of which none jumps, as friction does where motion turns: that is smeared below a low
+    cutoff, and what is left of it looks like friction of another size, or like an amplifier."""
     if answer.verdict not in ("named", "ambiguous"):
         return False
     adopted = [step for step in answer.steps if step.adopted and step.proof is None]
     names = {name for step in adopted for name in (step.effect, *(member.effect for member in step.group))}
-    return bool(adopted) and all(name is None or effect(name).shared_name.family != FRICTION for name in names)
+    return bool(adopted) and not any(name is not None and _jumps(name) for name in names)
+
+
+def _jumps(name: str) -> bool:
+    return name in JUMPING or effect(name).shared_name.family == FRICTION
 
 
 @dataclass(frozen=True)

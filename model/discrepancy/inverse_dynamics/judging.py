@@ -13,6 +13,7 @@ from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
+from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
@@ -27,6 +28,9 @@ FAR_OFF = 4.0
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
+NO_PART = 0.5
+"""Least share of a residual that is no noise, with or without it, which an effect takes: of a residual that is made of
+something else, any law takes a little, with evidence that counts as if the rest were noise."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 LEAD = 4.0
@@ -133,12 +137,21 @@ def _refusal(standing: Standing, comparison: Comparison, *, explains_most: bool)
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
+    if _leaves_what_is_no_noise(standing, comparison):
+        return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})
     if tolerances(standing.model)[1] != "stated" or explains_most:
         return None
     farthest = _farthest_newly_off(standing, chosen)
     return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
+
+
+def _leaves_what_is_no_noise(standing: Standing, comparison: Comparison) -> bool:
+    """Whether an effect takes a small part of what is left on its joints, and what it leaves there is no noise."""
+    own = np.array([j in comparison.chosen.joints for j in standing.model.machine.modelled_joints])
+    left = np.sqrt(comparison.fitted_after[own])
+    return bool(own.any() and (left > NO_NOISE * standing.case.noise[own]).all() and comparison.removed < NO_PART)
 
 
 def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:

@@ -29,9 +29,11 @@ NONLINEAR = frozenset(
 """Effects whose torque is far from linear in their size."""
 ONE_SIDED = "one_sided_spring"
 """The effect whose size changes its law with its sign."""
-SMALL = 1e-4
-"""Share of its size at which any other effect is probed besides. What the tolerances took over of an effect would be
-there twice at its full size, and friction would hold a different part of it where a joint turns."""
+SMALL = 1e-6
+"""Share of its size at which any other effect is probed besides: the step of the fit's own derivatives. What the
+tolerances took over of an effect would be there twice at its full size, and friction would hold a different part of it
+where a joint turns. A ten-thousandth was too much for that: on a rig whose payload was fitted as a mass, a payload's
+column was fifty times longer than what mass and payload differ by, and promised nothing."""
 NONLINEAR_LIMIT = 2.0
 """Largest size of such an effect that a probe may find, in the size at which it was probed."""
 

@@ -49,9 +49,8 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     plain = _takes_half_of_what_is_no_noise(found, before, case)
     if not plain and any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
         return False
-    if any(_ends_at_bound(p, found.fit.values[p.name]) for p in found.parameters):
-        return False
-    if not is_far_everywhere(found.stated, found.fit.values):
+    ends = any(_ends_at_bound(p, found.fit.values[p.name]) for p in found.parameters)
+    if ends or not is_far_everywhere(found.stated, found.fit.values):
         return False
     if found.effect not in OF_CHANGES or plain:
         return True

@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from model import layout as at
 from model.arrays import Floats
-from model.inverse_dynamics import torque_balance
+from model.inverse_dynamics import friction_at_rest
+from model.inverse_dynamics.friction_at_rest import RestingFriction, less_held
+from model.inverse_dynamics.link_motion import LinkMotion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, low_pass
-from model.inverse_dynamics.torque_balance import _held_by_friction
 from tests.model.inverse_dynamics.driven_slide import TIME, motion_of
 
 
@@ -30,7 +32,13 @@ SHAPE = RECORD.speed.shape
 
 def held(left: Floats, level: float) -> Floats:
     """What friction of this level leaves of a residual torque (k, 1)."""
-    return _held_by_friction(left, np.full(SHAPE, level), RECORD.contact, RECORD)
+    return less_held(left, coulomb(level), RECORD)
+
+
+def coulomb(level: float) -> RestingFriction:
+    """Coulomb friction of a level."""
+    whole = np.full(SHAPE, level)
+    return RestingFriction(-level * RECORD.contact, -whole, whole)
 
 
 def below_cutoff(torque: Floats) -> float:
@@ -62,7 +70,7 @@ def test_what_noise_leaves_at_passages_is_taken_up(monkeypatch: pytest.MonkeyPat
         return float(np.mean([below_cutoff(held(noise(seed), 2.0)) for seed in range(8)]))
 
     taken = left_on_average()
-    monkeypatch.setattr(torque_balance, "HOLDING_ROUNDS", 0)
+    monkeypatch.setattr(friction_at_rest, "HOLDING_ROUNDS", 0)
     assert taken < 0.8 * left_on_average()
 
 
@@ -87,4 +95,25 @@ def test_friction_of_no_level_takes_nothing_of_the_mean() -> None:
 def test_a_joint_that_never_turns_leaves_what_it_left() -> None:
     fast = replace(RECORD, speed=np.full(SHAPE, 1.0))
     left = noise(5)
-    assert _held_by_friction(left, np.full(SHAPE, 2.0), RECORD.contact, fast) is left
+    assert less_held(left, coulomb(2.0), fast) is left
+
+
+def test_friction_that_is_more_one_way_holds_more_on_that_side() -> None:
+    """A torque within the level of one direction at passages, and beyond it in the other."""
+    joints = np.zeros((1, at.PER_JOINT))
+    joints[0, at.DIRECTION] = 1.5
+    motion = LinkMotion(RECORD.position, RECORD.speed, RECORD.acceleration, RECORD.contact)
+    friction = friction_at_rest.friction_at_rest(np.full(SHAPE, 2.0), motion, joints)
+    forwards = np.where(RECORD.turns, -3.5 - friction.sliding, 0.0)  # forwards, friction acts backwards
+    assert np.abs(less_held(forwards, friction, RECORD)[TURNS]).max() == pytest.approx(0.0, abs=1e-9)
+    backwards = np.where(RECORD.turns, 3.5 - friction.sliding, 0.0)
+    assert less_held(backwards, friction, RECORD)[TURNS].max() > 1.0
+
+
+@pytest.mark.parametrize("column", [at.STRIBECK, at.BREAKAWAY])
+def test_friction_that_fades_or_has_to_be_broken_holds_more_both_ways(column: int) -> None:
+    joints = np.zeros((1, at.PER_JOINT))
+    joints[0, column], joints[0, at.STRIBECK_SPEED] = 1.5, 0.1
+    motion = LinkMotion(RECORD.position, RECORD.speed, RECORD.acceleration, RECORD.contact)
+    friction = friction_at_rest.friction_at_rest(np.full(SHAPE, 2.0), motion, joints)
+    np.testing.assert_allclose((friction.lowest, friction.highest), (np.full(SHAPE, -3.5), np.full(SHAPE, 3.5)))

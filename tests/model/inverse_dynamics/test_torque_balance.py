@@ -14,9 +14,10 @@ from daq.contracts.trace import Trace
 from model import layout as at
 from model.fitting.choice import chosen_unknowns
 from model.fitting.options import FitOptions
+from model.inverse_dynamics.link_motion import link_motion
 from model.inverse_dynamics.recorded_motion import recorded_motion
 from model.inverse_dynamics.smoothing import low_pass
-from model.inverse_dynamics.torque_balance import TorqueBalance, link_motion
+from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
