@@ -185,3 +185,13 @@ def test_a_group_is_right_where_the_record_cannot_tell_its_members_apart() -> No
 def test_an_answer_about_a_sound_arm_is_a_false_alarm() -> None:
     assert score(truth("sound"), answered("unknown-effect")).alarm
     assert score(truth("sound"), answered("nothing-significant")).alarm is False
+
+
+@pytest.mark.parametrize(
+    ("joint", "law", "name"),
+    [(2, 0, "coulomb_friction"), (4, 0, "load_dependent_friction"), (2, 1, "gravity_torque_friction")],
+)
+def test_a_weight_that_presses_evenly_rubs_as_coulomb_friction(joint: int, law: int, name: str) -> None:
+    rig = sound_rig("six-torques", KINDS["six-torques"], 1)
+    (hidden,) = hide(rig, "load_dependent_friction", joint, law, {"load_share": 0.1}).hidden
+    assert (hidden.name, hidden.known_as) == ("load_dependent_friction", name)

@@ -17,7 +17,7 @@ from model.fitting.options import FitOptions
 from model.inverse_dynamics.link_motion import link_motion
 from model.inverse_dynamics.recorded_motion import recorded_motion
 from model.inverse_dynamics.smoothing import low_pass
-from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.inverse_dynamics.torque_balance import TorqueBalance, _followed
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
@@ -127,3 +127,16 @@ def test_a_vanishing_error_of_a_sensor_changes_nothing() -> None:
         balance.residual({"joint1.potentiometer_offset.offset": value})[0] for value in (0.0, 1e-12)
     )
     np.testing.assert_allclose(next_to_none, without, atol=1e-8 * float(np.abs(without).max()))
+
+
+@pytest.mark.parametrize("time_constant", [0.0, 1e-4, 0.003, 0.05])
+def test_a_gear_that_damps_follows_a_straight_torque_late(time_constant: float) -> None:
+    period = 0.004
+    time = period * np.arange(400)
+    followed = _followed(2.0 * time, time_constant, period)
+    lag = time_constant * (1.0 - np.exp(-time / time_constant)) if time_constant else np.zeros_like(time)
+    np.testing.assert_allclose(followed, 2.0 * (time - lag), atol=1e-12)
+
+
+def test_a_gear_that_damps_holds_what_is_constant() -> None:
+    np.testing.assert_allclose(_followed(np.full(50, 3.0), 0.01, 0.004), 3.0)

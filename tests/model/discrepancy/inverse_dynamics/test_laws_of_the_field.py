@@ -23,6 +23,7 @@ from tests.worlds.folder import write_world
             marks=pytest.mark.slow,
         ),
         pytest.param("planar-cascade", 709, None, "one_sided_spring", (2,), "stiffness", 0.7155),
+        pytest.param("axis-cascade", 904, None, "direction_dependent_friction", (1,), "difference", 0.115),
         pytest.param(*("planar-pid", 711, None, "amplifier_threshold", (2,), "width", 2.0008), marks=pytest.mark.slow),
     ],
 )
@@ -44,6 +45,17 @@ def test_a_law_is_named_and_its_size_found(
     (step,) = [s for s in found.steps if s.adopted]
     assert (step.effect, step.joints) == (effect, joints)
     assert step.parameters[f"joint{joints[0]}.{effect}.{part}"].value == pytest.approx(value, rel=0.05)
+
+
+@pytest.mark.timeout(300)
+def test_a_payload_that_was_fitted_as_a_mass_is_named(tmp_path: Path) -> None:
+    """Stated masses have taken it over by eight of their deviations: of the payload itself, a small rest shows."""
+    write_world(tmp_path, "axis-current", 908)
+    lab = tmp_path / "lab"
+    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
+    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("payload", ())], found.summary
+    assert found.steps[0].parameters["load.payload.mass"].value == pytest.approx(0.1112, rel=0.1)
 
 
 @pytest.mark.timeout(300)
