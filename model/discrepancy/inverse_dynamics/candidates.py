@@ -71,6 +71,8 @@ WINDING_SHARES = (0.01, 0.1)
 are tried."""
 PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
+FASTEST_RIPPLE = 1000.0
+"""Most waves of a ripple a turn (a metre) that are tried."""
 LONGEST_SCAN = 400
 """Largest number of frequencies that are tried."""
 
@@ -133,6 +135,12 @@ class _Place:
     def positions(self) -> Floats:
         """The joint's positions in all records, rad (m)."""
         return np.concatenate([r.position[r.rows, self.column] for r in self.records])
+
+    @property
+    def slowest_ripple(self) -> float:
+        """Waves a turn (rad/m) of a ripple of which one lies within the positions at which the joint moves."""
+        every = np.concatenate([r.position[r.rows, self.column][r.moving[:, self.column]] for r in self.records])
+        return 2 * np.pi / max(float(np.ptp(every)) if every.size else 0.0, 1e-9)
 
     @property
     def current(self) -> float:
@@ -253,12 +261,13 @@ def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Star
         yield {by_part[k].name: _inside(by_part[k], v) for k, v in start.items() if k in by_part}
 
 
-def _narrowed(p: Parameter, place: _Place) -> Parameter:
+def _narrowed(p: Parameter, place: _Place) -> Parameter:  # noqa: PLR0911 (one line an effect)
     """The parameter, with bounds narrowed to what the record allows.
 
     A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
     ever acts would explain any motion, with bodies without mass. Friction must not change within the speeds at which
-    its direction is not resolved. A spring on one side must begin to pull within the recorded positions.
+    its direction is not resolved. A spring on one side must begin to pull within the recorded positions. A ripple
+    repeats itself within them: less than one wave is a spring, or a shifted sensor.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
@@ -270,6 +279,8 @@ def _narrowed(p: Parameter, place: _Place) -> Parameter:
         return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
     if p.effect == "amplifier_threshold":
         return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
+    if p.effect == "torque_ripple" and p.null is None:
+        return replace(p, low=min(p.high, max(p.low, place.slowest_ripple)))
     if p.effect != "supply_limit":
         return p
     return replace(p, low=min(p.high, max(p.low, float(np.quantile(place.drives, UNLIMITED)))))
@@ -338,13 +349,12 @@ def _timed_warming(place: _Place) -> Iterator[Start]:
 
 def _ripple(place: _Place) -> Iterator[Start]:
     column, records = place.column, place.records
-    every = np.concatenate([r.position[r.rows, column][r.moving[:, column]] for r in records])
-    travel = float(np.ptp(every)) if every.size else 0.0
-    if travel <= 0:
+    if place.slowest_ripple > FASTEST_RIPPLE:
         return
+    travel = 2 * np.pi / place.slowest_ripple
     slow = float(np.quantile(place.speeds, 0.25))
     highest = 2 * np.pi * records[0].cutoff / max(slow, 1e-9)
-    grid = _scanned(max(2 * np.pi / travel, 0.5), min(highest, 1000.0), 0.7 * np.pi / travel)
+    grid = _scanned(max(place.slowest_ripple, 0.5), min(highest, FASTEST_RIPPLE), 0.7 * np.pi / travel)
     prismatic = place.model.machine.joint(column + 1).kind == "prismatic"
     if not prismatic and travel > np.pi:
         whole = np.arange(1, min(int(highest), 200) + 1, dtype=np.float64)
