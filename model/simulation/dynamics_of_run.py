@@ -30,10 +30,11 @@ def rod_arm_accelerations(
 ) -> None:
     """Closed form, tilted base included."""
     theta_1, theta_2, theta_3 = q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA]
-    b1, b2, b3 = three_joint.horizontal_gravity_torques(theta_1, theta_2, theta_3, body)
-    a[0], a[1], a[2] = accelerations(
-        theta_2, theta_3, v[0], v[1], v[2], torque[0] - b1, torque[1] - b2, torque[2] - b3, body
-    )
+    t1, t2, t3 = torque[0], torque[1], torque[2]
+    if body[lumped.GRAVITY_X] != 0.0 or body[lumped.GRAVITY_Y] != 0.0:
+        b1, b2, b3 = three_joint.horizontal_gravity_torques(theta_1, theta_2, theta_3, body)
+        t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3
+    a[0], a[1], a[2] = accelerations(theta_2, theta_3, v[0], v[1], v[2], t1, t2, t3, body)
 
 
 @internal
