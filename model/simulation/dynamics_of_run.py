@@ -14,7 +14,7 @@ from model import layout as at
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
-from model.dynamics.compilation import compiled, internal
+from model.dynamics.compilation import borrowing, compiled, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
@@ -24,7 +24,7 @@ from model.simulation.joint_torques import rubs_under_gravity
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, uncompiled
 
 
-@internal
+@borrowing
 def rod_arm_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], a: NDArray[Any]
 ) -> None:
@@ -37,7 +37,7 @@ def rod_arm_accelerations(
     a[0], a[1], a[2] = accelerations(theta_2, theta_3, v[0], v[1], v[2], t1, t2, t3, body)
 
 
-@internal
+@borrowing
 def _add_shares(joints: NDArray[Any], gravity: NDArray[Any], out: NDArray[Any]) -> None:
     """Adds to the levels `out` each joint's share of its gravity torque, N·m."""
     for j in range(joints.shape[0]):
@@ -115,7 +115,7 @@ def chain_gravity(q: NDArray[Any], _joints: NDArray[Any], body: ChainArrays) -> 
     return recursive.gravity_torques(body, q)
 
 
-@internal
+@borrowing
 def _published_levels(
     q: NDArray[Any], joints: NDArray[Any], weight_2: complex, weight_3: complex, out: NDArray[Any]
 ) -> None:
