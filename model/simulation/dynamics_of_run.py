@@ -14,7 +14,7 @@ from model import layout as at
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
-from model.dynamics.compilation import borrowing, compiled, internal
+from model.dynamics.compilation import borrowing, compiled, compiled_borrowing, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
@@ -54,14 +54,19 @@ def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -
     return result
 
 
-@compiled
+@compiled_borrowing
 def rod_arm_levels(
     q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], _settings: NDArray[Any], out: NDArray[Any]
 ) -> None:
     """(7.32) to (7.34) from the closed form's parameters, and shares of the gravity torques."""
     _published_levels(q, joints, body[lumped.SIZE], body[lumped.SIZE + 1], out)
     if rubs_under_gravity(joints):
-        _add_shares(joints, rod_arm_gravity(q, joints, body), out)
+        g1, g2, g3 = three_joint.gravity_torques(
+            q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA], body
+        )
+        out[0] += joints[0, at.GRAVITY_SHARE] * magnitude(g1)
+        out[1] += joints[1, at.GRAVITY_SHARE] * magnitude(g2)
+        out[2] += joints[2, at.GRAVITY_SHARE] * magnitude(g3)
 
 
 @internal

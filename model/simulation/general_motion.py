@@ -46,30 +46,30 @@ def advance(
     n = joints.shape[0]
     h = duration / steps
     for step in range(steps):
-        _begin(state, work)
+        begin(state, work)
         for stage in range(4):
             reach = 0.0 * h if stage == 0 else (h if stage == 3 else 0.5 * h)
-            _to_stage(state, work, reach)
+            to_stage(state, work, reach)
             friction_levels_of(kind, work[Q], joints, body, arm.settings, work[LEVEL])
             now = start + step * h + reach
             if own.shape[1] > 0:
                 work[LOAD] = gravity_of(kind, work[Q], joints, body)
-            _form_torques(state, work, volts, now, h, stage, joints, flags)
+            form_torques(state, work, volts, now, h, stage, joints, flags)
             if own.shape[1] > 0:
                 for j in range(n):
                     if flags[j] & at.HAS_USER_EFFECT:
                         work[TORQUE, j] += own_torque(
                             own[j], joints[j], work[Q, j], work[V, j], volts[j], work[LOAD, j], now
                         )
-            _add_motors(work)
+            add_motors(work)
             accelerate(kind, work[Q], work[V], work[TORQUE], joints, body, work[A])
-            _add_stage(work, 2.0 if stage in (1, 2) else 1.0)
-        _end(state, work, h / 6.0, joints)
-        _end_joints(state, work, volts, h, joints, flags)
+            add_stage(work, 2.0 if stage in (1, 2) else 1.0)
+        end_step(state, work, h / 6.0, joints)
+        end_joints(state, work, volts, h, joints, flags)
 
 
 @borrowing
-def _form_torques(
+def form_torques(
     state: Array, work: Array, volts: Array, now: complex, h: complex, stage: int, joints: Array, flags: Array
 ) -> None:
     """Torques on the links but for those of the user's effects and of the motors, which stand in a row of their own."""
@@ -95,14 +95,14 @@ def _form_torques(
 
 
 @borrowing
-def _add_motors(work: Array) -> None:
+def add_motors(work: Array) -> None:
     """The motors' torques, or what gears transmit of them, to those on the links."""
     for j in range(work.shape[1]):
         work[TORQUE, j] += work[MOTOR, j]
 
 
 @borrowing
-def _end_joints(state: Array, work: Array, volts: Array, h: complex, joints: Array, flags: Array) -> None:
+def end_joints(state: Array, work: Array, volts: Array, h: complex, joints: Array, flags: Array) -> None:
     """What a step of `h` s leaves behind beside positions and speeds."""
     for j in range(joints.shape[0]):
         if flags[j] != 0:
@@ -113,7 +113,7 @@ def _end_joints(state: Array, work: Array, volts: Array, h: complex, joints: Arr
 
 
 @borrowing
-def _begin(state: Array, work: Array) -> None:
+def begin(state: Array, work: Array) -> None:
     """A step begins: stage values are those of the state, accelerations and sums are zero."""
     for j in range(state.shape[0]):
         work[V, j], work[W, j] = state[j, SPEED], state[j, ROTOR_SPEED]
@@ -123,7 +123,7 @@ def _begin(state: Array, work: Array) -> None:
 
 
 @borrowing
-def _to_stage(state: Array, work: Array, reach: complex) -> None:
+def to_stage(state: Array, work: Array, reach: complex) -> None:
     """Stage values from the state and the rates of the stage before."""
     for j in range(state.shape[0]):
         work[Q, j] = state[j, POSITION] + reach * work[V, j]
@@ -133,7 +133,7 @@ def _to_stage(state: Array, work: Array, reach: complex) -> None:
 
 
 @borrowing
-def _add_stage(work: Array, weight: float) -> None:
+def add_stage(work: Array, weight: float) -> None:
     """The stage's rates, weighted, into the sums."""
     for j in range(work.shape[1]):
         work[SUM_V, j] += weight * work[V, j]
@@ -143,7 +143,7 @@ def _add_stage(work: Array, weight: float) -> None:
 
 
 @borrowing
-def _end(state: Array, work: Array, sixth: complex, joints: Array) -> None:
+def end_step(state: Array, work: Array, sixth: complex, joints: Array) -> None:
     """The state after the step."""
     for j in range(state.shape[0]):
         moved = sixth * work[SUM_V, j]
