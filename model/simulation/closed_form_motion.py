@@ -8,7 +8,7 @@ from model import layout as at
 from model.arrays import Array
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
-from model.dynamics.compilation import inlined, internal
+from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.dual import sin_cos
 from model.dynamics.linear_solve import solve_3
 from model.dynamics.three_joint import gravity_torques, horizontal_gravity_torques, mass_matrix_and_bias
@@ -45,7 +45,7 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
     )
 
 
-@internal
+@borrowing
 def advance(  # noqa: PLR0915 (a step in registers: three joints written out, nothing allocated)
     state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm
 ) -> None:
