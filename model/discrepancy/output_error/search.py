@@ -63,8 +63,10 @@ class Point(Calibration):
 
     @cached_property
     def information(self) -> Floats:
-        """(p, p) of data and priors. Not to be written to: a step and its correction both read it."""
-        return self.tangents @ self.tangents.T + np.diag(self.precision)
+        """(p, p) of data and priors, read-only: a step and the correction after it share it."""
+        found = self.tangents @ self.tangents.T + np.diag(self.precision)
+        found.flags.writeable = False
+        return found
 
     @property
     def is_finite(self) -> bool:
