@@ -103,6 +103,7 @@ def diagnose_sealed(
 
 
 def _environment() -> dict[str, str]:
-    return {
+    kept = {
         key: value for key, value in os.environ.items() if key in _KEPT_VARIABLES or key.startswith(_KEPT_BEGINNINGS)
     }
+    return {"OPENBLAS_NUM_THREADS": "1"} | kept  # as `daq` does: threads of thin products wait for each other

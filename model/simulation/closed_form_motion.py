@@ -8,7 +8,7 @@ from model import layout as at
 from model.arrays import Array
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
-from model.dynamics.compilation import inlined, internal
+from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.dual import sin_cos
 from model.dynamics.linear_solve import solve_3
 from model.dynamics.three_joint import gravity_torques, horizontal_gravity_torques, mass_matrix_and_bias
@@ -45,7 +45,7 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
     )
 
 
-@internal
+@borrowing
 def advance(  # noqa: PLR0915 (a step in registers: three joints written out, nothing allocated)
     state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm
 ) -> None:
@@ -114,9 +114,13 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
             t3 = drive_3 - damping_3 * u3 - y3 * l3
             if special:
                 now = start + step * h + reach
-                t1 += special_torque(joints[0], flags[0], stage, now, h, q1 + dq1, u1, u1, v1, y1, state[0], volts[0])
-                t2 += special_torque(joints[1], flags[1], stage, now, h, p2, u2, u2, v2, y2, state[1], volts[1])
-                t3 += special_torque(joints[2], flags[2], stage, now, h, p3, u3, u3, v3, y3, state[2], volts[2])
+                if flags[0] != 0:
+                    p1 = q1 + dq1
+                    t1 += special_torque(joints[0], flags[0], stage, now, h, p1, u1, u1, v1, y1, state[0], volts[0])
+                if flags[1] != 0:
+                    t2 += special_torque(joints[1], flags[1], stage, now, h, p2, u2, u2, v2, y2, state[1], volts[1])
+                if flags[2] != 0:
+                    t3 += special_torque(joints[2], flags[2], stage, now, h, p3, u3, u3, v3, y3, state[2], volts[2])
             if tilted:
                 b1, b2, b3 = horizontal_gravity_torques(q1 + dq1 + offset_1, p2 + offset_2, p3 + offset_3, body)
                 t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3
@@ -133,15 +137,18 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
         z1 = deflection(z1, dq1, soft_1, form_1)
         z2 = deflection(z2, dq2, soft_2, form_2)
         z3 = deflection(z3, dq3, soft_3, form_3)
-        if special:
-            state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3
-            state[0, SPEED] = v1
+        if flags[0] != 0:
+            state[0, SPEED], state[0, DEFLECTION] = v1, z1
             after_step(state[0], joints[0], flags[0], l1, v1, sixth * vs1, volts[0], h)
-            state[1, SPEED] = v2
+            z1 = state[0, DEFLECTION]
+        if flags[1] != 0:
+            state[1, SPEED], state[1, DEFLECTION] = v2, z2
             after_step(state[1], joints[1], flags[1], l2, v2, sixth * vs2, volts[1], h)
-            state[2, SPEED] = v3
+            z2 = state[1, DEFLECTION]
+        if flags[2] != 0:
+            state[2, SPEED], state[2, DEFLECTION] = v3, z3
             after_step(state[2], joints[2], flags[2], l3, v3, sixth * vs3, volts[2], h)
-            z1, z2, z3 = state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION]
+            z3 = state[2, DEFLECTION]
     state[0, POSITION], state[1, POSITION], state[2, POSITION] = q1, q2, q3
     state[0, SPEED], state[1, SPEED], state[2, SPEED] = v1, v2, v3
     state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3

@@ -14,7 +14,7 @@ from model import layout as at
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
-from model.dynamics.compilation import compiled, internal
+from model.dynamics.compilation import borrowing, compiled, compiled_borrowing, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
@@ -24,19 +24,20 @@ from model.simulation.joint_torques import rubs_under_gravity
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, uncompiled
 
 
-@internal
+@borrowing
 def rod_arm_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], a: NDArray[Any]
 ) -> None:
     """Closed form, tilted base included."""
     theta_1, theta_2, theta_3 = q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA]
-    b1, b2, b3 = three_joint.horizontal_gravity_torques(theta_1, theta_2, theta_3, body)
-    a[0], a[1], a[2] = accelerations(
-        theta_2, theta_3, v[0], v[1], v[2], torque[0] - b1, torque[1] - b2, torque[2] - b3, body
-    )
+    t1, t2, t3 = torque[0], torque[1], torque[2]
+    if body[lumped.GRAVITY_X] != 0.0 or body[lumped.GRAVITY_Y] != 0.0:
+        b1, b2, b3 = three_joint.horizontal_gravity_torques(theta_1, theta_2, theta_3, body)
+        t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3
+    a[0], a[1], a[2] = accelerations(theta_2, theta_3, v[0], v[1], v[2], t1, t2, t3, body)
 
 
-@internal
+@borrowing
 def _add_shares(joints: NDArray[Any], gravity: NDArray[Any], out: NDArray[Any]) -> None:
     """Adds to the levels `out` each joint's share of its gravity torque, N·m."""
     for j in range(joints.shape[0]):
@@ -53,14 +54,19 @@ def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -
     return result
 
 
-@compiled
+@compiled_borrowing
 def rod_arm_levels(
     q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], _settings: NDArray[Any], out: NDArray[Any]
 ) -> None:
     """(7.32) to (7.34) from the closed form's parameters, and shares of the gravity torques."""
     _published_levels(q, joints, body[lumped.SIZE], body[lumped.SIZE + 1], out)
     if rubs_under_gravity(joints):
-        _add_shares(joints, rod_arm_gravity(q, joints, body), out)
+        g1, g2, g3 = three_joint.gravity_torques(
+            q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA], body
+        )
+        out[0] += joints[0, at.GRAVITY_SHARE] * magnitude(g1)
+        out[1] += joints[1, at.GRAVITY_SHARE] * magnitude(g2)
+        out[2] += joints[2, at.GRAVITY_SHARE] * magnitude(g3)
 
 
 @internal
@@ -114,7 +120,7 @@ def chain_gravity(q: NDArray[Any], _joints: NDArray[Any], body: ChainArrays) -> 
     return recursive.gravity_torques(body, q)
 
 
-@internal
+@borrowing
 def _published_levels(
     q: NDArray[Any], joints: NDArray[Any], weight_2: complex, weight_3: complex, out: NDArray[Any]
 ) -> None:

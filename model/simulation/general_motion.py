@@ -10,7 +10,7 @@ from typing import Any
 
 from model import layout as at
 from model.arrays import Array
-from model.dynamics.compilation import internal
+from model.dynamics.compilation import borrowing, internal
 from model.simulation.dynamics_of_run import accelerate, friction_levels_of, gravity_of
 from model.simulation.joint_torques import (
     DEFLECTION,
@@ -30,8 +30,8 @@ from model.simulation.own_torque import own_torque
 from model.simulation.run_arrays import Arm
 
 # Rows of the work array (WORK, n): stage values, accelerations, weighted sums.
-Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B, LOAD = range(13)
-WORK = 13
+Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B, LOAD, MOTOR = range(14)
+WORK = 14
 
 
 @internal
@@ -46,47 +46,74 @@ def advance(
     n = joints.shape[0]
     h = duration / steps
     for step in range(steps):
-        _begin(state, work)
+        begin(state, work)
         for stage in range(4):
             reach = 0.0 * h if stage == 0 else (h if stage == 3 else 0.5 * h)
-            _to_stage(state, work, reach)
+            to_stage(state, work, reach)
             friction_levels_of(kind, work[Q], joints, body, arm.settings, work[LEVEL])
             now = start + step * h + reach
             if own.shape[1] > 0:
                 work[LOAD] = gravity_of(kind, work[Q], joints, body)
-            for j in range(n):
-                joint, moved = joints[j], work[Q, j] - state[j, POSITION]
-                z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING], joint[at.PRESLIDING_SHAPE])
-                gives = flags[j] & at.HAS_FLEXIBILITY != 0
-                turning = work[W, j] if gives else work[V, j]
-                motor = motor_gain(joint, state[j, RISE]) * volts[j] - motor_damping(joint, state[j, RISE]) * turning
-                link = -z * work[LEVEL, j]
-                if flags[j] != 0:
-                    begun = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
-                    link += special_torque(
-                        joint, flags[j], stage, now, h, work[Q, j], work[V, j], turning, begun, z, state[j], volts[j]
-                    )
-                if flags[j] & at.HAS_USER_EFFECT:
-                    link += own_torque(own[j], joint, work[Q, j], work[V, j], volts[j], work[LOAD, j], now)
-                if gives:
-                    through = transmitted(joint, work[M, j] - work[Q, j], work[W, j] - work[V, j])
-                    rotor = joint[at.ROTOR_INERTIA] * joint[at.GEAR] * joint[at.GEAR]
-                    work[B, j] = (motor - through) / rotor
-                    motor = through
-                work[TORQUE, j] = link + motor
+            form_torques(state, work, volts, now, h, stage, joints, flags)
+            if own.shape[1] > 0:
+                for j in range(n):
+                    if flags[j] & at.HAS_USER_EFFECT:
+                        work[TORQUE, j] += own_torque(
+                            own[j], joints[j], work[Q, j], work[V, j], volts[j], work[LOAD, j], now
+                        )
+            add_motors(work)
             accelerate(kind, work[Q], work[V], work[TORQUE], joints, body, work[A])
-            _add_stage(work, 2.0 if stage in (1, 2) else 1.0)
-        _end(state, work, h / 6.0, joints)
-        for j in range(n):
-            if flags[j] != 0:
-                gives = flags[j] & at.HAS_FLEXIBILITY != 0
-                turning = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
-                change = h / 6.0 * (work[SUM_B, j] if gives else work[SUM_A, j])
-                after_step(state[j], joints[j], flags[j], work[LEVEL, j], turning, change, volts[j], h)
+            add_stage(work, 2.0 if stage in (1, 2) else 1.0)
+        end_step(state, work, h / 6.0, joints)
+        end_joints(state, work, volts, h, joints, flags)
 
 
-@internal
-def _begin(state: Array, work: Array) -> None:
+@borrowing
+def form_torques(
+    state: Array, work: Array, volts: Array, now: complex, h: complex, stage: int, joints: Array, flags: Array
+) -> None:
+    """Torques on the links but for those of the user's effects and of the motors, which stand in a row of their own."""
+    for j in range(joints.shape[0]):
+        joint, moved = joints[j], work[Q, j] - state[j, POSITION]
+        z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING], joint[at.PRESLIDING_SHAPE])
+        gives = flags[j] & at.HAS_FLEXIBILITY != 0
+        turning = work[W, j] if gives else work[V, j]
+        motor = motor_gain(joint, state[j, RISE]) * volts[j] - motor_damping(joint, state[j, RISE]) * turning
+        link = -z * work[LEVEL, j]
+        if flags[j] != 0:
+            begun = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
+            link += special_torque(
+                joint, flags[j], stage, now, h, work[Q, j], work[V, j], turning, begun, z, state[j], volts[j]
+            )
+        if gives:
+            through = transmitted(joint, work[M, j] - work[Q, j], work[W, j] - work[V, j])
+            rotor = joint[at.ROTOR_INERTIA] * joint[at.GEAR] * joint[at.GEAR]
+            work[B, j] = (motor - through) / rotor
+            motor = through
+        work[TORQUE, j] = link
+        work[MOTOR, j] = motor
+
+
+@borrowing
+def add_motors(work: Array) -> None:
+    """The motors' torques, or what gears transmit of them, to those on the links."""
+    for j in range(work.shape[1]):
+        work[TORQUE, j] += work[MOTOR, j]
+
+
+@borrowing
+def end_joints(state: Array, work: Array, volts: Array, h: complex, joints: Array, flags: Array) -> None:
+    """What a step of `h` s leaves behind beside positions and speeds."""
+    for j in range(joints.shape[0]):
+        if flags[j] != 0:
+            gives = flags[j] & at.HAS_FLEXIBILITY != 0
+            turning = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
+            change = h / 6.0 * (work[SUM_B, j] if gives else work[SUM_A, j])
+            after_step(state[j], joints[j], flags[j], work[LEVEL, j], turning, change, volts[j], h)
+
+
+@borrowing
+def begin(state: Array, work: Array) -> None:
     """A step begins: stage values are those of the state, accelerations and sums are zero."""
     for j in range(state.shape[0]):
         work[V, j], work[W, j] = state[j, SPEED], state[j, ROTOR_SPEED]
@@ -95,8 +122,8 @@ def _begin(state: Array, work: Array) -> None:
             work[row, j] = 0.0 * state[j, SPEED]
 
 
-@internal
-def _to_stage(state: Array, work: Array, reach: complex) -> None:
+@borrowing
+def to_stage(state: Array, work: Array, reach: complex) -> None:
     """Stage values from the state and the rates of the stage before."""
     for j in range(state.shape[0]):
         work[Q, j] = state[j, POSITION] + reach * work[V, j]
@@ -105,8 +132,8 @@ def _to_stage(state: Array, work: Array, reach: complex) -> None:
         work[W, j] = state[j, ROTOR_SPEED] + reach * work[B, j]
 
 
-@internal
-def _add_stage(work: Array, weight: float) -> None:
+@borrowing
+def add_stage(work: Array, weight: float) -> None:
     """The stage's rates, weighted, into the sums."""
     for j in range(work.shape[1]):
         work[SUM_V, j] += weight * work[V, j]
@@ -115,8 +142,8 @@ def _add_stage(work: Array, weight: float) -> None:
         work[SUM_B, j] += weight * work[B, j]
 
 
-@internal
-def _end(state: Array, work: Array, sixth: complex, joints: Array) -> None:
+@borrowing
+def end_step(state: Array, work: Array, sixth: complex, joints: Array) -> None:
     """The state after the step."""
     for j in range(state.shape[0]):
         moved = sixth * work[SUM_V, j]

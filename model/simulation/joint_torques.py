@@ -16,7 +16,7 @@ from model import layout as at
 from model.arrays import Array
 from model.drives.magnet import back_emf_constant, torque_constant
 from model.drives.piecewise import clamped, magnitude, outside
-from model.dynamics.compilation import borrowing, inlined, internal
+from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.dual import sin_cos
 
 RESTICK_SPEED = 1e-3
@@ -121,7 +121,7 @@ def current_after(joint: Array, rise: Any, current: Any, volts: Any, begun: Any,
     return settled + (current - before) * (1.0 - turns * first) + (before - settled) * first
 
 
-@internal
+@borrowing
 def extra_torque(
     joint: Array, flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex, through: complex
 ) -> Any:
@@ -183,7 +183,7 @@ def special_torque(
     return torque + extra_torque(joint, flags, time, q, speed, z, state[STUCK], through)
 
 
-@internal
+@borrowing
 def after_step(
     state: Array,
     joint: Array,
@@ -205,7 +205,7 @@ def after_step(
         still_stuck(joint, level, state[SPEED], state[DEFLECTION : DEFLECTION + 1], state[STUCK : STUCK + 1])
 
 
-@internal
+@borrowing
 def still_stuck(joint: Array, level: complex, speed: complex, z: Array, stuck: Array) -> None:
     """Breaks away when the contact is stretched to its end; sticks again when motion stops or turns.
 

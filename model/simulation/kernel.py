@@ -20,7 +20,7 @@ from model.drives.amplifier import motor_volts
 from model.drives.controller import MEMORY
 from model.drives.piecewise import clamped
 from model.dynamics.compilation import internal
-from model.simulation import closed_form_motion, general_motion
+from model.simulation import closed_form_motion, flexible_motion, general_motion
 from model.simulation.dynamics_of_run import body_of, friction_levels_of, gravity_of
 from model.simulation.joint_torques import (
     CURRENT,
@@ -64,6 +64,18 @@ def _advance_of(kind: Any, state: Any, volts: Any, start: Any, duration: Any, st
             closed_form_motion.advance(state, volts, start, duration, steps, arm)
 
         return closed_form
+
+    if kind.instance_class is Flexible:
+
+        def flexible(
+            kind: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, arm: Any, work: Any
+        ) -> None:
+            if arm.own.shape[1] > 0:
+                general_motion.advance(kind, state, volts, start, duration, steps, arm, work)
+            else:
+                flexible_motion.advance(state, volts, start, duration, steps, arm, work)
+
+        return flexible
 
     def general(kind: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, arm: Any, work: Any) -> None:
         general_motion.advance(kind, state, volts, start, duration, steps, arm, work)

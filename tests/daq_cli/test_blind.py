@@ -97,6 +97,7 @@ def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Camp
     assert told["files"] == ["asking.json", "held-out.mcap", "model.json", "trace-1.mcap", "trace-2.mcap"]
     assert told["arguments"] == []
     assert "DAQ_RUNTIME_FOLDER" not in told["environment"]
+    assert told["environment"]["OPENBLAS_NUM_THREADS"]
     everything = json.dumps(told)
     for seed in SECRETS:
         assert str(seed) not in everything

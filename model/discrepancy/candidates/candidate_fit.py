@@ -185,7 +185,8 @@ def polish(before: Fit, found: CandidateFit) -> CandidateFit:
     near = [k for k, u in enumerate(point.unknowns) if not u.joints or set(u.joints) & set(joints)]
     free = _indices(point.unknowns, [p.name for p in found.hypothesis.free])
     try:
-        point = descend(point.with_new_tangents(near), POLISHING, free)
+        begun = point.with_new_tangents(near)
+        point = descend(begun, POLISHING, free, changing_known=set(free) <= set(near))
     except SpecError:
         return found
     better = with_evidence(before, found.probe, point)

@@ -73,7 +73,7 @@ class Projection:
 def projection(point: Point) -> Projection:
     """The projection at a point."""
     pull = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
-    information = point.information
+    information = point.information.copy()
     information[np.diag_indices_from(information)] *= 1 + 1e-9
     return Projection(point.tangents, np.asarray(np.linalg.inv(information), dtype=np.float64), point.weighted, pull)
 

@@ -127,7 +127,7 @@ class Prediction:
         """Information (p, p) about the shared unknowns from traces and priors, those of single traces marginalised;
         about the new starts, their priors."""
         mine = np.array([u.trace is None for u in self.point.unknowns])
-        information = self.point.information
+        information = self.point.information.copy()
         information[np.diag_indices_from(information)] *= 1 + LOOSE
         inner, cross = information[np.ix_(~mine, ~mine)], information[np.ix_(~mine, mine)]
         left = information[np.ix_(mine, mine)]

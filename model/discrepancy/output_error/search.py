@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -60,10 +61,12 @@ class Point(Calibration):
         """The largest deviation from a prior's mean, in its standard deviations."""
         return float(np.max(np.abs(self.values - self.expected) * np.sqrt(self.precision), initial=0.0))
 
-    @property
+    @cached_property
     def information(self) -> Floats:
-        """(p, p) of data and priors."""
-        return self.tangents @ self.tangents.T + np.diag(self.precision)
+        """(p, p) of data and priors, read-only: a step and the correction after it share it."""
+        found = self.tangents @ self.tangents.T + np.diag(self.precision)
+        found.flags.writeable = False
+        return found
 
     @property
     def is_finite(self) -> bool:
@@ -110,14 +113,17 @@ def point_at(observation: Observation, tried: Calibration, tangents: Floats | No
     return Point(tried.model, tried.unknowns, tried.values, observation, residuals, weighted, tangents)
 
 
-def descend(point: Point, steps: int, changing: Sequence[int] = (), goal: float = math.inf) -> Point:
+def descend(
+    point: Point, steps: int, changing: Sequence[int] = (), goal: float = math.inf, *, changing_known: bool = False
+) -> Point:
     """The point to which at most `steps` steps lead.
 
-    Derivatives by the unknowns of the indices `changing` are computed anew at every step. The search ends early where
-    the remaining steps, each as good as the last, would not lead to a cost of `goal`.
+    Derivatives by the unknowns of the indices `changing` are computed anew at every step; not at the first where they
+    are known at the point already. The search ends early where the remaining steps, each as good as the last, would not
+    lead to a cost of `goal`.
     """
     for number in range(steps):
-        if changing:
+        if changing and not (changing_known and number == 0):
             point = point.with_new_tangents(changing)
         following, descends = _step(point)
         if not descends:
@@ -167,7 +173,7 @@ def _step(point: Point) -> tuple[Point, bool]:
 
 def _gauss_newton(point: Point, least: Floats, most: Floats, damping: float) -> Floats:
     """The damped step (p,) to the minimum of the linearised problem, between `least` and `most` (p,)."""
-    information = point.information
+    information = point.information.copy()
     diagonal = np.diag(information)
     information[np.diag_indices_from(information)] += (1e-9 + damping) * np.maximum(diagonal, 1e-12 * diagonal.max())
     descent = point.tangents @ point.weighted - point.precision * (point.values - point.expected)

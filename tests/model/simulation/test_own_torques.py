@@ -17,6 +17,8 @@ from model.effects.effect_files import load_effect_file
 from model.effects.library import own_effects, remove_own
 from model.machine_model.model import Model, base_model
 from model.simulation.own_table import own_table
+from model.simulation.simulate import simulate
+from tests.model.simulation.records import ramp_inputs
 
 ARM = load_machine("ma2000")
 BEYOND_COLUMNS = (0, 2)
@@ -116,3 +118,21 @@ def test_a_torque_that_is_not_one_function_with_exact_derivatives_is_refused_in_
 @pytest.mark.parametrize("torque", ["k * magnitude(speed) * speed", "k * magnitude(speed)"])
 def test_a_torque_may_have_a_corner(tmp_path: Path, torque: str) -> None:
     assert own_table(arm_with(tmp_path, "k, speed", torque)(), np.float64)[0, 0, 0] != 0
+
+
+def test_the_arm_with_a_gear_that_gives_moves_to_the_bit_as_the_general_steps_move_it(tmp_path: Path) -> None:
+    """A user's effect takes the general steps. Of no size, it changes nothing else."""
+    loaded(tmp_path, "pull", "k", "k", "k")
+    inputs = ramp_inputs(ARM, back=True)
+    model = (
+        base_model(ARM)
+        .with_effect("joint_compliance", (1,), {"compliance": 1e-3})
+        .with_effect("backlash", (3,), {"gap": 0.02})
+        .with_effect("stiction", (2,), {"breakaway": 0.6})
+        .with_effect("gravity_torque_friction", (2,), {"share": 0.1})
+        .with_effect("base_tilt", values={"about_x": 0.05})
+    )
+    own = simulate(model, inputs)
+    general = simulate(model.with_effect("pull", (2,)), inputs)
+    assert np.array_equal(own.position, general.position)
+    assert np.array_equal(own.drive, general.drive)

@@ -48,6 +48,21 @@ def test_a_search_that_cannot_reach_its_goal_is_given_up(
     assert descend(begun, 5, goal=goal).cost == ends_at
 
 
+def test_derivatives_that_are_known_at_a_point_are_not_computed_again(given: Point) -> None:
+    changing = [0, 3]
+    known = given.with_new_tangents(range(5))
+    again = descend(known, 2, changing)
+    spared = descend(known, 2, changing, changing_known=True)
+    assert np.array_equal(spared.values, again.values)
+    assert np.array_equal(spared.tangents, again.tangents)
+
+
+def test_the_information_that_steps_share_cannot_be_written_to(given: Point) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        given.information[0, 0] = 1.0
+    assert given.moved_to(given.values).information is not given.information
+
+
 def test_a_better_fit_without_the_candidate_becomes_the_baseline(given: Point) -> None:
     end = judge(converge(given, 4))
     hypothesis = Hypothesis("coulomb_friction", (2,), given.model, (), (), proportional=True)
