@@ -114,13 +114,12 @@ def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) 
 
 
 def is_far(p: Parameter, value: float) -> bool:
-    """Whether a number is far from what the file states.
+    """Whether a number is far from what the file states, measured as its prior measures it (`prior_distance`).
 
-    A number that cannot be negative is stated to a share of itself: twice and half as much are then equally far. In
-    distances no number down to zero is far from one that is stated to a quarter of itself or worse. That is of
-    friction; the machine's own numbers are held by distances (`prior_distance`), and are measured by them.
+    Friction is stated to a share of itself, so that below what is stated its ratio counts: in distances no number down
+    to zero is far from one that is stated to a quarter of itself or worse.
     """
     deviation = p.deviation or 0.0
-    if p.effect is None or p.low < 0.0 or p.value <= 0.0:
+    if p.effect is None or p.low < 0.0 or p.value <= 0.0 or value >= p.value:
         return abs(value - p.value) > FAR * deviation
-    return value <= 0.0 or abs(math.log(value / p.value)) > FAR * deviation / p.value
+    return value <= 0.0 or math.log(p.value / value) > FAR * deviation / p.value
