@@ -64,12 +64,12 @@ NUMBER_WORDS = {
     "wrong_link_inertia": EffectWords("moments of inertia other than stated", None),
     "wrong_link_centre": EffectWords("a centre of mass other than stated", None),
     "wrong_geometry": EffectWords("dimensions other than stated", None),
-    "wrong_torque_constant": EffectWords("a torque constant other than stated", "torque_constant"),
-    "wrong_resistance": EffectWords("a resistance of the winding other than stated", "resistance"),
-    "wrong_drive_gain": EffectWords("a gain of the drive other than stated", "gain"),
-    "wrong_gear_ratio": EffectWords("a gear ratio other than stated", "gear_ratio"),
+    "wrong_torque_constant": EffectWords("a torque constant other than stated", None),
+    "wrong_resistance": EffectWords("a resistance of the winding other than stated", None),
+    "wrong_drive_gain": EffectWords("a gain of the drive other than stated", None),
+    "wrong_gear_ratio": EffectWords("a gear ratio other than stated", None),
 }
-"""Every number of the machine that a step may name."""
+"""Every number of the machine that a step may name; each of its parameters is a size."""
 
 IN_TORQUES = {
     "wrong_rotor_inertia": "{torque} is missing in proportion to the acceleration of this joint alone",

@@ -49,7 +49,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     plain = _takes_half_of_what_is_no_noise(found, before, case)
     if not plain and any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
         return False
-    if any(_ends_at_bound(p, found.fit.values[p.name]) for p in found.parameters):
+    if sizes_at_bounds(found):
         return False
     if not is_far_everywhere(found.stated, found.fit.values):
         return False
@@ -95,6 +95,11 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
     """Whether friction fades at the lowest speed that is looked at: then it fades below, where a smoothed speed does
     not tell whether the joint stands."""
     return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
+
+
+def sizes_at_bounds(found: Fitted) -> list[Parameter]:
+    """Sizes of an effect that ended at the end of what they may be."""
+    return [p for p in found.parameters if _ends_at_bound(p, found.fit.values[p.name])]
 
 
 def _ends_at_bound(p: Parameter, value: float) -> bool:

@@ -239,6 +239,5 @@ def _relief(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
 
 def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """k ln n for k parameters and n independent samples, and twice the logarithm of the places searched."""
-    counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
-    independent = max(float((counts / memory).sum()), 2.0)
+    independent = max(float((before.data.stretches.counts / memory).sum()), 2.0)
     return parameters * float(np.log(independent)) + 2 * float(np.log(max(places, 1)))
