@@ -283,10 +283,11 @@ def drives_at_limit(records: Sequence[RecordedMotion], joints: Sequence[int]) ->
     weights = [float(np.ptp(r.time)) for r in records]
     shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=weights)
     unknown = np.array([r.not_known for r in records])
+    some, every = (np.asarray(np.sum(m, axis=0) > 0) for m in (unknown, ~unknown))
     return DrivesAtLimit(
         tuple((j, float(share)) for j, share in zip(joints, shares, strict=True) if share > 0.0),
-        tuple(j for j, some in zip(joints, unknown.any(axis=0), strict=True) if some),
-        tuple(j for j, every in zip(joints, unknown.all(axis=0), strict=True) if every),
+        tuple(j for j, one in zip(joints, some, strict=True) if one),
+        tuple(j for j, known in zip(joints, every, strict=True) if not known),
     )
 
 
