@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from daq.contracts.progress import Never, silent
+from daq.contracts.progress import Never
 from model.discrepancy.inverse_dynamics.fitting import fit
 from model.discrepancy.inverse_dynamics.judging import BESIDE_REFUSED, judge
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -66,16 +66,6 @@ def test_the_first_candidates_are_fitted_to_their_ends(found: tuple[Fitted, ...]
     refined = _refined([replace(best, fit=begun)] * (REFINED + 1), Never())
     assert all(one.fit.criterion == pytest.approx(last.criterion, abs=0.1) for one in refined[:REFINED])
     assert refined[REFINED].fit is begun
-
-
-def test_a_search_refines_what_it_found(rubbing: TorqueWorkflow, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With derivatives that are of another place, a fit ends beside the best values."""
-    misled = {name: [0.3 * s for s in slopes] for name, slopes in rubbing.now.slopes().items()}
-    monkeypatch.setattr(type(rubbing.now), "slopes", lambda _: misled)
-    (best, *_) = search(rubbing.model, rubbing.now, rubbing.case, silent, Never()).fitted
-    last = best.fit
-    again = fit(last.balance, last.unknowns, last.values, last.data, last.noise.memory)
-    assert last.criterion == pytest.approx(again.criterion, abs=0.1)
 
 
 @pytest.mark.parametrize(("share", "taken"), [(0.9, False), (1.1, True)])
