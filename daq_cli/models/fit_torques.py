@@ -72,4 +72,11 @@ def _print(found: TorqueFit) -> None:
     print_table(errors, 120)
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")
+    if found.at_limit:
+        from model.discrepancy.explanation.note_words import note_words
+        from model.discrepancy.explanation.renderer import sentence
+        from model.discrepancy.grounds import Note
+
+        values = {"shares": found.at_limit, "not_examined": found.unknown_joints}
+        print(sentence(note_words(Note(kind="drive-at-limit", values=values))))
     print_on_the_edge(found.on_the_edge)

@@ -353,6 +353,8 @@ class Diagnosis(FrozenRecord):
     """Joints on which more is left than noise, where the verdict is `unknown-effect`."""
     worse_held_out: tuple[int, ...] = ()
     """Joints whose held-out error grew although no effect was added: the tolerance parameters were fitted wrongly."""
+    not_examined: tuple[int, ...] = ()
+    """Joints of which no fitted trace tells anything, since their drives stand at limits: the answer is not of them."""
 
 
 def in_order(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:

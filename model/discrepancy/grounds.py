@@ -48,6 +48,7 @@ NoteKind = Literal[
     "one-class",
     "positions-of-links",
     "resting-left-out",
+    "size-at-bound",
     "stated-numbers-moved",
     "taken-out-again",
     "tolerances-fitted-first",

@@ -117,6 +117,7 @@ class Effect:
         joints: on which it may act; empty for any.
         tone: what it repeats over, if it is a tone: no trial size can find one, a spectrum proposes its rate.
         family, torque, file: of an effect of the user's own (`model.effects.own`).
+        own_entry: of one that the shared list lacks, the entry that it would have there (`machine_numbers`).
     """
 
     name: str
@@ -131,6 +132,7 @@ class Effect:
     family: str = ""
     torque: Callable[..., Any] | None = None
     file: EffectFile | None = None
+    own_entry: EffectName | None = None
 
     @property
     def is_flexible(self) -> bool:
@@ -142,4 +144,6 @@ class Effect:
         """Its entry in the shared list; for a user's own effect, an entry of the same form."""
         if self.file is not None:
             return EffectName(self.name, "joint torque", self.family, self.physics)
+        if self.own_entry is not None:
+            return self.own_entry
         return effect_names()[self.name]

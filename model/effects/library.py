@@ -11,6 +11,7 @@ from model.effects.effect import Effect, EffectFile
 from model.effects.external import EXTERNAL
 from model.effects.friction import FRICTION
 from model.effects.load import LOAD
+from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.motor import MOTOR
 from model.effects.sensor import SENSOR
 from model.effects.transmission import TRANSMISSION
@@ -68,6 +69,11 @@ def effect(name: str) -> Effect:
     if found is None:
         raise SpecError(f"effect {name!r}: not in the library; it has {', '.join(library())}")
     return found
+
+
+def named_in_answers(name: str) -> Effect:
+    """What a step of an answer names: an effect, or a number of the machine. Raises SpecError with the names."""
+    return MACHINE_NUMBERS.get(name) or effect(name)
 
 
 def effect_from(name: str, file: EffectFile | None) -> Effect:

@@ -27,7 +27,7 @@ from model.fitting.shown import html_of, known_of, text_of
 from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.problem import TorqueProblem
-from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_limit, recorded_motion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
@@ -65,6 +65,11 @@ class TorqueFit(FrozenRecord):
     cutoff: float
     evaluations: int
     converged: bool
+    at_limit: tuple[tuple[int, float], ...] = ()
+    """Joints whose drives stand at limits that the file does not state, with their share of the time there: how much
+    less acts there is found beside all else."""
+    unknown_joints: tuple[int, ...] = ()
+    """Of these, joints of which a trace tells nothing for that reason."""
     on_the_edge: tuple[str, ...] = ()
     """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
 
@@ -145,6 +150,7 @@ def fit_torques(
         traces=tuple(t.record.trace_id for t in traces),
         fit={"fitted": [u.name for u in unknowns], "known": list(report.known)},
     )
+    limits = drives_at_limit(motions, model.machine.modelled_joints)
     progress(1.0, "done")
     return TorqueFit(
         model=fitted.with_lineage(lineage),
@@ -156,6 +162,8 @@ def fit_torques(
         cutoff=cutoff,
         evaluations=found.evaluations,
         converged=found.converged,
+        at_limit=limits.shares,
+        unknown_joints=limits.unknown,
         on_the_edge=on_the_edge(model, fitted, options),
     )
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from daq.contracts.effects import FORMER_EFFECTS, effect_names
 from model.discrepancy.diagnosis import FoundValue
-from model.effects.library import effect as effect_of
+from model.effects.library import named_in_answers
+from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_name
 
 
@@ -58,7 +59,27 @@ WORDS: dict[str, EffectWords] = {
 }
 """Every effect of the shared list."""
 
+NUMBER_WORDS = {
+    "wrong_rotor_inertia": EffectWords("a rotor inertia other than stated", None),
+    "wrong_link_inertia": EffectWords("moments of inertia other than stated", None),
+    "wrong_link_centre": EffectWords("a centre of mass other than stated", None),
+    "wrong_geometry": EffectWords("dimensions other than stated", None),
+    "wrong_torque_constant": EffectWords("a torque constant other than stated", None),
+    "wrong_resistance": EffectWords("a resistance of the winding other than stated", None),
+    "wrong_drive_gain": EffectWords("a gain of the drive other than stated", None),
+    "wrong_gear_ratio": EffectWords("a gear ratio other than stated", None),
+}
+"""Every number of the machine that a step may name; each of its parameters is a size."""
+
 IN_TORQUES = {
+    "wrong_rotor_inertia": "{torque} is missing in proportion to the acceleration of this joint alone",
+    "wrong_link_inertia": "{torque}s are missing as with the same mass spread differently over this link",
+    "wrong_link_centre": "{torque}s are missing as with mass elsewhere in this link",
+    "wrong_geometry": "{torque}s are missing as with a link of other dimensions",
+    "wrong_torque_constant": "the drive gives another {torque} for the same volts, and brakes otherwise with speed",
+    "wrong_resistance": "the drive gives another {torque} for the same volts, and brakes otherwise with speed",
+    "wrong_drive_gain": "every {torque} of the drive is larger or smaller by the same share",
+    "wrong_gear_ratio": "the drive gives another {torque} and turns otherwise for the same motion",
     "viscous_friction": "a {torque} against the motion grows in proportion to speed",
     "coulomb_friction": "a constant {torque} opposes motion and changes sign with its direction, at any speed",
     "load_dependent_friction": "a {torque} opposes motion in proportion to the weight on the joint",
@@ -102,6 +123,8 @@ def words_of(effect: str) -> EffectWords:
     """The entry of an effect; of the user's own effects, its identifier in words."""
     if effect in WORDS:
         return WORDS[effect]
+    if effect in MACHINE_NUMBERS:
+        return NUMBER_WORDS[effect]
     called = effect_name(effect)
     shared = effect in effect_names() or effect in FORMER_EFFECTS
     return EffectWords(called if shared else f"{called} (an effect of the user's own)", None)
@@ -119,4 +142,4 @@ def shape_in_torques(effect: str, *, slides: bool) -> str:
     if effect in IN_TORQUES:
         return IN_TORQUES[effect].format(**(SLIDING if slides else TURNING))
     known = effect_names()
-    return known[effect].line if effect in known else effect_of(effect).physics
+    return known[effect].line if effect in known else named_in_answers(effect).physics

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
 from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
-from model.discrepancy.explanation.renderer import size_words, suspicion_words, was_taken_back
+from model.discrepancy.explanation.renderer import not_examined_words, size_words, suspicion_words, was_taken_back
+from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
 
 SHOWN = 3
@@ -15,7 +16,12 @@ SHOWN = 3
 
 
 def headline(found: Diagnosis) -> str:
-    """The effects that were found, with joints and sizes; or that none was found, or none that is known. A clause."""
+    """The effects that were found, with joints and sizes; or that none was found, or none that is known; and joints
+    that were not examined. A clause."""
+    return "; ".join([_finding_of(found), *not_examined_words(found.not_examined)])
+
+
+def _finding_of(found: Diagnosis) -> str:
     if found.verdict == "suspected" and found.suspicion is not None:
         return f"perhaps {suspicion_words(found.suspicion)}"
     if found.verdict == "nothing-significant":
@@ -47,6 +53,6 @@ def _finding(step: Step) -> str:
     sizes = [
         size_words(v)
         for v in step.parameters.values()
-        if v.part == part and not (v.joints and set(v.joints) <= set(step.slight_joints))
+        if (v.part == part or effect in MACHINE_NUMBERS) and not (v.joints and set(v.joints) <= set(step.slight_joints))
     ]
     return ", ".join((effect_on(effect, step.main_joints), *sizes))

@@ -8,7 +8,7 @@ from typing import Any
 from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.grounds import Note, NoteKind
-from model.effects.names import effect_name
+from model.effects.names import effect_name, effect_on
 
 Values = Mapping[str, Any]
 
@@ -93,6 +93,14 @@ def _resting_left_out(_: Values) -> str:
     return "samples at which a joint rests are left out: friction holds it with whatever torque that takes"
 
 
+def _size_at_bound(v: Values) -> str:
+    return (
+        f"{effect_on(v['effect'], v['joints'])} would explain more (evidence {v['evidence']:.0f}), but only with "
+        f"{v['name']} at the end of what it may be, {_rounded(v['value'], v['unit'])}: no machine has that, so that it "
+        "is not named, and something like it may be missing"
+    )
+
+
 def _stated_numbers_moved(v: Values) -> str:
     numbers = v["numbers"]
     listed = ", ".join(
@@ -172,6 +180,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "one-class": _one_class,
     "positions-of-links": _positions_of_links,
     "resting-left-out": _resting_left_out,
+    "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
     "taken-out-again": _taken_out_again,
     "tolerances-fitted-first": _tolerances_fitted_first,

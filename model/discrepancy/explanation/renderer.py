@@ -166,7 +166,20 @@ def refusal_words(refusal: Refusal) -> str:
 
 
 def summary(answer: Diagnosis) -> str:
-    """The answer in a few sentences, from its verdict, its steps and what is left."""
+    """The answer in a few sentences: what was not examined, its verdict, its steps and what is left."""
+    return " ".join([*map(sentence, not_examined_words(answer.not_examined)), _summary_of(answer)])
+
+
+def not_examined_words(joints: Sequence[int]) -> list[str]:
+    """That joints were not examined, as a clause; none where all were."""
+    if not joints:
+        return []
+    one = len(joints) == 1
+    seen = "was not examined: its drive stands at its" if one else "were not examined: their drives stand at their"
+    return [f"{joints_in_words(joints)} {seen} largest value for too much of the time"]
+
+
+def _summary_of(answer: Diagnosis) -> str:
     adopted = [s for s in answer.steps if s.adopted]
     match answer.verdict:
         case "nothing-significant":

@@ -21,7 +21,7 @@ from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.verdict import verdict
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.drive_timing import MOST, samples_late
-from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_limit
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
 
@@ -77,6 +77,7 @@ def answer_of(outcome: Outcome, traces: Sequence[str], held_out: Sequence[str], 
         where=locate(standing.now, case),
         candidates=outcome.tried,
         remaining=shapes,
+        not_examined=drives_at_limit(case.records, standing.model.machine.modelled_joints).not_examined,
         model_before=standing.given,
         model_after=_resulting_model(outcome, traces),
         traces=tuple(traces),
@@ -158,14 +159,10 @@ def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note
 
 def _at_limits(standing: Standing) -> tuple[Note, ...]:
     """Where drives were at limits that no file states."""
-    records = (*standing.case.records, *standing.case.held_out)
-    shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=[np.ptp(r.time) for r in records])
     joints = standing.model.machine.modelled_joints
-    found = [(joint, float(share)) for joint, share in zip(joints, shares, strict=True) if share > 0.0]
-    unknown = [
-        joint for joint, some in zip(joints, np.any([r.not_known for r in records], axis=0), strict=True) if some
-    ]
-    return (Note(kind="drive-at-limit", values={"shares": found, "not_examined": unknown}),) if found else ()
+    found = drives_at_limit((*standing.case.records, *standing.case.held_out), joints)
+    values = {"shares": list(found.shares), "not_examined": list(found.unknown)}
+    return (Note(kind="drive-at-limit", values=values),) if found.shares else ()
 
 
 def _timing(standing: Standing) -> tuple[Note, ...]:

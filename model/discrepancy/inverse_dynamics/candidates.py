@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN, is
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.inverse_dynamics.stated_numbers import number_trials, stated_trial
+from model.discrepancy.inverse_dynamics.trial import Start, Trial
 from model.effects.effect import Effect
 from model.effects.library import library
 from model.inverse_dynamics.drive_timing import MOST
@@ -24,8 +26,6 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.effect_parameters import suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-
-Start = dict[str, float]
 
 UNSEEN = ("backlash", "damping")
 """Part of an effect that torques do not show: the damping of a contact acts in its vibration, above every cutoff."""
@@ -75,30 +75,6 @@ FASTEST_RIPPLE = 1000.0
 """Most waves of a ripple a turn (a metre) that are tried."""
 LONGEST_SCAN = 400
 """Largest number of frequencies that are tried."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """An effect on joints, with its own parameters and the starting values from which it is tried.
-
-    amplitudes: its parameters (full names) that measure its size; the others only shape it.
-    stated: those of its parameters that the file states, as it states them: the trial lifts their priors. Its starts
-        are then measured from where the tolerances' fit has them, `origin`, and not from nothing.
-    """
-
-    effect: str
-    joints: tuple[int, ...]
-    model: Model
-    parameters: tuple[Parameter, ...]
-    amplitudes: tuple[str, ...]
-    starts: tuple[Start, ...]
-    stated: tuple[Parameter, ...] = ()
-    origin: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def size(self) -> int:
-        """Parameters that the effect adds."""
-        return len(self.parameters)
 
 
 @dataclass(frozen=True)
@@ -168,7 +144,7 @@ class _Place:
 
 def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once; of what the file states,
-    whether it is another size than stated."""
+    whether it is another size than stated; and numbers of the machine that the fit has moved."""
     names = case.options.effects
     for name, effect in library().items():
         if name in NOT_IN_TORQUES or (names is not None and name not in names):
@@ -178,7 +154,7 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
         )
         for joints in places:
             if _present(model, name, joints):
-                if (again := _stated_trial(model, name, joints, now)) is not None:
+                if (again := stated_trial(model, name, joints, now)) is not None:
                     yield again
                 continue
             if not _possible(model, effect, joints) or (names is None and not is_beside(model, name, joints)):
@@ -188,6 +164,7 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
             trial = _trial(model, name, joints, now)
             if trial.starts:
                 yield trial
+    yield from number_trials(model, now, case)
 
 
 def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial:
@@ -201,19 +178,6 @@ def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) ->
     own = tuple(_narrowed(p, place) for p in added if p.effect != BENT or p.part in FREED_BENDS)
     amplitudes = tuple(p.name for p in own if p.null is not None)
     return Trial(name, joints, wider, own, amplitudes, tuple(_starts(name, own, place)))
-
-
-def _stated_trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial | None:
-    """An effect that the file states for this joint: it may be larger or smaller than within its stated deviations."""
-    tolerances = {u.name: u for u in now.unknowns if u.deviation is not None and not u.nuisance}
-    mine = (p for p in model.parameters if p.effect == name and p.joints == joints and p.null is not None)
-    own = tuple(p for p in mine if p.name in tolerances)
-    if not own or not joints:
-        return None
-    stated = tuple(replace(p, value=tolerances[p.name].expected, deviation=tolerances[p.name].deviation) for p in own)
-    origin = {p.name: now.values[p.name] for p in own}
-    start = {n: v + tolerances[n].scale for n, v in origin.items()}
-    return Trial(name, joints, model, own, tuple(origin), (start,), stated, origin)
 
 
 def _constant_load(model: Model, name: str, column: int, records: Sequence[RecordedMotion]) -> bool:

@@ -33,11 +33,7 @@ MORE_THAN_NOISE = 1.1
 
 def mean_squares(stretches: Stretches, residual: Sequence[Floats]) -> Floats:
     """Mean square (n,) of residual torques by joint where it moves; NaN for a joint that never does."""
-    return _mean_squares([stretches.of_joint(residual, j) for j in range(len(stretches.by_joint))])
-
-
-def _mean_squares(by_joint: Sequence[Sequence[Floats]]) -> Floats:
-    return np.array([float(np.mean(np.concatenate(p) ** 2)) if p else np.nan for p in by_joint])
+    return stretches.mean_squares(residual)
 
 
 def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[RecordedMotion, ...]) -> Floats:
@@ -61,15 +57,15 @@ def evidence(before: BalanceFit, after: BalanceFit, records: tuple[RecordedMotio
 def block_squares(now: BalanceFit) -> Floats:
     """Mean squares (n,) that a fit leaves on quarters of its own records, each predicted from the others."""
     known, data = now.slopes(), now.data
-    whole: list[list[Floats]] = [[] for _ in range(len(data.floor))]
+    sums, counts = np.zeros(len(data.floor)), np.zeros(len(data.floor))
     for fold in range(FOLDS):
         inside = [_fold(len(r), fold) for r in now.residual]
         others = Data(data.stretches.within([~m for m in inside]), data.floor)
         found = fit(now.balance, now.unknowns, now.values, others, now.noise.memory, known, BLOCK_ROUNDS)
         left = data.stretches.within(inside)
-        for j in range(len(data.floor)):
-            whole[j] += left.of_joint(found.residual, j)
-    return _mean_squares(whole)
+        sums += np.nan_to_num(left.mean_squares(found.residual)) * left.counts
+        counts += left.counts
+    return np.asarray(np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan))
 
 
 def _fold(count: int, fold: int) -> NDArray[np.bool_]:

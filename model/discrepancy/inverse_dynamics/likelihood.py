@@ -28,14 +28,35 @@ SHORTEST_STRETCH = 6
 
 @dataclass(frozen=True)
 class Stretches:
-    """Where each joint moves: per joint, the record (index) and rows of every uninterrupted stretch."""
+    """Where each joint moves: per joint, the record (index) and rows of every uninterrupted stretch.
+
+    unknown: per joint, the dimensions that were projected away of its residuals (`RecordedMotion.unknown_count`); none
+    where it is empty.
+    """
 
     by_joint: tuple[tuple[Stretch, ...], ...]
+    unknown: tuple[float, ...] = ()
 
     @property
-    def samples(self) -> int:
+    def samples(self) -> float:
         """Number of residuals that are compared, of all joints."""
-        return sum(rows.stop - rows.start for joint in self.by_joint for _, rows in joint)
+        return float(self.counts.sum())
+
+    @property
+    def counts(self) -> Floats:
+        """(n,) residuals of each joint that tell something: the samples, less what was projected away."""
+        counts = self._rows - np.array(self.unknown or np.zeros(len(self.by_joint)))
+        return np.asarray(np.maximum(counts, 0.0))
+
+    @property
+    def _rows(self) -> Floats:
+        return np.array([float(sum(rows.stop - rows.start for _, rows in joint)) for joint in self.by_joint])
+
+    def mean_squares(self, residual: Sequence[Floats]) -> Floats:
+        """(n,) mean square of each joint's residual over what tells something; NaN where nothing does."""
+        sums = [sum(float(np.sum(p**2)) for p in self.of_joint(residual, j)) for j in range(len(self.by_joint))]
+        counts = self.counts
+        return np.asarray(np.where(counts > 0.0, np.array(sums) / np.maximum(counts, 1.0), np.nan))
 
     def of_joint(self, residual: Sequence[Floats], joint: int) -> list[Floats]:
         """Residuals of a joint (index), stretch by stretch; `residual` is an array (m, n, …) a record."""
@@ -51,14 +72,20 @@ class Stretches:
                 inside[rows] = keep[i][rows]
                 pieces += _pieces(i, inside)
             cut.append(tuple(pieces))
-        return Stretches(tuple(cut))
+        found = Stretches(tuple(cut))
+        if not self.unknown:
+            return found
+        kept = found._rows / np.maximum(self._rows, 1.0)
+        return Stretches(found.by_joint, tuple(map(float, kept * np.array(self.unknown))))
 
 
 def stretches_of(records: Sequence[RecordedMotion]) -> Stretches:
     """The stretches of records in which their joints move."""
     joints = records[0].moving.shape[1]
+    unknown = np.sum([r.unknown_count for r in records], axis=0)
     return Stretches(
-        tuple(tuple(s for i, r in enumerate(records) for s in _pieces(i, r.moving[:, j])) for j in range(joints))
+        tuple(tuple(s for i, r in enumerate(records) for s in _pieces(i, r.moving[:, j])) for j in range(joints)),
+        tuple(map(float, unknown)) if unknown.any() else (),
     )
 
 
@@ -93,10 +120,11 @@ def noise_model(stretches: Stretches, residual: Sequence[Floats], floor: Floats)
     """Deviation and memory of residuals; `floor` (n,) is the least deviation that they can have."""
     joints = len(stretches.by_joint)
     deviation, memory = floor.copy(), np.ones(joints)
+    squares = stretches.mean_squares(residual)
     for j in range(joints):
         if pieces := stretches.of_joint(residual, j):
             every = np.concatenate(pieces)
-            deviation[j] = max(float(np.sqrt(np.mean(every**2))), floor[j])
+            deviation[j] = max(float(np.sqrt(np.nan_to_num(squares[j]))), floor[j])
             covariance = autocovariance([piece - every.mean() for piece in pieces], LONGEST_MEMORY)
             memory[j] = 1 + 2 * float(((covariance[1:] / max(covariance[0], 1e-300)) ** 2).sum())
     return NoiseModel(deviation, memory)
@@ -106,9 +134,5 @@ def minus_twice_log_likelihood(
     stretches: Stretches, residual: Sequence[Floats], memory: Floats, floor: Floats
 ) -> Floats:
     """Per joint (n,), constants left out: (samples/memory) ln of the mean square, which is `floor`² at least."""
-    result = np.zeros(len(stretches.by_joint))
-    for j in range(len(result)):
-        if pieces := stretches.of_joint(residual, j):
-            squares = np.concatenate(pieces) ** 2
-            result[j] = squares.size / memory[j] * np.log(max(float(squares.mean()), floor[j] ** 2))
-    return result
+    squares = np.maximum(np.nan_to_num(stretches.mean_squares(residual)), floor**2)
+    return np.asarray(stretches.counts / memory * np.log(squares))

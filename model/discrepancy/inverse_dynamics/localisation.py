@@ -65,6 +65,7 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
     cells: list[PhaseCell] = []
     dependences: list[Dependence] = []
     places: list[WorstPlace] = []
+    sizes = np.sqrt(case.stretches.mean_squares(residual))
     for j, joint in enumerate(model.machine.modelled_joints):
         pieces = case.stretches.of_joint(residual, j)
         if not pieces:
@@ -95,7 +96,9 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
                 )
         dependences += [_dependence(joint, a, b, u) for a, b, u in _bins(now, case, j)]
         phase = max(squares, key=lambda p: squares[p])
-        relative = float(np.sqrt(np.mean(np.concatenate(pieces) ** 2))) / floor[j]
+        if not np.isfinite(sizes[j]):
+            continue
+        relative = float(sizes[j]) / floor[j]
         rms, unit = relative * floor[j], torque_unit(model, joint)
         places.append(WorstPlace(joint=joint, phase=phase, ratio=relative, rms=rms, unit=unit, whole_record=True))
     if not places:
@@ -116,9 +119,9 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
 def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape, ...]:
     """Per joint, the dependence that explains most of a torque beyond noise, where there is a significant one."""
     model, found = now.balance.model, []
+    sizes = np.sqrt(np.nan_to_num(case.stretches.mean_squares(now.residual)))
     for j, joint in enumerate(model.machine.modelled_joints):
-        pieces = case.stretches.of_joint(now.residual, j)
-        if not pieces or float(np.sqrt(np.mean(np.concatenate(pieces) ** 2))) < BEYOND_NOISE * case.noise[j]:
+        if sizes[j] < BEYOND_NOISE * case.noise[j]:
             continue
         every = [
             (b.explained, a, b, u)

@@ -49,8 +49,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     plain = _takes_half_of_what_is_no_noise(found, before, case)
     if not plain and any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
         return False
-    ends = any(_ends_at_bound(p, found.fit.values[p.name]) for p in found.parameters)
-    if ends or not is_far_everywhere(found.stated, found.fit.values):
+    if sizes_at_bounds(found) or not is_far_everywhere(found.stated, found.fit.values):
         return False
     if found.effect not in OF_CHANGES or plain:
         return True
@@ -96,6 +95,11 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
     return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
 
 
+def sizes_at_bounds(found: Fitted) -> list[Parameter]:
+    """Sizes of an effect that ended at the end of what they may be."""
+    return [p for p in found.parameters if _ends_at_bound(p, found.fit.values[p.name])]
+
+
 def _ends_at_bound(p: Parameter, value: float) -> bool:
     """Whether a size, or the rate of a tone, ended at the end of what it may be, where a fit would go on: no machine
     has it, and what it takes is something else. The slowest ripple is a spring."""
@@ -113,12 +117,12 @@ def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) 
 
 
 def is_far(p: Parameter, value: float) -> bool:
-    """Whether a number is far from what the file states.
+    """Whether a number is far from what the file states, measured as its prior measures it (`prior_distance`).
 
-    A number that cannot be negative is stated to a share of itself: twice and half as much are then equally far. In
-    distances no number down to zero is far from one that is stated to a quarter of itself or worse.
+    Friction is stated to a share of itself, so that below what is stated its ratio counts: in distances no number down
+    to zero is far from one that is stated to a quarter of itself or worse.
     """
     deviation = p.deviation or 0.0
-    if p.low < 0.0 or p.value <= 0.0:
+    if p.effect is None or p.low < 0.0 or p.value <= 0.0 or value >= p.value:
         return abs(value - p.value) > FAR * deviation
-    return value <= 0.0 or abs(math.log(value / p.value)) > FAR * deviation / p.value
+    return value <= 0.0 or math.log(p.value / value) > FAR * deviation / p.value

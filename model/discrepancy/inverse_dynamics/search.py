@@ -9,13 +9,14 @@ import numpy as np
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
+from model.discrepancy.inverse_dynamics.candidates import list_trials
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
-from model.effects.library import effect as effect_of
+from model.discrepancy.inverse_dynamics.trial import Start
+from model.effects.library import named_in_answers
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
@@ -63,7 +64,7 @@ class Fitted:
         Friction that falls with speed is Coulomb friction where it hardly falls: the shorter law is then its name. A
         tilted base that gives the torque of friction by direction is another thing, whatever its parameters.
         """
-        family, others = (effect_of(f.effect).shared_name.family for f in (self, other))
+        family, others = (named_in_answers(f.effect).shared_name.family for f in (self, other))
         if len(self.parameters) <= len(other.parameters) or family != others:
             return False
         own, theirs = (
@@ -238,6 +239,5 @@ def _relief(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
 
 def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """k ln n for k parameters and n independent samples, and twice the logarithm of the places searched."""
-    counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
-    independent = max(float((counts / memory).sum()), 2.0)
+    independent = max(float((before.data.stretches.counts / memory).sum()), 2.0)
     return parameters * float(np.log(independent)) + 2 * float(np.log(max(places, 1)))

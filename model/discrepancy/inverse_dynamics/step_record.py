@@ -12,8 +12,9 @@ from model.discrepancy.grounds import Reason
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
-from model.discrepancy.inverse_dynamics.judging import Judgement, needed_lead
+from model.discrepancy.inverse_dynamics.judging import SUSPECTED, Judgement, needed_lead
 from model.discrepancy.inverse_dynamics.localisation import locate
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
@@ -21,6 +22,9 @@ from model.machine_model.model import Model
 
 SHOWN = 12
 """Most candidates that a step lists."""
+TOLD = 9.0
+"""Fall of −2 log posterior, less what noise brings, from which records tell one effect from another: three
+deviations."""
 ABOVE_NOISE = 1.2
 """Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
 removed."""
@@ -31,7 +35,7 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
 
     Args:
         standing: before the step. found: what the step's search found.
-        refused: candidates of this step that were not taken before; they are no rivals.
+        refused: candidates of this step that were not taken, or passed over, before; they are no rivals.
     """
     model, case, chosen, compared = standing.model, standing.case, judgement.chosen, judgement.comparison
     rivals = _rivals(standing, found, chosen, refused)
@@ -43,7 +47,7 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
         evidence_held_out=judgement.told if case.held_out else None,
         margin=chosen.evidence - max([0.0, *(r.evidence for r in rivals)]),
         candidates=list_candidates(case, found),
-        group=_group(case, chosen, rivals),
+        group=_group(standing, chosen, rivals),
         rmse_fit=signal_errors(model, compared.fitted_before, compared.fitted_after, case.noise),
         rmse_holdout=signal_errors(model, compared.before, compared.after, case.noise) if case.held_out else (),
         excess_removed_holdout=(
@@ -94,13 +98,28 @@ def _rivals(standing: Standing, found: Findings, chosen: Fitted, refused: Sequen
     return [c for c in rivals if c.rivals(chosen) and not c.imitates(chosen, standing.now)]
 
 
-def _group(case: TorqueCase, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[Candidate, ...]:
+def _group(standing: Standing, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[Candidate, ...]:
     """The candidate and the rivals that are too near to name it alone, the best one of each effect; none without."""
-    near = [r for r in rivals if chosen.evidence - r.evidence < needed_lead(case.options, chosen, r)]
+    case = standing.case
+    near = [r for r in rivals if _cannot_be_told(case.options, chosen, r)]
     if not near:
         return ()
     group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
     return tuple(_candidate(case, c) for c in group)
+
+
+def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bool:
+    """Whether records leave open which of two effects it is: by evidence, or by what they say of both.
+
+    What a parameter costs is no statement of the records: a rival that explains as much with two parameters more is
+    less likely before anything was recorded, and not refuted. Noise alone brings one for every parameter, which is
+    taken off. Such a rival has to be one that would be suspected by itself.
+    """
+    needed, lead = needed_lead(options, chosen, rival), chosen.evidence - rival.evidence
+    if lead < needed:
+        return True
+    of_records = lead + (chosen.cost - len(chosen.parameters)) - (rival.cost - len(rival.parameters))
+    return of_records < needed and rival.evidence >= SUSPECTED
 
 
 def _excess_removed(noise: Floats, fitted: Floats, before: Floats, after: Floats) -> float | None:

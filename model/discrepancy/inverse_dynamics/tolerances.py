@@ -34,11 +34,12 @@ def tolerances(
     known = sizes or {}
     every = [known.get(p.name, p) for p in model.parameters]
     own = [p for p in every if p.name not in added]
-    stated = [p for p in own if p.deviation is not None and p.effect is None]
+    of_machine = [p for p in model.parameters if p.deviation is not None and p.effect is None]
+    stated = [p for p in of_machine if p.name not in added]
     bodies = [p for p in own if p.kind is Kind.INERTIA and p.value != 0.0]
     machine: list[tuple[Parameter, float | None]]
     source: DeviationSource
-    if stated:
+    if of_machine:
         machine = [(p, p.deviation) for p in stated]
         source = "stated"
     elif model.lineage.traces:

@@ -14,7 +14,7 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, judge
 from model.discrepancy.inverse_dynamics.left_over import first_contradicted
-from model.discrepancy.inverse_dynamics.resolution import is_resolved
+from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.step_record import list_candidates, record_step
@@ -68,6 +68,7 @@ class TorqueWorkflow:
             if not self._adopt(found):
                 self.tried = list_candidates(self.case, found)
                 self.suspicion = suspect(self.standing, found)
+                self.notes += self._on_sizes_at_bounds(found)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(done)
@@ -117,14 +118,22 @@ class TorqueWorkflow:
             unresolved=tuple(f for f, is_one in zip(found.fitted, resolved, strict=True) if not is_one),
         )
 
+    def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
+        """What would have been enough evidence to be named, had its size not ended where no machine is."""
+        enough = [f for f in found.unresolved if f.evidence >= self.case.options.least_evidence]
+        best = {f.effect: f for f in reversed(enough) if sizes_at_bounds(f)}
+        return [_size_at_bound(f) for f in best.values()]
+
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
         refused: list[Fitted] = []
+        passed_over: list[Fitted] = []  # they explain noise, or other records speak against them: no rivals either
         for chosen in found.fitted[:CHANCES]:
             judgement = judge(self.standing, chosen, refused)
             if judgement is None:
+                passed_over.append(chosen)
                 continue
-            self.steps.append(record_step(self.standing, found, judgement, refused))
+            self.steps.append(record_step(self.standing, found, judgement, [*refused, *passed_over]))
             if judgement.refusal is None:
                 self._take(chosen)
                 return True
@@ -178,3 +187,12 @@ class TorqueWorkflow:
         if step.effect is None or (step.joints and not joints):
             return self.model
         return self.model.without_effect(step.effect, joints or None)
+
+
+def _size_at_bound(found: Fitted) -> Note:
+    """The first size of a candidate that ended at its bound."""
+    p = sizes_at_bounds(found)[0]
+    values = {"effect": found.effect, "joints": list(found.joints), "evidence": found.evidence}
+    return Note(
+        kind="size-at-bound", values={**values, "name": p.part, "value": found.fit.values[p.name], "unit": p.unit}
+    )

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
 from model.arrays import Floats
+from model.discrepancy.inverse_dynamics.likelihood import stretches_of
 from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, low_pass
 from tests.model.inverse_dynamics.driven_slide import CUTOFF, PERIOD, TIME, controlled, motion_of
 
@@ -169,6 +170,20 @@ def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:
     assert share_left(record, np.sin(2.0 * TIME)) < 1e-20
     resting = record.less_unknown(np.ones((len(record.moving), 1)))[~record.moving[:, 0]]
     assert (resting == 1.0).all(), "samples at rest are not touched"
+
+
+def test_dimensions_that_are_projected_away_count_as_no_samples() -> None:
+    record, free, lost = (motion_of(d) for d in (standing(0.12, 0.8), 4.0 * np.sin(2.7 * TIME), standing(0.16, 0.32)))
+    assert free.unknown_count.tolist() == [0]
+    assert lost.unknown_count.tolist() == lost.moving.sum(axis=0).tolist()
+    own, every = (stretches_of([one]) for one in (record, free))
+    rows = sum(r.stop - r.start for _, r in own.by_joint[0])
+    assert 0 < record.unknown_count[0] < rows
+    assert own.counts.tolist() == [rows - record.unknown_count[0]]
+    white = np.random.default_rng(2).standard_normal((len(record.moving), 1))
+    assert float(own.mean_squares([record.less_unknown(white)])[0]) == pytest.approx(1.0, abs=0.25)
+    assert every.counts[0] == every.samples == sum(r.stop - r.start for _, r in every.by_joint[0])
+    assert np.isnan(stretches_of([lost]).mean_squares([lost.less_unknown(white)])[0])
 
 
 def test_a_wheel_that_turns_many_times_is_low_passed_like_one_that_does_not() -> None:

@@ -73,3 +73,14 @@ def test_a_suspicion_says_what_more_motion_would_settle(answer: Diagnosis) -> No
     assert headline(suspected) == (
         "perhaps backlash on joint 1, evidence 24 of 30; 20 s more of this motion would settle it"
     )
+
+
+def test_joints_that_were_not_examined_are_in_the_first_line(answer: Diagnosis) -> None:
+    silent = answer.model_copy(update={"verdict": "nothing-significant", "steps": (), "not_examined": (2,)})
+    assert headline(silent).endswith(
+        "; joint 2 was not examined: its drive stands at its largest value for too much of the time"
+    )
+    assert summary(silent).startswith("Joint 2 was not examined: ")
+    both = silent.model_copy(update={"not_examined": (1, 3)})
+    assert "joints 1 and 3 were not examined" in headline(both)
+    assert "not examined" not in headline(answer)

@@ -46,6 +46,19 @@ def test_friction_is_named_beside_a_constant_force_which_is_told_as_a_group() ->
     assert {"base_tilt", "direction_dependent_friction"} <= {c.effect for c in constant.group}
 
 
+def test_a_tilted_base_is_in_the_group_of_a_constant_force_whatever_its_parameters_cost() -> None:
+    """A tilt has two parameters, friction by direction has one: on an axis that slides along x both are the same force,
+    and what the second parameter costs is more than the lead that is asked for here."""
+    fitted, held = (pushed(rigs.slide_trace(seed, RUBBING, duration=10.0), 4.0) for seed in (1, 2))
+    named = ("coulomb_friction", "base_tilt", "direction_dependent_friction")
+    asked = TorqueOptions(least_margin=2.0, effects=named)
+    found = diagnose_torques(base_model(rigs.slide_machine()), [fitted], [held], asked)
+    step = next(s for s in found.steps if s.adopted and s.effect != "coulomb_friction")
+    evidence = {c.effect: c.evidence for c in step.group}
+    assert set(evidence) == {"base_tilt", "direction_dependent_friction"}, found.summary
+    assert max(evidence.values()) - min(evidence.values()) > asked.least_margin
+
+
 def test_an_effect_that_lacks_evidence_alone_is_suspected() -> None:
     trace = rigs.slide_trace(1, {"coulomb": 6.0}, duration=4.0)
     strict = TorqueOptions(least_evidence=2000.0, effects=("coulomb_friction", "payload"))

@@ -1,0 +1,39 @@
+"""Where torques are missing most, and what is told of a size that ended at its bound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.inverse_dynamics.localisation import locate
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.search import Fitted
+from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow, _size_at_bound
+from tests.model.discrepancy.inverse_dynamics.searches import sliding
+
+
+@pytest.fixture(scope="module")
+def rubbing() -> TorqueWorkflow:
+    return sliding({"coulomb": 8.0}, TorqueOptions(effects=("coulomb_friction",)))
+
+
+def test_a_size_at_its_bound_is_told_with_its_value(rubbing: TorqueWorkflow) -> None:
+    wider = rubbing.model.with_effect("coulomb_friction", (1,))
+    (p,) = (replace(q, high=3.0) for q in wider.parameters if q.effect == "coulomb_friction")
+    now = replace(rubbing.now, values={**rubbing.now.values, p.name: 3.0})
+    found = Fitted("coulomb_friction", (1,), wider, (p,), now, 80.0)
+    note = _size_at_bound(found)
+    assert (note.kind, note.values["effect"], note.values["value"]) == ("size-at-bound", "coulomb_friction", 3.0)
+    assert "torque at the end of what it may be, 3 N" in note_words(note)
+
+
+def test_the_joint_of_the_largest_residual_is_named(rubbing: TorqueWorkflow) -> None:
+    where = locate(rubbing.now, rubbing.case)
+    assert where.worst is not None
+    assert (where.joint, where.worst.joint, where.largest) == (1, 1, None)
+    (sizes,) = (np.sqrt(rubbing.case.stretches.mean_squares(rubbing.now.residual)),)
+    assert where.worst.rms == pytest.approx(sizes[0])
+    assert where.worst.ratio == pytest.approx(sizes[0] / rubbing.case.noise[0])
