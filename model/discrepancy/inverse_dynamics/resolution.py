@@ -117,12 +117,13 @@ def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) 
 
 
 def is_far(p: Parameter, value: float) -> bool:
-    """Whether a number is far from what the file states, measured as its prior measures it (`prior_distance`).
+    """Whether a number is far from what the file states.
 
-    Friction is stated to a share of itself, so that below what is stated its ratio counts: in distances no number down
-    to zero is far from one that is stated to a quarter of itself or worse.
+    Friction is stated to a share of itself, and that roughly: twice and half as much are then equally far. In distances
+    no number down to zero is far from one that is stated to a quarter of itself or worse. A machine's own numbers are
+    far by their distance.
     """
     deviation = p.deviation or 0.0
-    if p.effect is None or p.low < 0.0 or p.value <= 0.0 or value >= p.value:
+    if p.effect is None or p.low < 0.0 or p.value <= 0.0:
         return abs(value - p.value) > FAR * deviation
-    return value <= 0.0 or math.log(p.value / value) > FAR * deviation / p.value
+    return value <= 0.0 or abs(math.log(value / p.value)) > FAR * deviation / p.value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from daq.contracts.machine import Machine
@@ -68,14 +67,3 @@ def test_numbers_of_the_machine_are_named_and_never_added() -> None:
         assert named_in_answers(name) is number
         assert number.shared_name.name == name
         assert not number.parameters
-
-
-def test_friction_far_above_what_is_stated_is_named_by_its_distance() -> None:
-    """1 N·m to 30 % stated: 2.8 N·m are six of its deviations, and not yet three and a third times as much."""
-    stated = rigs.geared_machine().model_dump(mode="json", exclude_unset=True)
-    stated["joints"][0]["friction"] = {"coulomb": rigs.quantity(0.1, "N·m", low=0.0, deviation=0.03)}
-    found = answer(Machine.model_validate(stated), coulomb=0.28)
-    (step,) = (s for s in found.steps if s.adopted)
-    assert (step.effect, step.joints) == ("coulomb_friction", (1,)), found.summary
-    (value,) = step.parameters.values()
-    assert np.isclose(value.value, 0.28, rtol=0.05)
