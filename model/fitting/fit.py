@@ -30,6 +30,7 @@ from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
+from model.machine_model.posterior import determined
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
@@ -238,20 +239,21 @@ def _result(
     own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
     identities = tuple(record.name for record in problem.records)
     errors = _errors(model, problem, before, estimate.after)
-    summary = {
-        "rmse": [e.after for e in errors],
-        "whitened_mean_square": estimate.mean_square,
-        "converged": solution.converged,
-        "fitted": list(own),
-        "known": list(estimate.report.known),
-    }
-    fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
     deviations = np.sqrt(np.diag(estimate.covariance))
     parameters = tuple(
         fitted_parameter(u, float(v), float(d), estimate.report.verdict(u.name))
         for u, v, d in zip(problem.unknowns, solution.values, deviations, strict=True)
         if not u.nuisance
     )
+    summary = {
+        "rmse": [e.after for e in errors],
+        "whitened_mean_square": estimate.mean_square,
+        "converged": solution.converged,
+        "fitted": list(own),
+        "known": list(estimate.report.known),
+        "deviations": determined((p.name, p.deviation) for p in parameters),
+    }
+    fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
     return FitResult(
         model=fitted,
         parameters=parameters,

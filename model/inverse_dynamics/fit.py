@@ -31,6 +31,7 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_lim
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
+from model.machine_model.posterior import determined
 
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
@@ -148,7 +149,11 @@ def fit_torques(
     lineage = Lineage(
         parent=model.identity,
         traces=tuple(t.record.trace_id for t in traces),
-        fit={"fitted": [u.name for u in unknowns], "known": list(report.known)},
+        fit={
+            "fitted": [u.name for u in unknowns],
+            "known": list(report.known),
+            "deviations": determined((p.name, p.deviation) for p in parameters),
+        },
     )
     limits = drives_at_limit(motions, model.machine.modelled_joints)
     progress(1.0, "done")

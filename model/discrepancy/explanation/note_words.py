@@ -144,7 +144,9 @@ def _tolerances_fitted_first(v: Values) -> str:
 def _tolerance_source(v: Values) -> str:
     match v["source"]:
         case "stated":
-            return "parameters may be off by what the machine file states"
+            stated = "parameters may be off by what the machine file states"
+            known = v.get("fitted", 0)
+            return f"{stated}; an earlier fit, to other records, knows {known} of them better" if known else stated
         case "fitted-before":
             return f"the machine file states no deviations; fitted bodies are taken to be known to {v['share']:.0%}"
         case _:

@@ -11,7 +11,7 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalE
 from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers
 from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
+from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors, standard_deviations
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
@@ -24,6 +24,7 @@ from model.inverse_dynamics.drive_timing import MOST, samples_late
 from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_limit
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
+from model.machine_model.posterior import determined
 
 SLIGHTLY_LATE = 0.1
 """Least lateness of a drive that is told, in samples."""
@@ -113,10 +114,14 @@ def _errors(standing: Standing, records: tuple[RecordedMotion, ...]) -> tuple[Si
 def _resulting_model(outcome: Outcome, traces: Sequence[str]) -> Model:
     """The model that comes out, with what the controller's numbers prove, and where it comes from."""
     standing = outcome.standing
+    deviations = determined(standard_deviations(standing.now).items())
     lineage = Lineage(
         parent=standing.given.identity,
         traces=tuple(traces),
-        fit={"fitted": [u.name for u in outcome.unknowns]},
+        fit={
+            "fitted": [u.name for u in outcome.unknowns],
+            "deviations": deviations,
+        },
         note="diagnosis",
     )
     found = standing.model.with_values(standing.now.model_values)

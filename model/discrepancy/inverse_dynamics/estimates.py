@@ -22,7 +22,7 @@ NORMAL_95 = 1.959964
 
 def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, FoundValue]:
     """Estimates of an effect's parameters with 95 % intervals that hold for correlated residuals."""
-    deviations = _deviations(now)
+    deviations = standard_deviations(now)
     result = {}
     for p in parameters:
         value, deviation = now.values[p.name], deviations.get(p.name)
@@ -35,7 +35,7 @@ def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, 
     return result
 
 
-def _deviations(now: BalanceFit) -> dict[str, float]:
+def standard_deviations(now: BalanceFit) -> dict[str, float]:
     """Standard deviations of the unknowns that change the residual at all, by name."""
     slopes = now.slopes()
     used = [u for u in now.unknowns if any(np.abs(s).max() > 0 for s in slopes[u.name])]

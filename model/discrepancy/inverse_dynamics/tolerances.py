@@ -29,12 +29,12 @@ def tolerances(
 
     Args:
         added: effects' parameters (full names) that the diagnosis itself put in; they have no prior.
-        sizes: effects' parameters by name, with deviations that follow from the records.
+        sizes: parameters by name, with deviations that follow from the records or from an earlier fit.
     """
     known = sizes or {}
     every = [known.get(p.name, p) for p in model.parameters]
     own = [p for p in every if p.name not in added]
-    of_machine = [p for p in model.parameters if p.deviation is not None and p.effect is None]
+    of_machine = [p for p in every if p.deviation is not None and p.effect is None]
     stated = [p for p in of_machine if p.name not in added]
     bodies = [p for p in own if p.kind is Kind.INERTIA and p.value != 0.0]
     machine: list[tuple[Parameter, float | None]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Suspicion
@@ -26,6 +27,7 @@ from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.machine_model.posterior import known_from_fit
 
 
 @dataclass
@@ -51,7 +53,7 @@ class TorqueWorkflow:
         self.given = self.model
         self.now = self._fit(self.model, {}, self.added)
         self.first = self.now
-        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE}
+        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE, "fitted": len(self._known_before)}
         self.notes.append(Note(kind="tolerance-source", values=source))
 
     @property
@@ -101,12 +103,19 @@ class TorqueWorkflow:
     def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
         """The model fitted again, with the parameters that the diagnosis has `added` without priors."""
         records, names = self.case.records, frozenset(added)
-        own = [u for u in tolerances(self.given, sizes=recorded_sizes(self.given, records))[0] if u.name not in names]
+        expected = {**recorded_sizes(self.given, records), **self._known_before}
+        own = [u for u in tolerances(self.given, sizes=expected)[0] if u.name not in names]
         known = {u.name for u in own}
         sizes = {**recorded_sizes(model, records), **added}
         found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
         unknowns = (*own, *found, *timing_unknowns(model))
         return fit(TorqueBalance(model, self.case.records), unknowns, begin, self.case.data)
+
+    @cached_property
+    def _known_before(self) -> dict[str, Parameter]:
+        """Parameters of the given model, by name, that an earlier fit to other records has left better known."""
+        deviations = known_from_fit(self.given, (r.name for r in self.case.records))
+        return {name: replace(self.given.parameter(name), deviation=d) for name, d in deviations.items()}
 
     def _search(self) -> Findings:
         """What a step found, without what the records do not resolve."""

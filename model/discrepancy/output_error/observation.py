@@ -30,7 +30,7 @@ from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.drives import controller as pid
 from model.effects.effect import JointScale, Tone
 from model.fitting.fit import fit_problem
-from model.fitting.options import FitOptions
+from model.fitting.options import FitOptions, Prior
 from model.fitting.records import Record
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
@@ -38,6 +38,7 @@ from model.fitting.whitening import Whitener
 from model.inverse_dynamics.recorded_sizes import as_driven
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
+from model.machine_model.posterior import known_from_fit
 from model.simulation.batch import BatchRun
 from model.simulation.inputs import readings_on_grid
 from model.simulation.period import OUT_DRIVE, OUT_READING, OUTPUTS
@@ -356,8 +357,11 @@ def observe(
     """
     stated = tuple(p.name for p in model.parameters if p.deviation is not None and p.deviation > 0 and p.null is None)
     effects = tuple(p.name for p in model.parameters if p.effect is not None and p.deviation is not None)
+    known = known_from_fit(model, (t.record.trace_id for t in traces))
+    priors = {name: Prior(expected=model.parameter(name).value, deviation=d) for name, d in known.items()}
+    chosen = tuple(dict.fromkeys((*stated, *effects)))
     problem: SimulatedProblem = fit_problem(
-        model, traces, FitOptions(parameters=tuple(dict.fromkeys((*stated, *effects))), bend_terms=BEND_TERMS)
+        model, traces, FitOptions(parameters=chosen, bend_terms=BEND_TERMS, priors=priors)
     )
     sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])

@@ -7,11 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from daq.contracts.progress import Never, silent
 from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow, _size_at_bound
+from model.inverse_dynamics.recorded_motion import recorded_motions
+from model.machine_model.model import base_model
+from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
 
 
@@ -37,3 +43,19 @@ def test_the_joint_of_the_largest_residual_is_named(rubbing: TorqueWorkflow) -> 
     (sizes,) = (np.sqrt(rubbing.case.stretches.mean_squares(rubbing.now.residual)),)
     assert where.worst.rms == pytest.approx(sizes[0])
     assert where.worst.ratio == pytest.approx(sizes[0] / rubbing.case.noise[0])
+
+
+def test_the_joint_of_the_largest_torque_is_told_beside_the_one_farthest_above_its_noise() -> None:
+    """Of six joints, the last has three hundred times its noise and the second the largest torque."""
+    model = base_model(rigs.six_machine())
+    traces = [rigs.six_trace(1, {}, duration=6.0)]
+    records = recorded_motions(traces, model.machine, 3.0)
+    case = TorqueCase(records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
+    flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.now.residual]
+    where = locate(replace(flow.now, residual=residual), case)
+    assert where.worst is not None
+    assert where.largest is not None
+    assert (where.joint, where.worst.joint, where.largest.joint) == (6, 6, 2)
+    assert where.worst.ratio == pytest.approx(300.0)
+    assert where.largest.rms == pytest.approx(9.0)

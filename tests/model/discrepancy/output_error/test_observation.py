@@ -7,6 +7,7 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from model.discrepancy.output_error.observation import forms_rounded_drive, observe
+from model.machine_model.model import Lineage
 from model.simulation.inputs import gains_of
 from tests.model.fitting import imagined
 
@@ -26,6 +27,16 @@ def test_numbers_of_the_machine_are_expected_to_be_what_its_file_states() -> Non
     load = next(u for u in given.unknowns if u.name == "load.mass")
     assert load.expected == pytest.approx(imagined.arm().parameter("load.mass").value)
     assert load.start == pytest.approx(1.4)
+
+
+def test_numbers_that_an_earlier_fit_knows_are_expected_to_be_those_of_the_fit() -> None:
+    stated = imagined.arm().parameter("load.mass").deviation
+    assert stated is not None
+    fit = {"deviations": {"load.mass": 0.5 * stated}}
+    heavy = imagined.arm().with_values({"load.mass": 1.4}).with_lineage(Lineage(traces=("earlier",), fit=fit))
+    _, given = observe(heavy, [imagined.trace(heavy, seconds=3.0)])
+    load = next(u for u in given.unknowns if u.name == "load.mass")
+    assert (load.expected, load.deviation) == (pytest.approx(1.4), pytest.approx(0.5 * stated))
 
 
 def test_a_board_rounds_its_drive_unless_whole_errors_make_whole_counts_of_power() -> None:
