@@ -1,0 +1,262 @@
+"""From which values an effect's parameters are searched, and within which bounds, by what the records hold."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from daq.contracts.machine import NoController
+from model import layout as at
+from model.arrays import Floats
+from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN
+from model.discrepancy.excitation import own_frequencies
+from model.discrepancy.inverse_dynamics.place import Place
+from model.discrepancy.inverse_dynamics.trial import Start
+from model.inverse_dynamics.drive_timing import MOST
+from model.inverse_dynamics.recorded_motion import RESOLVED
+from model.machine_model.parameter import Parameter
+
+DAMPED = 0.1
+"""Damping ratio of a rotor on its gear's spring from which damping is tried."""
+EITHER_WAY = (
+    "direction_dependent_friction",
+    "direction_dependent_viscous_friction",
+    "direction_dependent_gear_loss",
+)
+"""Effects that act one way by their sign: they have no slope from one sign to the other, and are begun with both."""
+SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
+"""Quantiles of a joint's speed in magnitude: speeds at which Stribeck friction may have faded."""
+DRIVE_QUANTILES = (0.2, 0.5, 0.8)
+"""Quantiles of the drive in magnitude that are tried as dead zones."""
+THRESHOLD_SHARES = tuple(float(share) for share in np.geomspace(0.02, 0.6, 16))
+"""Thresholds of an amplifier that are tried, as shares of the largest drive, each a quarter larger than the one before:
+a search goes from sample to sample, and finds a threshold only from near it."""
+PASSED = 0.3
+"""Least share of the record in which the drive is above a threshold that is tried."""
+LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
+"""Limits of the drive that are tried, as shares of its largest value."""
+UNLIMITED = 0.7
+"""Least share of the record in which the drive stays below a limit that is tried."""
+DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
+"""Delays, and time constants of windings, that are tried, s."""
+WARMING_TIMES = (10.0, 40.0, 200.0)
+"""Thermal time constants that are tried, s."""
+LARGEST_HEATING = 0.2
+"""Largest rise of a winding's resistance in a second of the record's own current: copper 50 K warmer in a second."""
+RISE = 0.2
+"""Rise of a winding's resistance in a record that is tried: copper 50 K warmer."""
+WINDING_SHARES = (0.01, 0.1)
+"""Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
+are tried."""
+PLAY_SHARES = (0.0005, 0.003, 0.02)
+"""Free play that is tried, as a share of the joint's travel."""
+FASTEST_RIPPLE = 1000.0
+"""Most waves of a ripple a turn (a metre) that are tried."""
+LONGEST_SCAN = 400
+"""Largest number of frequencies that are tried."""
+
+
+def starts_of(name: str, own: Sequence[Parameter], place: Place) -> Iterator[Start]:
+    """Values to probe from: finite sizes, since many effects have no useful derivative at their null value."""
+    search = _SEARCHED.get(name)
+    if search is None:
+        yield {p.name: _typical(p) for p in own}
+        if name in EITHER_WAY:
+            yield {p.name: -_typical(p) for p in own}
+        return
+    by_part = {p.part: p for p in own}
+    for start in search(place):
+        yield {by_part[k].name: _inside(by_part[k], v) for k, v in start.items() if k in by_part}
+
+
+def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one line an effect)
+    """The parameter, with bounds narrowed to what the record allows.
+
+    A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
+    ever acts would explain any motion, with bodies without mass. Friction must not change within the speeds at which
+    its direction is not resolved. A spring on one side must begin to pull within the recorded positions. A ripple
+    repeats itself within them: less than one wave is a spring, or a shifted sensor.
+    """
+    if p.effect == "stribeck_friction" and p.null is None:
+        slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
+        return replace(p, low=min(p.high, max(p.low, slowest)))
+    if p.effect == "one_sided_spring" and p.null is None:
+        low, high = np.quantile(place.positions, TAUT_WITHIN)
+        return replace(p, low=float(low), high=float(high))
+    if p.effect == "resistance_drift" and p.null is not None:
+        return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
+    if p.effect == "amplifier_threshold":
+        return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
+    if p.effect == "torque_ripple" and p.null is None:
+        return replace(p, low=min(p.high, max(p.low, place.slowest_ripple)))
+    if p.effect != "supply_limit":
+        return p
+    return replace(p, low=min(p.high, max(p.low, float(np.quantile(place.drives, UNLIMITED)))))
+
+
+def _typical(p: Parameter) -> float:
+    size = p.deviation if p.deviation is not None else abs(p.value) or 1.0
+    return _inside(p, p.value + size if p.null is not None else p.value)
+
+
+def _inside(p: Parameter, value: float) -> float:
+    return float(np.clip(value, p.low, p.high))
+
+
+def _stribeck(place: Place) -> Iterator[Start]:
+    for speed in np.quantile(place.speeds, SPEED_QUANTILES):
+        yield {"torque": place.torque, "speed": max(float(speed), 1e-3)}
+
+
+def _dead_zone(place: Place) -> Iterator[Start]:
+    drive = place.drives
+    for width in (0.05 * float(drive.max()), *np.quantile(drive, DRIVE_QUANTILES)):
+        yield {"width": float(width)}
+
+
+def _threshold(place: Place) -> Iterator[Start]:
+    largest, highest = float(place.drives.max()), float(np.quantile(place.drives, 1 - PASSED))
+    for width in (share * largest for share in THRESHOLD_SHARES):
+        if width <= highest:
+            yield {"width": width}
+
+
+def _limit(place: Place) -> Iterator[Start]:
+    largest, supply = float(place.drives.max()), float(place.numbers[at.SUPPLY])
+    for share in LIMIT_SHARES:
+        if share * min(largest, supply) > 0:
+            yield {"voltage": share * min(largest, supply)}
+
+
+def _delay(place: Place) -> Iterator[Start]:
+    controller = place.model.machine.controller
+    if isinstance(controller, NoController):
+        least = MOST * max(r.sampled for r in place.records)
+        for time in [t for t in DELAYS if t > least] or [1.5 * least]:
+            yield {"time": time}
+        return
+    for time in DELAYS:
+        if time <= 13 * controller.period.value:
+            yield {"time": time}
+
+
+def _inductance(place: Place) -> Iterator[Start]:
+    for time in DELAYS:
+        yield {"inductance": float(place.numbers[at.RESISTANCE]) * time}
+
+
+def _warming(place: Place) -> Iterator[Start]:
+    for time in WARMING_TIMES:
+        yield {"heating": RISE / max(place.current**2 * min(time, place.duration), 1e-12), "time_constant": time}
+
+
+def _timed_warming(place: Place) -> Iterator[Start]:
+    for time, side in itertools.product(WARMING_TIMES, (1.0, -1.0)):
+        yield {"rise": side * RISE / (1.0 - float(np.exp(-place.duration / time))), "time_constant": time}
+
+
+def _ripple(place: Place) -> Iterator[Start]:
+    column, records = place.column, place.records
+    if place.slowest_ripple > FASTEST_RIPPLE:
+        return
+    travel = 2 * np.pi / place.slowest_ripple
+    slow = float(np.quantile(place.speeds, 0.25))
+    highest = 2 * np.pi * records[0].cutoff / max(slow, 1e-9)
+    grid = _scanned(max(place.slowest_ripple, 0.5), min(highest, FASTEST_RIPPLE), 0.7 * np.pi / travel)
+    prismatic = place.model.machine.joint(column + 1).kind == "prismatic"
+    if not prismatic and travel > np.pi:
+        whole = np.arange(1, min(int(highest), 200) + 1, dtype=np.float64)
+        grid = np.unique(np.concatenate([grid, whole]))
+    for cycles in _peaks(grid, [r.position[r.rows, column] for r in records], place):
+        yield {"sine": place.torque, "cosine": place.torque, "cycles": cycles}
+
+
+def _disturbance(place: Place) -> Iterator[Start]:
+    longest = max(float(np.ptp(r.time)) for r in place.records)
+    grid = _scanned(max(0.05, 2 / longest), 0.8 * place.records[0].cutoff, 0.4 / longest)
+    grid = grid[~own_frequencies(grid, [r.speed for r in place.records], place.records[0].period)]
+    for rate in _peaks(2 * np.pi * grid, [r.time[r.rows] for r in place.records], place):
+        yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi)}
+
+
+def _spring(place: Place) -> Iterator[Start]:
+    middle, span = float(np.mean(place.positions)), float(np.ptp(place.positions))
+    for rest in (middle, middle - 2 * span, middle + 2 * span):
+        yield {"stiffness": place.torque / max(span, 1e-9), "rest": rest}
+
+
+def _cable(place: Place) -> Iterator[Start]:
+    stiffness = place.torque / max(float(np.ptp(place.positions)), 1e-9)
+    for rest, side in itertools.product(np.quantile(place.positions, TAUT_QUANTILES), (1.0, -1.0)):
+        yield {"stiffness": side * stiffness, "rest": float(rest)}
+
+
+def _compliance(place: Place) -> Iterator[Start]:
+    """Compliances with which the motion of the rotor relative to the link takes a share of the torque."""
+    joint = place.numbers
+    gain = joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE]
+    torques = [gain * r.drive[:, place.column] for r in place.records]
+    changes = [np.gradient(np.gradient(t, r.time), r.time) for t, r in zip(torques, place.records, strict=True)]
+    inertia = joint[at.ROTOR_INERTIA] * joint[at.GEAR] ** 2
+    whole = float(np.std(np.concatenate(torques)) / max(inertia * np.std(np.concatenate(changes)), 1e-300))
+    for share in WINDING_SHARES:
+        compliance = share * whole
+        yield {"compliance": compliance, "damping": 2 * DAMPED * float(np.sqrt(inertia / max(compliance, 1e-300)))}
+
+
+def _play(place: Place) -> Iterator[Start]:
+    travel = max(float(np.ptp(r.position[:, place.column])) for r in place.records)
+    for share in PLAY_SHARES:
+        yield {"gap": share * travel}
+
+
+def _tilt(_place: Place) -> Iterator[Start]:
+    yield {"about_x": 0.05, "about_y": 0.05}
+
+
+def _scanned(low: float, high: float, step: float) -> Floats:
+    if high <= low:
+        return np.array([low])
+    return np.linspace(low, high, int(np.clip((high - low) / step, 2, LONGEST_SCAN)))
+
+
+def _peaks(rates: Floats, along: Sequence[Floats], place: Place) -> list[float]:
+    """The two rates (rad per unit of `along`) whose sine and cosine explain most of the residual of a joint."""
+    masks = [r.moving[:, place.column] for r in place.records]
+    signal = np.concatenate([x[:, place.column][m] for x, m in zip(place.residual, masks, strict=True)])
+    where = np.concatenate([a[m] for a, m in zip(along, masks, strict=True)])
+    if signal.size < 20:
+        return []
+    signal = signal - signal.mean()
+    power = np.abs(np.exp(-1j * np.outer(rates, where)) @ signal)
+    order = np.argsort(power)[::-1]
+    found: list[float] = []
+    for k in order:
+        if all(abs(rates[k] - f) > 3 * (rates[1] - rates[0] if len(rates) > 1 else 0) for f in found):
+            found.append(float(rates[k]))
+        if len(found) == 2:
+            break
+    return found
+
+
+_SEARCHED: dict[str, Callable[[Place], Iterator[Start]]] = {
+    "stribeck_friction": _stribeck,
+    "dead_zone": _dead_zone,
+    "amplifier_threshold": _threshold,
+    "supply_limit": _limit,
+    "input_delay": _delay,
+    "motor_inductance": _inductance,
+    "resistance_drift": _warming,
+    "resistance_rise": _timed_warming,
+    "torque_ripple": _ripple,
+    "periodic_disturbance": _disturbance,
+    "spring_torque": _spring,
+    "one_sided_spring": _cable,
+    "base_tilt": _tilt,
+    "joint_compliance": _compliance,
+    "backlash": _play,
+}
+"""Effects whose starting values depend on the record, and the functions that find them."""
