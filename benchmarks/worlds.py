@@ -102,10 +102,13 @@ def _same(places: Sequence[list[int]], wanted: list[int]) -> bool | None:
 
 
 def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) -> bool | None:
-    """The name where it can be told from every other, a group of what it cannot be told from else; None where nothing
-    is known, or the effect itself cannot be told from a sound arm."""
+    """The name where it can be told from every other, a group of what it cannot be told from else; None where the names
+    that were given were not compared, or the effect itself cannot be told from a sound arm."""
     rivals = truth.get("sharpness")
     if not rivals or any(rival["name"] == "none" and rival["d_prime"] < TOLD_APART for rival in rivals):
+        return None
+    compared = {rival["name"] for rival in rivals} | {_known_as(truth["hidden"][0])}
+    if not strict and not all(names <= compared for names in steps):
         return None
     untold = {rival["name"] for rival in rivals if rival["d_prime"] < TOLD_APART}
     right = {_known_as(truth["hidden"][0])}

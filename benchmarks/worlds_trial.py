@@ -93,7 +93,7 @@ class Row:
     d_prime: float | None
     """Between the arm with and without its effect, the least of several; None where it was not computed."""
     sharp: bool | None
-    """None where it was not worked out, and where the sound arm can imitate the effect."""
+    """None where a name that was given was not compared with the effect, and where the sound arm can imitate it."""
     excess_removed: float | None
     seconds: float
 

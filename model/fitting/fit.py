@@ -30,7 +30,7 @@ from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
-from model.machine_model.posterior import determined
+from model.machine_model.posterior import summarise_posterior
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
@@ -251,7 +251,7 @@ def _result(
         "converged": solution.converged,
         "fitted": list(own),
         "known": list(estimate.report.known),
-        "deviations": determined((p.name, p.deviation) for p in parameters),
+        **summarise_posterior(model.lineage, identities, ((p.name, p.model_value, p.deviation) for p in parameters)),
     }
     fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
     return FitResult(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,14 @@ class Unknown:
             )
         if self.deviation is not None and not (self.deviation > 0 and math.isfinite(self.deviation)):
             raise SpecError(f"{self.name}: expected deviation {self.deviation:g} {self.unit} must be above 0")
+
+    @property
+    def as_stated(self) -> Unknown:
+        """The same with the deviation that the machine file states, where an earlier fit knows the number better."""
+        stated = self.parameter.deviation
+        if self.deviation is None or stated is None or stated <= self.deviation:
+            return self
+        return replace(self, deviation=stated)
 
     @property
     def name(self) -> str:

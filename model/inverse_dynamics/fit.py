@@ -31,7 +31,7 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_lim
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
-from model.machine_model.posterior import determined
+from model.machine_model.posterior import summarise_posterior
 
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
@@ -152,7 +152,11 @@ def fit_torques(
         fit={
             "fitted": [u.name for u in unknowns],
             "known": list(report.known),
-            "deviations": determined((p.name, p.deviation) for p in parameters),
+            **summarise_posterior(
+                model.lineage,
+                [t.record.trace_id for t in traces],
+                ((p.name, p.model_value, p.deviation) for p in parameters),
+            ),
         },
     )
     limits = drives_at_limit(motions, model.machine.modelled_joints)

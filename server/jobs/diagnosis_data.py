@@ -11,6 +11,7 @@ from model.discrepancy.explanation.renderer import not_a_finding, where_with_sum
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
+from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import placed
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.effect_parameters import effect_parameters
@@ -53,7 +54,7 @@ def _words(found: Diagnosis) -> dict[str, ParameterWords]:
     rejected = [
         parameter
         for step in found.steps
-        if step.effect is not None and not step.adopted
+        if step.effect is not None and not step.adopted and step.effect not in MACHINE_NUMBERS  # the model has those
         for parameter in effect_parameters(machine, step.effect, step.joints, shared=False)
     ]
     return words_by_name([*found.model_before.parameters, *found.model_after.parameters, *rejected])

@@ -6,15 +6,16 @@ rounding. χ² is what remains, over the variance of the noise, and what the tol
 rival is √(χ² of the rival − χ² of the effect's own plainest law), and that of `none` is √χ² of the sound arm. Below 5
 the record does not tell.
 
-Of several effects, d′ of each is that of the arm without it, with the others as they are; rivals are told of one alone.
+Of several effects, d′ of each is that of the arm without it, with the others as they are; rivals are computed for
+single effects only. A rival that no world can hide counts as no nearer than the sound arm.
 
 What this version leaves out:
 - rivals on other joints than the effect's; held-out records; recorded speeds;
 - the closed loop hides a part of what a recorded drive shows: d′ is rather too small; coloured noise counts as white
   with its density at low frequencies, outliers do not count;
 - sizes are sought from a few starts, with tolerances that answer linearly, before tolerances are refitted, and the
-  refit ends after some steps. Whatever was tried is an upper bound of the least χ², so d′ may be too large, never too
-  small: for ripple, disturbance and the gears that give it is.
+  refit ends after some steps. Whatever was tried is an upper bound of the least χ², so that d′ of `none` may be too
+  large, and d′ of a rival off either way, since what was found for the effect itself is subtracted.
 """
 
 from __future__ import annotations
@@ -136,6 +137,9 @@ class _Comparison:
             name, law = drawn_as(known)
             if name in OPEN or known == known_as:
                 continue
+            if name not in effects_of(self.rig):
+                found.append(Rival(known, math.sqrt(none)))
+                continue
             places = joints_of(self.rig, name)
             if name not in WHOLE_MACHINE and hidden.joint is not None:
                 places = tuple(place for place in places if place == hidden.joint)
@@ -209,7 +213,11 @@ class _Comparison:
 
         def left(steps: Floats) -> Floats:
             by = {t: float(s) * t.share for t, s in zip(self.rig.tolerances, steps, strict=True)}
-            return np.concatenate([self._readings(*moved(made, by)) - self.true, steps])
+            try:
+                readings = self._readings(*moved(made, by))
+            except (ValueError, ArithmeticError):  # no such arm
+                readings = np.full(self.true.size, 1e3)
+            return np.concatenate([readings - self.true, steps])
 
         at, residual, formed = start, left(start), 0
         slopes = np.vstack([self.answers, np.eye(start.size)])

@@ -24,7 +24,7 @@ from model.inverse_dynamics.drive_timing import MOST, samples_late
 from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_limit
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
-from model.machine_model.posterior import determined
+from model.machine_model.posterior import summarise_posterior
 
 SLIGHTLY_LATE = 0.1
 """Least lateness of a drive that is told, in samples."""
@@ -114,14 +114,13 @@ def _errors(standing: Standing, records: tuple[RecordedMotion, ...]) -> tuple[Si
 def _resulting_model(outcome: Outcome, traces: Sequence[str]) -> Model:
     """The model that comes out, with what the controller's numbers prove, and where it comes from."""
     standing = outcome.standing
-    deviations = determined(standard_deviations(standing.now).items())
+    known = standing.now.model_values
+    estimates = ((name, known[name], d) for name, d in standard_deviations(standing.now).items() if name in known)
+    learnt = summarise_posterior(standing.given.lineage, traces, estimates)
     lineage = Lineage(
         parent=standing.given.identity,
         traces=tuple(traces),
-        fit={
-            "fitted": [u.name for u in outcome.unknowns],
-            "deviations": deviations,
-        },
+        fit={"fitted": [u.name for u in outcome.unknowns], **learnt},
         note="diagnosis",
     )
     found = standing.model.with_values(standing.now.model_values)
@@ -133,7 +132,7 @@ def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
     standing = outcome.standing
     values = standing.now.values
     return (
-        *on_stated_numbers((u for u in outcome.unknowns if u.name not in outcome.added), values),
+        *on_stated_numbers((u.as_stated for u in outcome.unknowns if u.name not in outcome.added), values),
         *on_named_numbers((p for name, p in outcome.stated.items() if name in outcome.added), values),
         _torque_left(outcome),
         *_assumptions(cutoff, outcome.controller.not_looked_for),

@@ -158,8 +158,9 @@ def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:
     """Distance of the farthest of the numbers that the file states, in stated deviations, with a candidate: of those
     that were not far off without it; 0 where there are none."""
     now = standing.now
-    before = {u.name: abs(prior_distance(u, now.values[u.name])[0]) for u in now.unknowns}
-    stated = [u for u in chosen.fit.unknowns if u.parameter.effect is None and before.get(u.name, FAR_OFF) < FAR_OFF]
+    before = {u.name: abs(prior_distance(u.as_stated, now.values[u.name])[0]) for u in now.unknowns}
+    own = [u.as_stated for u in chosen.fit.unknowns if u.parameter.effect is None]
+    stated = [u for u in own if before.get(u.name, FAR_OFF) < FAR_OFF]
     return max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
 
 

@@ -73,7 +73,8 @@ class _Magnet(NamedTuple):
 
 
 def _magnets(unknowns: Sequence[Unknown]) -> list[_Magnet]:
-    """The magnets of which both constants are unknowns and something is expected of the back-EMF constant."""
+    """The magnets of which both constants are unknowns and something is expected of the back-EMF constant, or nothing
+    of either: constants that a candidate has freed are still of one magnet."""
     of_motors = {
         (u.parameter.part, u.parameter.joints): k
         for k, u in enumerate(unknowns)
@@ -82,7 +83,9 @@ def _magnets(unknowns: Sequence[Unknown]) -> list[_Magnet]:
     found = []
     for (part, joints), torque in of_motors.items():
         back = of_motors.get(("back_emf_constant", joints))
-        if part != "torque_constant" or back is None or unknowns[back].deviation is None:
+        if part != "torque_constant" or back is None:
+            continue
+        if unknowns[back].deviation is None and unknowns[torque].deviation is not None:
             continue
         looser = _share(unknowns[torque]) > _share(unknowns[back])
         found.append(_Magnet(torque, back, torque if looser else back))

@@ -103,10 +103,11 @@ def sizes_at_bounds(found: Fitted) -> list[Parameter]:
 def _ends_at_bound(p: Parameter, value: float) -> bool:
     """Whether a size, or the rate of a tone, ended at the end of what it may be, where a fit would go on: no machine
     has it, and what it takes is something else. The slowest ripple is a spring."""
-    if p.effect == "supply_limit" or (p.null is None and p.rate_of is None):  # records bound a limit
+    is_shape = p.effect is not None and p.null is None and p.rate_of is None
+    if is_shape or p.effect == "supply_limit":  # records bound a limit
         return False
     ends = [bound for bound in (p.low, p.high) if math.isfinite(bound) and bound != p.null]
-    return any(abs(value - end) <= AT_END * abs(end) for end in ends)
+    return any(abs(value - end) <= AT_END * max(abs(end), p.deviation or 0.0) for end in ends)
 
 
 def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) -> bool:

@@ -7,7 +7,7 @@ number (an added mass, a weakened magnet), the effect alone is tried: two names 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from model import layout as at
@@ -23,6 +23,8 @@ from model.machine_model.parameter import Parameter
 TRIED = 2.0
 """Deviations from which a number is tried: half of what makes it a candidate that may be named, since several numbers
 share a distance that one of them has."""
+MAGNET = ("torque_constant", "back_emf_constant")
+"""Numbers of a motor that are of one magnet."""
 NUMBERS = {
     ("motor", "rotor_inertia"): "wrong_rotor_inertia",
     ("drive", "inertia"): "wrong_rotor_inertia",
@@ -60,7 +62,7 @@ def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[T
             continue
         if case.options.joints and p.joints[0] not in case.options.joints:
             continue
-        if not _has_effect(model, p, now.values[p.name] < u.expected):
+        if not _has_effect(model, p, _is_lower(p, now, tolerances)):
             found.setdefault((name, p.joints), []).append((p, u))
     for (name, joints), numbers in found.items():
         moved = [(p, u) for p, u in numbers if abs(prior_distance(u, now.values[p.name])[0]) >= TRIED]
@@ -79,10 +81,19 @@ def _lifted(
 ) -> Trial:
     """Stated numbers without their priors."""
     own = tuple(p for p, _ in numbers)
-    stated = tuple(replace(p, value=u.expected, deviation=u.deviation) for p, u in numbers)
+    stated = tuple(replace(p, value=u.expected, deviation=u.as_stated.deviation) for p, u in numbers)
     origin = {p.name: now.values[p.name] for p in own}
     start = {p.name: origin[p.name] + u.scale for p, u in numbers}
     return Trial(name, joints, model, own, tuple(origin), (start,), stated, origin)
+
+
+def _is_lower(p: Parameter, now: BalanceFit, tolerances: Mapping[str, Unknown]) -> bool:
+    """Whether the fit has lowered a number; of a motor's two constants, the one that is further off says it of both."""
+    own = [tolerances[p.name]]
+    if p.part in MAGNET:
+        own = [u for u in tolerances.values() if u.parameter.part in MAGNET and u.joints == p.joints]
+    farthest = max(own, key=lambda u: abs(prior_distance(u, now.values[u.name])[0]))
+    return now.values[farthest.name] < farthest.expected
 
 
 def _has_effect(model: Model, p: Parameter, lower: bool) -> bool:
@@ -90,5 +101,4 @@ def _has_effect(model: Model, p: Parameter, lower: bool) -> bool:
     joint = p.joints[0]
     if p.part == "centre_x":
         return bool(model.vector[at.slot(joint, at.A)] != 0.0)
-    magnet = p.part in ("torque_constant", "back_emf_constant")
-    return magnet and lower and suits_drive(model.machine, "weakened_magnet", joint)
+    return p.part in MAGNET and lower and suits_drive(model.machine, "weakened_magnet", joint)

@@ -22,9 +22,6 @@ from model.machine_model.model import Model
 
 SHOWN = 12
 """Most candidates that a step lists."""
-TOLD = 9.0
-"""Fall of −2 log posterior, less what noise brings, from which records tell one effect from another: three
-deviations."""
 ABOVE_NOISE = 1.2
 """Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
 removed."""

@@ -23,18 +23,22 @@ DeviationSource = Literal["stated", "fitted-before", "free"]
 
 
 def tolerances(
-    model: Model, added: frozenset[str] = frozenset(), sizes: Mapping[str, Parameter] | None = None
+    model: Model,
+    added: frozenset[str] = frozenset(),
+    sizes: Mapping[str, Parameter] | None = None,
+    fitted: Mapping[str, float] | None = None,
 ) -> tuple[tuple[Unknown, ...], DeviationSource]:
     """Parameters that may be wrong, and where their deviations come from.
 
     Args:
         added: effects' parameters (full names) that the diagnosis itself put in; they have no prior.
-        sizes: parameters by name, with deviations that follow from the records or from an earlier fit.
+        sizes: effects' parameters by name, with deviations that follow from the records.
+        fitted: deviations of earlier fits by name, where they are smaller (`posterior.load_posterior`).
     """
-    known = sizes or {}
+    known, better = sizes or {}, fitted or {}
     every = [known.get(p.name, p) for p in model.parameters]
     own = [p for p in every if p.name not in added]
-    of_machine = [p for p in every if p.deviation is not None and p.effect is None]
+    of_machine = [p for p in model.parameters if p.deviation is not None and p.effect is None]
     stated = [p for p in of_machine if p.name not in added]
     bodies = [p for p in own if p.kind is Kind.INERTIA and p.value != 0.0]
     machine: list[tuple[Parameter, float | None]]
@@ -50,7 +54,8 @@ def tolerances(
         source = "free"
     effects = [(p, p.deviation) for p in own if p.effect is not None]
     found = [free_unknown(p) for p in every if p.name in added]
-    return (*(_unknown(p, d) for p, d in (*machine, *effects)), *found), source
+    claimed = ((p, better.get(p.name, d)) for p, d in (*machine, *effects))
+    return (*(_unknown(p, d) for p, d in claimed), *found), source
 
 
 def free_unknown(p: Parameter) -> Unknown:

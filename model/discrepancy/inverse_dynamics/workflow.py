@@ -27,7 +27,7 @@ from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.machine_model.posterior import known_from_fit
+from model.machine_model.posterior import load_posterior
 
 
 @dataclass
@@ -103,8 +103,8 @@ class TorqueWorkflow:
     def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
         """The model fitted again, with the parameters that the diagnosis has `added` without priors."""
         records, names = self.case.records, frozenset(added)
-        expected = {**recorded_sizes(self.given, records), **self._known_before}
-        own = [u for u in tolerances(self.given, sizes=expected)[0] if u.name not in names]
+        before = tolerances(self.given, sizes=recorded_sizes(self.given, records), fitted=self._known_before)[0]
+        own = [u for u in before if u.name not in names]
         known = {u.name for u in own}
         sizes = {**recorded_sizes(model, records), **added}
         found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
@@ -112,10 +112,9 @@ class TorqueWorkflow:
         return fit(TorqueBalance(model, self.case.records), unknowns, begin, self.case.data)
 
     @cached_property
-    def _known_before(self) -> dict[str, Parameter]:
-        """Parameters of the given model, by name, that an earlier fit to other records has left better known."""
-        deviations = known_from_fit(self.given, (r.name for r in self.case.records))
-        return {name: replace(self.given.parameter(name), deviation=d) for name, d in deviations.items()}
+    def _known_before(self) -> Mapping[str, float]:
+        """Deviations of the given model's numbers, by name, that earlier fits to other records know better."""
+        return load_posterior(self.given, (r.name for r in (*self.case.records, *self.case.held_out)))
 
     def _search(self) -> Findings:
         """What a step found, without what the records do not resolve."""
@@ -130,7 +129,7 @@ class TorqueWorkflow:
     def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
         """What would have been enough evidence to be named, had its size not ended where no machine is."""
         enough = [f for f in found.unresolved if f.evidence >= self.case.options.least_evidence]
-        best = {f.effect: f for f in reversed(enough) if sizes_at_bounds(f)}
+        best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
         return [_size_at_bound(f) for f in best.values()]
 
     def _adopt(self, found: Findings) -> bool:
@@ -150,7 +149,8 @@ class TorqueWorkflow:
         return False
 
     def _take(self, chosen: Fitted) -> None:
-        if chosen.stated and all(chosen.fit.values[p.name] < p.value for p in chosen.stated):
+        friction = bool(chosen.stated) and all(p.effect is not None for p in chosen.stated)
+        if friction and all(chosen.fit.values[p.name] < p.value for p in chosen.stated):
             self.lowered.add(len(self.steps) - 1)
         self.stated |= {p.name: p for p in chosen.stated}
         self.added |= {p.name: p for p in chosen.parameters}
@@ -198,9 +198,15 @@ class TorqueWorkflow:
         return self.model.without_effect(step.effect, joints or None)
 
 
+def _own_bounds(found: Fitted) -> list[Parameter]:
+    """Sizes of a candidate that ended where no machine is, and not merely where the records say nothing more."""
+    known = found.model.by_name
+    return [p for p in sizes_at_bounds(found) if (p.low, p.high) == (known[p.name].low, known[p.name].high)]
+
+
 def _size_at_bound(found: Fitted) -> Note:
     """The first size of a candidate that ended at its bound."""
-    p = sizes_at_bounds(found)[0]
+    p = _own_bounds(found)[0]
     values = {"effect": found.effect, "joints": list(found.joints), "evidence": found.evidence}
     return Note(
         kind="size-at-bound", values={**values, "name": p.part, "value": found.fit.values[p.name], "unit": p.unit}

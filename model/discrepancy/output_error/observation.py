@@ -38,7 +38,7 @@ from model.fitting.whitening import Whitener
 from model.inverse_dynamics.recorded_sizes import as_driven
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
-from model.machine_model.posterior import known_from_fit
+from model.machine_model.posterior import load_posterior
 from model.simulation.batch import BatchRun
 from model.simulation.inputs import readings_on_grid
 from model.simulation.period import OUT_DRIVE, OUT_READING, OUTPUTS
@@ -345,19 +345,22 @@ class Observation:
 
 
 def observe(
-    model: Model, traces: Sequence[Trace], feedback_share: float = FEEDBACK_SHARE
+    model: Model, traces: Sequence[Trace], feedback_share: float = FEEDBACK_SHARE, held_out: Sequence[str] = ()
 ) -> tuple[Observation, Calibration]:
     """Traces ready for a diagnosis, and the model as it was given, with potentiometers that may bend within their
     linearity. Its unknowns are the tolerance parameters, all numbers that may differ from the model's on a sound
     machine: every number with an expected deviation, the potentiometers' bends, the form of friction near zero speed,
     and the initial postures.
 
+    Args:
+        held_out: identities of the traces that are not fitted to.
+
     Raises:
         TraceError, SpecError: as `model.fitting.fit.fit`.
     """
     stated = tuple(p.name for p in model.parameters if p.deviation is not None and p.deviation > 0 and p.null is None)
     effects = tuple(p.name for p in model.parameters if p.effect is not None and p.deviation is not None)
-    known = known_from_fit(model, (t.record.trace_id for t in traces))
+    known = load_posterior(model, (*(t.record.trace_id for t in traces), *held_out))
     priors = {name: Prior(expected=model.parameter(name).value, deviation=d) for name, d in known.items()}
     chosen = tuple(dict.fromkeys((*stated, *effects)))
     problem: SimulatedProblem = fit_problem(

@@ -85,7 +85,7 @@ def diagnose_by_simulation(
         traces, holdout = (tuple(map(thinned, some)) for some in (traces, holdout))
     progress(0.02, "fitting the tolerance parameters")
     known = with_findings(model, findings)
-    given = _given_point(*observe(known, traces))
+    given = _given_point(*observe(known, traces, held_out=[t.record.trace_id for t in holdout]))
     if given.observation.drive_is_input:
         # The plant gets the drive that was recorded, whatever the controller has done.
         excluded = tuple(effect.value for effect in ControllerEffect)
@@ -365,7 +365,7 @@ def _candidates(found: _Search) -> tuple[Candidate, ...]:
 def _stated(point: Point) -> list[Unknown]:
     """The numbers of the machine itself that a fit may change: no effect's, and no initial posture."""
     known = point.model.by_name
-    return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
+    return [u.as_stated for u in point.unknowns if u.name in known and known[u.name].effect is None]
 
 
 def _with_lineage(case: Case, point: Point) -> Model:

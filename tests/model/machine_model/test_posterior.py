@@ -10,7 +10,7 @@ from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.fitting.options import FitOptions
 from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import Lineage, Model, base_model
-from model.machine_model.posterior import LEAST_KEPT, determined, known_from_fit
+from model.machine_model.posterior import LEAST_SHARE, load_posterior, summarise_posterior
 from tests.model.discrepancy.inverse_dynamics import rigs
 
 STATED = 1.2
@@ -34,24 +34,38 @@ def diagnosed(model: Model, **hidden: float) -> Diagnosis:
     return diagnose_torques(model, traces[:1], traces[1:], TorqueOptions(effects=("link_mass",)))
 
 
-def with_deviations(deviations: dict[str, float], *traces: str) -> Model:
-    return given().with_lineage(Lineage(traces=traces, fit={"deviations": deviations}))
+NAME = "link1.mass"
+
+
+def knowing(deviation: float, **more: object) -> Model:
+    """The slide, whose mass an earlier fit to the trace `earlier` has left with a deviation."""
+    posterior = {NAME: {"value": 12.0, "deviation": deviation}, "link9.mass": {"value": 1.0, "deviation": 1e-3}}
+    return given().with_lineage(Lineage(traces=("earlier",), fit={"posterior": posterior, **more}))
 
 
 @pytest.mark.parametrize(
-    ("deviation", "kept"), [(2 * STATED, None), (0.5 * STATED, 0.5 * STATED), (1e-6, LEAST_KEPT * STATED)]
+    ("deviation", "kept"), [(2 * STATED, None), (0.5 * STATED, 0.5 * STATED), (1e-6, LEAST_SHARE * STATED)]
 )
 def test_a_fit_leaves_no_more_than_is_stated_and_no_less_than_a_quarter(deviation: float, kept: float | None) -> None:
-    known = known_from_fit(with_deviations({"link1.mass": deviation, "link9.mass": 1e-3}, "earlier"), ["new"])
-    assert known == ({} if kept is None else {"link1.mass": pytest.approx(kept)})
+    known = load_posterior(knowing(deviation), ["new"])
+    assert known == ({} if kept is None else {NAME: pytest.approx(kept)})
 
 
-def test_a_record_counts_once() -> None:
-    assert known_from_fit(with_deviations({"link1.mass": 0.4}, "one", "other"), ["new", "other"]) == {}
+def test_a_record_counts_once_whatever_fits_lie_between() -> None:
+    model = knowing(0.4, learnt_from=["first"])
+    for trace in ("earlier", "first"):
+        assert load_posterior(model, ["new", trace]) == {}
+    learnt = summarise_posterior(model.lineage, ["third"], [])
+    assert learnt["learnt_from"] == ["earlier", "first", "third"]
+
+
+def test_a_number_that_was_typed_by_hand_has_no_posterior() -> None:
+    assert load_posterior(knowing(0.4).with_values({NAME: 12.5}), ["new"]) == {}
 
 
 def test_what_records_do_not_determine_is_not_kept() -> None:
-    assert determined([("a", 0.1), ("b", None), ("c", float("inf")), ("d", 0.0)]) == {"a": 0.1}
+    estimates = [("a", 1.0, 0.1), ("b", 1.0, None), ("c", 1.0, float("inf")), ("d", 1.0, 0.0)]
+    assert summarise_posterior(Lineage(), [], estimates)["posterior"] == {"a": {"value": 1.0, "deviation": 0.1}}
 
 
 def test_a_mass_that_is_stated_roughly_is_named_where_a_fit_has_known_it_better() -> None:
@@ -68,5 +82,26 @@ def test_a_model_that_was_fitted_to_a_sound_machine_finds_nothing_on_it() -> Non
 
 
 def test_the_model_that_comes_out_of_a_diagnosis_knows_its_numbers() -> None:
-    known = (diagnosed(given()).model_after.lineage.fit or {})["deviations"]
-    assert 0.0 < known["link1.mass"] < 0.1 * STATED
+    model = diagnosed(given()).model_after
+    assert load_posterior(model, ["another"]) == {NAME: pytest.approx(LEAST_SHARE * STATED)}
+    assert load_posterior(model, model.lineage.traces) == {}
+
+
+def test_a_held_out_trace_that_the_model_has_learnt_from_makes_it_expect_what_its_file_states() -> None:
+    model = fitted()
+    traces = [rigs.slide_trace(1, {"mass": 12.0 + 2 * STATED}), rigs.slide_trace(5, {"mass": 12.0 + 2 * STATED})]
+    found = diagnose_torques(model, traces[:1], traces[1:], TorqueOptions(effects=("link_mass",)))
+    assert found.verdict == "nothing-significant", found.summary
+
+
+def test_friction_that_has_changed_since_the_fit_is_held_against_the_file_and_not_against_the_fit() -> None:
+    """A warm day: a sixth less than stated to a third is no effect, however well an earlier fit knew it."""
+    machine = rigs.slide_machine().model_dump(mode="json", exclude_unset=True)
+    machine["joints"][0]["friction"] = {"viscous": rigs.quantity(6.0, "N·s/m", low=0.0, deviation=2.0)}
+    stating = base_model(type(rigs.slide_machine()).model_validate(machine))
+    cold = [rigs.slide_trace(seed, {"viscous": 6.0}) for seed in (5, 6)]
+    model = fit_torques(stating, cold).model
+    assert load_posterior(model, ["new"])
+    warm = [rigs.slide_trace(seed, {"viscous": 5.0}) for seed in (1, 2)]
+    found = diagnose_torques(model, warm[:1], warm[1:], TorqueOptions(effects=("viscous_friction", "coulomb_friction")))
+    assert found.verdict == "nothing-significant", found.summary

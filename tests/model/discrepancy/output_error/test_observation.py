@@ -32,7 +32,7 @@ def test_numbers_of_the_machine_are_expected_to_be_what_its_file_states() -> Non
 def test_numbers_that_an_earlier_fit_knows_are_expected_to_be_those_of_the_fit() -> None:
     stated = imagined.arm().parameter("load.mass").deviation
     assert stated is not None
-    fit = {"deviations": {"load.mass": 0.5 * stated}}
+    fit = {"posterior": {"load.mass": {"value": 1.4, "deviation": 0.5 * stated}}}
     heavy = imagined.arm().with_values({"load.mass": 1.4}).with_lineage(Lineage(traces=("earlier",), fit=fit))
     _, given = observe(heavy, [imagined.trace(heavy, seconds=3.0)])
     load = next(u for u in given.unknowns if u.name == "load.mass")
