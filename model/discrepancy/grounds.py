@@ -87,6 +87,7 @@ RefusalKind = Literal[
     "error-grows",
     "error-rises",
     "falls-too-little",
+    "leaves-more-than-noise",
     "only-resembles",
     "superfluous",
     "worse-than-given",

@@ -21,8 +21,8 @@ left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
 class RestingFriction:
     """What friction does where a joint hardly moves (k, n), N·m.
 
-    sliding: its torque by the smoothed direction of motion, which the balance has counted. lowest, highest: what it can
-    take while the joint stands, on the positive side where motion was backwards.
+    sliding: its torque by the smoothed direction of motion, which the balance has counted. lowest, highest: limits of
+    the torque while the joint stands; against backward motion it is positive.
     """
 
     sliding: Floats
@@ -31,8 +31,8 @@ class RestingFriction:
 
 
 def friction_at_rest(level: Floats, motion: LinkMotion, joints: Floats) -> RestingFriction:
-    """Friction of joints (n, PER_JOINT) that stand or turn, by its level (k, n): what is more one way, what fades with
-    speed, and what it takes to break away."""
+    """Coulomb friction of a level (k, n), and direction-dependent, Stribeck and breakaway friction, of joints
+    (n, PER_JOINT) that stand or turn. Losses of gears are not held."""
     more, fading = joints[:, at.DIRECTION], joints[:, at.STRIBECK]
     speed = np.where(fading != 0.0, joints[:, at.STRIBECK_SPEED], 1.0)
     contact = motion.contact

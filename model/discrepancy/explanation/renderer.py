@@ -149,6 +149,11 @@ def refusal_words(refusal: Refusal) -> str:
             )
         case "falls-too-little":
             words = f"on records not fitted to, the mean square falls by only {n['share']:.1%}"
+        case "leaves-more-than-noise":
+            words = (
+                f"it takes {n['share']:.0%} of the mean square on records not fitted to, and leaves "
+                f"{n['noises']:.0f} times the noise: of what something else makes, any law takes a part"
+            )
         case "only-resembles":
             words = (
                 "it only resembles what is missing: with all that was found, "

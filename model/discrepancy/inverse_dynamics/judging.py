@@ -29,8 +29,8 @@ SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
 NO_PART = 0.5
-"""Least share of a residual that is no noise, with or without it, which an effect takes: of a residual that is made of
-something else, any law takes a little, with evidence that counts as if the rest were noise."""
+"""Least share of a residual far above noise that an effect must take. Any law takes a little of another one, and the
+evidence then counts the rest as noise."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 LEAD = 4.0
@@ -137,8 +137,8 @@ def _refusal(standing: Standing, comparison: Comparison, *, explains_most: bool)
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
-    if _leaves_what_is_no_noise(standing, comparison):
-        return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
+    if (noises := _noises_left(standing, comparison)) > NO_NOISE and comparison.removed < NO_PART:
+        return Refusal(kind="leaves-more-than-noise", numbers={"share": comparison.removed, "noises": noises})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})
     if tolerances(standing.model)[1] != "stated" or explains_most:
@@ -147,11 +147,13 @@ def _refusal(standing: Standing, comparison: Comparison, *, explains_most: bool)
     return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
 
 
-def _leaves_what_is_no_noise(standing: Standing, comparison: Comparison) -> bool:
-    """Whether an effect takes a small part of what is left on its joints, and what it leaves there is no noise."""
+def _noises_left(standing: Standing, comparison: Comparison) -> float:
+    """Least residual that an effect leaves on a joint of its own, in noise floors; 0 for one of the whole machine, and
+    where nothing is known of its joints."""
     own = np.array([j in comparison.chosen.joints for j in standing.model.machine.modelled_joints])
-    left = np.sqrt(comparison.fitted_after[own])
-    return bool(own.any() and (left > NO_NOISE * standing.case.noise[own]).all() and comparison.removed < NO_PART)
+    left = np.sqrt(comparison.fitted_after[own]) / standing.case.noise[own]
+    known = left[np.isfinite(left)]
+    return float(known.min()) if known.size else 0.0
 
 
 def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:

@@ -68,7 +68,7 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
     sizes = np.sqrt(case.stretches.mean_squares(residual))
     for j, joint in enumerate(model.machine.modelled_joints):
         pieces = case.stretches.of_joint(residual, j)
-        if not pieces:
+        if not pieces or not np.isfinite(sizes[j]):
             continue
         correlation = correlation_of([p / floor[j] for p in pieces], LEAST)
         squares: dict[Phase, float] = {}
@@ -96,8 +96,6 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
                 )
         dependences += [_dependence(joint, a, b, u) for a, b, u in _bins(now, case, j)]
         phase = max(squares, key=lambda p: squares[p])
-        if not np.isfinite(sizes[j]):
-            continue
         relative = float(sizes[j]) / floor[j]
         rms, unit = relative * floor[j], torque_unit(model, joint)
         places.append(WorstPlace(joint=joint, phase=phase, ratio=relative, rms=rms, unit=unit, whole_record=True))

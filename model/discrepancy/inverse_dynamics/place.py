@@ -50,7 +50,8 @@ class Place:
 
     @property
     def slowest_ripple(self) -> float:
-        """Waves a turn (rad/m) of a ripple of which one lies within the positions at which the joint moves."""
+        """Slowest rate, in rad of phase per rad (m), of a ripple: one wave lies within the positions at which the joint
+        moves."""
         every = np.concatenate([r.position[r.rows, self.column][r.moving[:, self.column]] for r in self.records])
         return 2 * np.pi / max(float(np.ptp(every)) if every.size else 0.0, 1e-9)
 

@@ -54,7 +54,7 @@ are tried."""
 PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
 FASTEST_RIPPLE = 1000.0
-"""Most waves of a ripple a turn (a metre) that are tried."""
+"""Fastest ripple that is tried, in rad of phase per rad (m)."""
 LONGEST_SCAN = 400
 """Largest number of frequencies that are tried."""
 

@@ -21,8 +21,8 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 TRIED = 2.0
-"""Deviations from which a number is tried: half of what makes it a candidate that may be named, since several numbers
-share a distance that one of them has."""
+"""Distance, in deviations, from which a number is tried: half of what it takes to be named, because several numbers may
+share one distance."""
 MAGNET = ("torque_constant", "back_emf_constant")
 """Numbers of a motor that are of one magnet."""
 NUMBERS = {
@@ -37,8 +37,8 @@ NUMBERS = {
     **{("link", f"centre_{axis}"): "wrong_link_centre" for axis in "xyz"},
     **{("link", part): "wrong_geometry" for part in ("length", "offset", "radius")},
 }
-"""What a number is called that is far from what the file states, by what carries it and which number of that it is.
-Masses, loads, friction and sensors' zeros have effects of the library that do the same."""
+"""Name of the step, by component and part of the number. Masses, loads, friction and sensors' zeros have effects of the
+library that do the same."""
 
 
 def stated_trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial | None:

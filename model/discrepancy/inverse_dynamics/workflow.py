@@ -43,6 +43,8 @@ class TorqueWorkflow:
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
+    at_bounds: list[Note] = field(default_factory=list)
+    """Effects that would have been named, had their sizes not ended where no machine is."""
     suspicion: Suspicion | None = None
     stated: dict[str, Parameter] = field(default_factory=dict)
     """Numbers that steps have named although the file states them, as it states them."""
@@ -70,7 +72,7 @@ class TorqueWorkflow:
             if not self._adopt(found):
                 self.tried = list_candidates(self.case, found)
                 self.suspicion = suspect(self.standing, found)
-                self.notes += self._on_sizes_at_bounds(found)
+                self.at_bounds = self._on_sizes_at_bounds(found)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(done)
@@ -91,7 +93,7 @@ class TorqueWorkflow:
             stated=self.stated,
             tried=self.tried,
             suspicion=self.suspicion,
-            notes=tuple(self.notes),
+            notes=(*self.notes, *self.at_bounds),
         )
         return answer_of(outcome, traces, held_out, cutoff)
 
@@ -185,7 +187,7 @@ class TorqueWorkflow:
                 self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
                 self.steps[index] = withdrawn(step, wrong)
             self.now = self._fit(self.model, {}, self.added)
-            self.suspicion, self.tried = None, ()  # they were of the model with these effects
+            self.suspicion, self.tried, self.at_bounds = None, (), []  # they were of the model with these effects
 
     def _without(self, step: Step) -> Model:
         """The model without the effect of a step, but for joints of which the file states it."""

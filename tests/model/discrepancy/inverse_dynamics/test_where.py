@@ -13,8 +13,9 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.resolution import sizes_at_bounds
 from model.discrepancy.inverse_dynamics.search import Fitted
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow, _size_at_bound
+from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow, _own_bounds, _size_at_bound
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -27,13 +28,21 @@ def rubbing() -> TorqueWorkflow:
 
 
 def test_a_size_at_its_bound_is_told_with_its_value(rubbing: TorqueWorkflow) -> None:
+    wider = rubbing.model.with_effect("link_mass", (1,))
+    (p,) = (q for q in wider.parameters if q.effect == "link_mass")
+    now = replace(rubbing.now, values={**rubbing.now.values, p.name: p.high})
+    note = _size_at_bound(Fitted("link_mass", (1,), wider, (p,), now, 80.0))
+    assert (note.kind, note.values["effect"], note.values["value"]) == ("size-at-bound", "link_mass", p.high)
+    assert f"added at the end of what it may be, {p.high:g} kg" in note_words(note)
+
+
+def test_a_bound_that_only_the_record_sets_is_no_end_of_what_machines_are(rubbing: TorqueWorkflow) -> None:
     wider = rubbing.model.with_effect("coulomb_friction", (1,))
     (p,) = (replace(q, high=3.0) for q in wider.parameters if q.effect == "coulomb_friction")
     now = replace(rubbing.now, values={**rubbing.now.values, p.name: 3.0})
     found = Fitted("coulomb_friction", (1,), wider, (p,), now, 80.0)
-    note = _size_at_bound(found)
-    assert (note.kind, note.values["effect"], note.values["value"]) == ("size-at-bound", "coulomb_friction", 3.0)
-    assert "torque at the end of what it may be, 3 N" in note_words(note)
+    assert sizes_at_bounds(found) == [p]
+    assert _own_bounds(found) == []
 
 
 def test_the_joint_of_the_largest_residual_is_named(rubbing: TorqueWorkflow) -> None:

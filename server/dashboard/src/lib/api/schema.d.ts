@@ -2467,6 +2467,11 @@ export interface components {
              */
             worse_held_out?: number[];
             /**
+             * Not Examined
+             * @default []
+             */
+            not_examined?: number[];
+            /**
              * Models
              * @default []
              */
@@ -4434,7 +4439,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "larger-noise" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "larger-noise" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "size-at-bound" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
             /**
              * Values
              * @default {}
@@ -5217,7 +5222,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "contradicts-file" | "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous" | "worse-than-given";
+            kind: "contradicts-file" | "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "leaves-more-than-noise" | "only-resembles" | "superfluous" | "worse-than-given";
             /**
              * Numbers
              * @default {}
