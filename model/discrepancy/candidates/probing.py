@@ -75,7 +75,22 @@ def projection(point: Point) -> Projection:
     pull = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
     information = point.information.copy()
     information[np.diag_indices_from(information)] *= 1 + 1e-9
-    return Projection(point.tangents, np.asarray(np.linalg.inv(information), dtype=np.float64), point.weighted, pull)
+    return Projection(point.tangents, inverse_of(information), point.weighted, pull)
+
+
+def inverse_of(information: Floats) -> Floats:
+    """Inverse (p, p) of what is known of unknowns; a direction of which nothing is known explains nothing.
+
+    An effect whose law never acts on the record, as a cable that is never taut, leaves its numbers without any
+    information, and they have no prior.
+    """
+    try:
+        return np.asarray(np.linalg.inv(information), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        known = np.diag(information) > 0.0
+        scale = np.where(known, 1.0 / np.sqrt(np.where(known, np.diag(information), 1.0)), 0.0)
+        both = np.outer(scale, scale)  # units differ by many powers of ten
+        return np.asarray(np.linalg.pinv(information * both, rcond=1e-12, hermitian=True) * both, dtype=np.float64)
 
 
 def probe(point: Point, tried: Sequence[Hypothesis]) -> list[Probe]:
