@@ -27,6 +27,12 @@ def _noticeable_compliance(scale: JointScale) -> float:
     return 2 * scale.resolution / (0.05 * scale.torque)
 
 
+def _softest_contact(scale: JointScale) -> float:
+    """Most that a contact gives, rad/(N·m). Of a drive that is a plain gain no torque is known without a record."""
+    known = scale.torque == scale.strongest
+    return contact_compliance(scale) + 10 * _noticeable_compliance(scale) if known else math.inf
+
+
 TRANSMISSION = (
     Effect(
         "torque_ripple",
@@ -93,7 +99,7 @@ TRANSMISSION = (
                 null=None,
                 start=contact_compliance,
                 low=contact_compliance,
-                high=lambda s: contact_compliance(s) + 10 * _noticeable_compliance(s),
+                high=_softest_contact,
                 deviation=_noticeable_compliance,
             ),
         ),
