@@ -190,10 +190,6 @@ REPORTED: dict[str, Kind] = {
         motions=("sweep", "via points"),
         known_loop=False,
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-volts-body": replace(
         _AXIS, rate=(300.0,), bits=(17,), contacts=(TANH, BRISTLE), body=True, motions=("via points", "sweep")
     ),
@@ -231,6 +227,34 @@ REPORTING: dict[str, Kind] = {
         body=True,
         motions=("sines", "via points"),
         known_loop=False,
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-rounded-sines": replace(
+        _AXIS, rate=(250.0,), bits=(16,), rounding=0.003, limit=0.6, contacts=(SWITCH,), motions=("sines", "sweep")
+    ),
+    "planar-volts-table": replace(
+        _PLANAR, rate=(200.0,), bits=(16,), contacts=(TANH,), horizontal=True, motions=("via points", "sines")
+    ),
+    "planar-cascade-body": replace(
+        _PLANAR, controller=CASCADE, rate=(300.0,), bits=(17,), contacts=(BRISTLE,), body=True, motions=("sweep",)
+    ),
+    "arm-steps": replace(
+        _ANTHROPOMORPHIC, rate=(250.0,), bits=(16,), contacts=(TANH, BRISTLE), motions=("steps", "via points")
+    ),
+    "axis-current-ramps": replace(
+        _AXIS, drive=CURRENT, rate=(300.0,), bits=(17,), contacts=(TANH,), motions=("ramps",), known_loop=False
+    ),
+    "six-cascade": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        controller=CASCADE,
+        rate=(250.0,),
+        bits=(17,),
+        contacts=(SWITCH,),
+        motions=("via points", "sines"),
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""

@@ -15,7 +15,7 @@ CONTACT = "joint1.backlash.contact"
 
 
 def test_a_contact_behind_a_plain_gain_may_give_whatever_records_show() -> None:
-    """A diagnosis in torques bounds it by the recorded torque. Its answer was refused by bounds that no torque was in."""
+    """A diagnosis in torques bounds it by the recorded torque; its answer was refused by bounds without any."""
     model = base_model(rigs.geared_machine()).with_effect("backlash", (1,))
     assert model.parameter(CONTACT).high == math.inf
     assert model.with_values({CONTACT: 0.5}).parameter(CONTACT).value == 0.5
