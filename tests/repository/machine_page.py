@@ -44,8 +44,8 @@ file and the machine. A number with a deviation is a tolerance parameter: fits a
 Stated of any other number of a modelled joint or of the controller they are an error: no method would use them.
 
 A torque constant, resistance, gain or gear ratio sets the scale of all torques, which motion alone does not show. Their
-deviations are used where the closed loop is diagnosed; a balance of torques believes these numbers, and a fit moves
-them only when they are named.
+deviations are used by a diagnosis, which names such a number where it is far off; a fit moves them only when they are
+named.
 
 Nothing limits the number of joints but time: a step of the simulation takes time in proportion to its square, a probe
 of every effect on every joint to its cube. CSV columns are numbered up to 99; the MA2000's board has six.
