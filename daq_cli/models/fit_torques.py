@@ -77,6 +77,6 @@ def _print(found: TorqueFit) -> None:
         from model.discrepancy.explanation.renderer import sentence
         from model.discrepancy.grounds import Note
 
-        values = {"shares": found.at_limit, "not_examined": found.unknown_joints}
+        values = {"shares": found.at_limit, "unknown_joints": found.unknown_joints}
         print(sentence(note_words(Note(kind="drive-at-limit", values=values))))
     print_on_the_edge(found.on_the_edge)

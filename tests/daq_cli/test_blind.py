@@ -20,6 +20,7 @@ from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
 from daq.executors.workers import ending
 from daq.traces.reader import read_trace
+from daq_cli.trial import sealed
 from daq_cli.trial.campaign import Campaign
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
 from daq_cli.trial.folder import TrialFolder
@@ -97,11 +98,19 @@ def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Camp
     assert told["files"] == ["asking.json", "held-out.mcap", "model.json", "trace-1.mcap", "trace-2.mcap"]
     assert told["arguments"] == []
     assert "DAQ_RUNTIME_FOLDER" not in told["environment"]
-    assert told["environment"]["OPENBLAS_NUM_THREADS"]
     everything = json.dumps(told)
     for seed in SECRETS:
         assert str(seed) not in everything
         assert str(seed // 100) not in everything
+
+
+def test_a_sealed_diagnosis_has_one_thread_for_products_unless_it_is_told_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    assert sealed._environment()["OPENBLAS_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    assert sealed._environment()["OPENBLAS_NUM_THREADS"] == "4"
 
 
 def test_the_diagnosis_is_given_the_announced_load(done: Campaign) -> None:

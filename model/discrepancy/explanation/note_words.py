@@ -24,7 +24,7 @@ def _cutoff(v: Values) -> str:
 
 def _drive_at_limit(v: Values) -> str:
     shares = ", ".join(f"{share:.0%} of joint {joint}'s time" for joint, share in v["shares"])
-    unknown = ", ".join(map(str, v["not_examined"]))
+    unknown = ", ".join(map(str, v["unknown_joints"]))
     return (
         f"the recorded drive stands at its largest value ({shares}), where less may act than is recorded: how much "
         "less is found beside all else, and nothing is concluded from it"

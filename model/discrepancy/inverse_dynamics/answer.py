@@ -165,7 +165,7 @@ def _at_limits(standing: Standing) -> tuple[Note, ...]:
     """Where drives were at limits that no file states."""
     joints = standing.model.machine.modelled_joints
     found = drives_at_limit((*standing.case.records, *standing.case.held_out), joints)
-    values = {"shares": list(found.shares), "not_examined": list(found.unknown)}
+    values = {"shares": list(found.shares), "unknown_joints": list(found.unknown)}
     return (Note(kind="drive-at-limit", values=values),) if found.shares else ()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -48,11 +49,22 @@ def test_a_search_that_cannot_reach_its_goal_is_given_up(
     assert descend(begun, 5, goal=goal).cost == ends_at
 
 
-def test_derivatives_that_are_known_at_a_point_are_not_computed_again(given: Point) -> None:
-    changing = [0, 3]
+def test_derivatives_that_are_known_at_a_point_are_not_computed_again(
+    given: Point, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changing, computed = [0, 3], []
     known = given.with_new_tangents(range(5))
+    whole = Point.with_new_tangents
+
+    def counted(point: Point, indices: Sequence[int]) -> Point:
+        computed.append(list(indices))
+        return whole(point, indices)
+
+    monkeypatch.setattr(Point, "with_new_tangents", counted)
     again = descend(known, 2, changing)
+    first = len(computed)
     spared = descend(known, 2, changing, changing_known=True)
+    assert len(computed) - first == first - 1
     assert np.array_equal(spared.values, again.values)
     assert np.array_equal(spared.tangents, again.tangents)
 
