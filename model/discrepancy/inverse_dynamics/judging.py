@@ -28,7 +28,7 @@ FAR_OFF = 4.0
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
-NO_PART = 0.5
+NO_PART = 0.4
 """Least share of a residual far above noise that an effect must take. Any law takes a little of another one, and the
 evidence then counts the rest as noise."""
 MOST_OF_IT = 0.6

@@ -22,6 +22,8 @@ from model.machine_model.parameter import Parameter
 OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_inductance"})
 """Effects whose torque follows how a torque changes in time: they cut short or shift what is fast, and noise of
 accelerations, or a gear that rattles, is fast."""
+WARMING = "resistance_rise"
+"""The effect of a winding that warms with time, whatever its current."""
 SLOWER = 0.5
 """Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
 the fifth power of the cutoff, so 3 % of it is left there."""
@@ -47,7 +49,10 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     if found.effect == DELAY and _may_be_timing(found):
         return False
     plain = _takes_half_of_what_is_no_noise(found, before, case)
-    if not plain and any(_fades_unresolved(p, found.fit.values[p.name]) for p in found.parameters):
+    values = found.fit.values
+    if any(_warms_at_once(p, values[p.name]) for p in found.parameters):
+        return False
+    if not plain and any(_fades_unresolved(p, values[p.name]) for p in found.parameters):
         return False
     if sizes_at_bounds(found) or not is_far_everywhere(found.stated, found.fit.values):
         return False
@@ -93,6 +98,12 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
     """Whether friction fades at the lowest speed that is looked at: then it fades below, where a smoothed speed does
     not tell whether the joint stands."""
     return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
+
+
+def _warms_at_once(p: Parameter, value: float) -> bool:
+    """Whether a winding is as warm as it gets within the shortest time that is looked at: no copper is, and what is
+    more at once than before is friction or a lost part of the drive."""
+    return p.effect == WARMING and p.part == "time_constant" and value <= AT_BOUND * p.low
 
 
 def sizes_at_bounds(found: Fitted) -> list[Parameter]:
