@@ -39,11 +39,11 @@ def daq(*words: str) -> dict[str, Any]:
 
 
 def names(answer: dict[str, Any]) -> list[str]:
-    """The effects of an answer, one text a step: the effect, or the members of a group."""
+    """The effects of an answer, one text a step: the effect, or the members of a group, whose order says nothing."""
     found = []
     for step in answer["steps"]:
         if step["adopted"]:
-            members = [c["effect"] for c in step["group"]] or [step["effect"]]
+            members = sorted(c["effect"] for c in step["group"]) or [step["effect"]]
             joints = "+".join(map(str, step["joints"]))
             found.append(" or ".join(members) + (f" on {joints}" if joints else ""))
     return found

@@ -22,7 +22,7 @@ def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
     return Table(
         ("parameter", "value", "95 % interval", "unit", "before", "expected", "verdict"),
         tuple(_parameter_row(p) for p in parameters),
-        "A parameter that the traces do not determine gets no number; the model keeps its expected value. "
+        "A parameter that the traces do not determine gets no number; the model carries one of those that fit as well. "
         "Intervals take the correlation of the residual into account.",
     )
 

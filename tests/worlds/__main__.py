@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 from tests.worlds.folder import write_world
+from tests.worlds.hiding import DRAWN
 from tests.worlds.kinds import KINDS, REPORTING
 from tests.worlds.world import CASES
 
@@ -24,7 +25,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--kind", choices=tuple(KINDS))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--case", choices=CASES, help="instead of the seed's own")
-    parser.add_argument("--effect", help="hide this one (a name of the library), whatever the case")
+    parser.add_argument(
+        "--effect", choices=DRAWN, metavar="NAME", help="hide this one (a name of the library), whatever the case"
+    )
     parser.add_argument("--sharpness", action="store_true", help="also which laws the records can tell apart")
     parser.add_argument("--list", action="store_true", help="the kinds")
     asked = parser.parse_args(arguments)

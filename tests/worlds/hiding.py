@@ -219,6 +219,9 @@ _SIZES: dict[str, Callable[[Size, Generator], dict[str, float]]] = {
 }
 """Sizes of the effects of joints, from the joint's own. Some are turned into fields when they are hidden."""
 
+DRAWN = (*_SIZES, *WHOLE_MACHINE)
+"""Names by which effects are drawn."""
+
 _LAW_FIELD = {
     "load_dependent_friction": "load_law",
     "stribeck_friction": "stribeck_law",

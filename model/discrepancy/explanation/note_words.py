@@ -104,7 +104,7 @@ def _size_at_bound(v: Values) -> str:
 def _stated_numbers_moved(v: Values) -> str:
     numbers = v["numbers"]
     listed = ", ".join(
-        f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.0f} deviations; {n['expected']:.4g} stated)"
+        f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.2g} deviations; {n['expected']:.4g} stated)"
         for n in numbers
     )
     if v.get("named"):

@@ -52,7 +52,7 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
             if case.held_out
             else None
         ),
-        where=locate(standing.now, case),
+        where=locate(compared.reference, case),
         reason=UNWRITTEN,
         reason_data=Reason(removed=compared.removed, slides=_slides(model, chosen.joints)),
         adopted=judgement.refusal is None,
