@@ -12,6 +12,7 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.machine_model.model import Model
 
 SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
+"""Errors of a position sensor, in a joint's numbers."""
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field, FiniteFloat, ValidationError
+
+from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from model.machine_model.model import Lineage, Model
 
 LEAST_SHARE = 0.25
 """Least share of an expected deviation that an earlier fit leaves: other records are of another day, with warmer gears
 and another mounting, and the model that was fitted is not exact. An assumption."""
+
+
+class Estimate(FrozenRecord):
+    """A number after a fit, with its standard deviation, in the number's unit."""
+
+    value: FiniteFloat
+    deviation: Annotated[FiniteFloat, Field(gt=0)]
+
+
+class Learnt(FrozenRecord):
+    """What a model file keeps of the fits that it comes from, as a part of `Lineage.fit`.
+
+    posterior: estimates by the number's name. learnt_from: identities of the traces of all fits.
+    """
+
+    posterior: dict[str, Estimate] = {}
+    learnt_from: tuple[str, ...] = ()
 
 
 def summarise_posterior(
@@ -37,19 +58,33 @@ def load_posterior(model: Model, traces: Iterable[str]) -> Mapping[str, float]:
 
     A number that was changed since then has none. Nor has any, where one of the traces (identities; fitted or held out)
     is one that the model has learnt from: what a record says counts once.
+
+    Raises:
+        SpecError: for a model file whose lineage holds something else in their place.
     """
     if set(traces) & _learnt_from(model.lineage):
         return {}
     found = {}
-    for name, estimate in ((model.lineage.fit or {}).get("posterior") or {}).items():
+    for name, estimate in _learnt(model.lineage).posterior.items():
         p = model.by_name.get(name)
-        if p is None or p.value != estimate["value"] or p.deviation is None:
+        if p is None or p.value != estimate.value or p.deviation is None:
             continue
-        if estimate["deviation"] < p.deviation:
-            found[name] = max(estimate["deviation"], LEAST_SHARE * p.deviation)
+        if estimate.deviation < p.deviation:
+            found[name] = max(estimate.deviation, LEAST_SHARE * p.deviation)
     return found
 
 
 def _learnt_from(lineage: Lineage) -> set[str]:
     """Identities of the traces of all fits that a model comes from."""
-    return {*lineage.traces, *((lineage.fit or {}).get("learnt_from") or ())}
+    return {*lineage.traces, *_learnt(lineage).learnt_from}
+
+
+def _learnt(lineage: Lineage) -> Learnt:
+    """The part of `Lineage.fit`, in which a file may hold anything. Raises SpecError."""
+    kept = {name: part for name, part in (lineage.fit or {}).items() if name in Learnt.model_fields}
+    try:
+        return Learnt.model_validate(kept)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, ("lineage", "fit", *first["loc"])))
+        raise SpecError(f"model: {where}: {first['msg']}") from None

@@ -44,7 +44,7 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
         evidence_held_out=judgement.told if case.held_out else None,
         margin=chosen.evidence - max([0.0, *(r.evidence for r in rivals)]),
         candidates=list_candidates(case, found),
-        group=_group(standing, chosen, rivals),
+        group=_group(case, chosen, rivals),
         rmse_fit=signal_errors(model, compared.fitted_before, compared.fitted_after, case.noise),
         rmse_holdout=signal_errors(model, compared.before, compared.after, case.noise) if case.held_out else (),
         excess_removed_holdout=(
@@ -95,9 +95,8 @@ def _rivals(standing: Standing, found: Findings, chosen: Fitted, refused: Sequen
     return [c for c in rivals if c.rivals(chosen) and not c.imitates(chosen, standing.now)]
 
 
-def _group(standing: Standing, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[Candidate, ...]:
+def _group(case: TorqueCase, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[Candidate, ...]:
     """The candidate and the rivals that are too near to name it alone, the best one of each effect; none without."""
-    case = standing.case
     near = [r for r in rivals if _cannot_be_told(case.options, chosen, r)]
     if not near:
         return ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from daq.contracts.errors import SpecError
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -61,6 +62,24 @@ def test_a_record_counts_once_whatever_fits_lie_between() -> None:
 
 def test_a_number_that_was_typed_by_hand_has_no_posterior() -> None:
     assert load_posterior(knowing(0.4).with_values({NAME: 12.5}), ["new"]) == {}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "where"),
+    [
+        ({"posterior": {NAME: 3.0}}, "lineage.fit.posterior.link1.mass: "),
+        ({"posterior": {NAME: {"value": 12.0, "deviation": -1.0}}}, "lineage.fit.posterior.link1.mass.deviation: "),
+        ({"posterior": [1]}, "lineage.fit.posterior: "),
+        ({"learnt_from": 7}, "lineage.fit.learnt_from: "),
+    ],
+)
+def test_a_model_file_with_something_else_in_its_lineage_is_refused_in_one_line(
+    wrong: dict[str, object], where: str
+) -> None:
+    with pytest.raises(SpecError) as refused:
+        load_posterior(given().with_lineage(Lineage(fit=wrong)), ["new"])
+    assert str(refused.value).startswith(f"model: {where}")
+    assert "\n" not in str(refused.value)
 
 
 def test_what_records_do_not_determine_is_not_kept() -> None:
