@@ -12,9 +12,13 @@ from hypothesis import strategies as st
 from model import layout as at
 from model.arrays import Floats
 from model.inverse_dynamics import friction_at_rest
+from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.friction_at_rest import RestingFriction, less_held
 from model.inverse_dynamics.link_motion import LinkMotion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, low_pass
+from model.machine_model.model import base_model
+from model.simulation.own_table import own_table
+from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.inverse_dynamics.driven_slide import TIME, motion_of
 
 
@@ -117,3 +121,25 @@ def test_friction_that_fades_or_has_to_be_broken_holds_more_both_ways(column: in
     motion = LinkMotion(RECORD.position, RECORD.speed, RECORD.acceleration, RECORD.contact)
     friction = friction_at_rest.friction_at_rest(np.full(SHAPE, 2.0), motion, joints)
     np.testing.assert_allclose((friction.lowest, friction.highest), (np.full(SHAPE, -3.5), np.full(SHAPE, 3.5)))
+
+
+@pytest.mark.parametrize("difference", [1.5, -0.7])
+def test_sliding_friction_is_what_the_balance_counts(difference: float) -> None:
+    """The laws stand in the compiled torques as well; what is held is held in place of exactly that."""
+    model = base_model(rigs.slide_machine())
+    for name, sizes in (
+        ("coulomb_friction", {"torque": 2.0}),
+        ("direction_dependent_friction", {"difference": difference}),
+        ("stribeck_friction", {"torque": 0.8, "speed": 0.03}),
+    ):
+        model = model.with_effect(name, (1,), sizes)
+    joints = np.ascontiguousarray(model.vector[at.SHARED :].reshape(1, at.PER_JOINT))
+    level, none = np.full(SHAPE, 2.0), np.zeros(SHAPE)
+    motion = LinkMotion(RECORD.position, RECORD.speed, RECORD.acceleration, RECORD.contact)
+    driven = kernel.DrivenMotion(
+        RECORD.time, RECORD.position, RECORD.speed, RECORD.contact, RECORD.speed, none, level, none
+    )
+    motor, other = np.empty(SHAPE), np.empty(SHAPE)
+    kernel.supplied_torque(driven, kernel.JointNumbers(joints, model.flags, own_table(model, np.float64)), motor, other)
+    assert np.abs(other).max() > 2.5
+    np.testing.assert_allclose(friction_at_rest.friction_at_rest(level, motion, joints).sliding, other, atol=1e-12)
