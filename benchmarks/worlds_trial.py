@@ -311,6 +311,8 @@ def main() -> int:
         print("\n".join(["[hashes]", *hashed, "", "[versions]", *versions]))
         return 0
     if asked.table is not None:
+        if not asked.table.is_file():
+            parser.error(f"--table {asked.table}: there is no such file")
         print("\n".join(table(read_rows(asked.table))))
         return 0
     if asked.folder is None or (asked.registration is None) == (not asked.sharpness):
