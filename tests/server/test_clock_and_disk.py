@@ -20,6 +20,7 @@ from server.catalogue.catalogue import Catalogue
 from server.services import RobotServices, Services
 from server.store.events import EventStore
 from tests.server.inside import WrongClock, service_inside
+from tests.server.polling import until
 
 SHORT = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
 
@@ -80,8 +81,7 @@ def test_what_waits_for_a_moment_waits_longer_when_the_clock_is_set_back(api: ht
     clock.ahead = timedelta(days=-1)
     assert api.get(f"experiments/{later}").json()["state"] == "queued"
     clock.ahead = timedelta(hours=2)
-    while api.get("queue").json()["waiting_for"] == "":  # what was due waits for the robot, and is not lost
-        pass
+    until(api, "queue", lambda queue: queue["waiting_for"] != "")  # what was due waits for the robot, and is not lost
     assert {one["id"] for one in api.get("queue/experiments").json()} >= {later, runs[0]["id"]}
     assert len(_listed(api, f"experiments?schedule={schedule['id']}")) == 1  # the run before still waits
 
@@ -170,13 +170,12 @@ def test_a_clock_that_leaps_ahead_makes_no_run_of_those_that_it_leaves_out(
 ) -> None:
     api.post("queue/pause")
     schedule = api.post("schedules", json={"spec": SHORT, "every": 3600}).json()["id"]
-    while not _listed(api, f"experiments?schedule={schedule}"):
-        pass
+    until(api, f"experiments?schedule={schedule}", lambda listed: listed["items"])
     before = datetime.fromisoformat(api.get(f"schedules/{schedule}").json()["next"])
     clock.ahead = timedelta(days=3650)
     api.post("queue/pause")  # which wakes the queue
-    while (now := datetime.fromisoformat(api.get(f"schedules/{schedule}").json()["next"])) == before:
-        pass
+    later = until(api, f"schedules/{schedule}", lambda one: datetime.fromisoformat(one["next"]) != before)
+    now = datetime.fromisoformat(later["next"])
     assert timedelta(0) < now - clock.utc() <= timedelta(hours=1)
     assert (now - before) % timedelta(hours=1) == timedelta(0)
     assert len(_listed(api, f"experiments?schedule={schedule}")) == 1

@@ -20,6 +20,7 @@ from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
 from tests.server.other_user import other_users_command_line
+from tests.server.polling import until
 from tests.server.service import Service
 
 ROBOT = "ma2000"
@@ -160,8 +161,8 @@ def test_a_program_is_kept_without_the_control_and_carried_out_with_it(empty: Se
     headers = {"Control-Lease": lease}
     assert empty.robot.post("/programs/nothing/run", headers=headers).status_code == 404
     assert empty.robot.post("/programs/waits/run", headers=headers).status_code == 202
-    while (status := empty.robot.get("/teaching").json())["activity"] != "none":
-        assert status["problem"] == ""
+    status = until(empty.robot, "/teaching", lambda teaching: teaching["activity"] == "none")
+    assert status["problem"] == ""
     assert status["result"] == "done: 1 instructions"
     empty.robot.delete("/control", headers=headers)
     assert [one["name"] for one in empty.robot.get("/programs").json()] == ["waits"]

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -51,9 +51,12 @@ class ObjectStore:
         return name
 
     def objects(self, bucket: str) -> dict[str, bytes]:
-        """What lies in a bucket, by name."""
-        listed = self.client.list_objects_v2(Bucket=bucket).get("Contents", [])
-        return {one["Key"]: self.client.get_object(Bucket=bucket, Key=one["Key"])["Body"].read() for one in listed}
+        """What lies in a bucket, by name. An object that is deleted between the list and its own turn is not there."""
+        found = {}
+        for one in self.client.list_objects_v2(Bucket=bucket).get("Contents", []):
+            with suppress(self.client.exceptions.NoSuchKey):
+                found[one["Key"]] = self.client.get_object(Bucket=bucket, Key=one["Key"])["Body"].read()
+        return found
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from daq.contracts.service.archive import Transfer
 from tests.daq_cli.invoke import CommandLine
 from tests.server.archive.store import ACCESS, SECRET, FaultyStore, ObjectStore, settings_of
 from tests.server.inside import WrongClock, service_inside
+from tests.server.polling import until
 
 TABLE = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
 
@@ -35,8 +36,7 @@ def _archived(api: httpx.Client) -> str:
     made = api.post("traces", content=TABLE, headers={"Content-Type": "text/csv"})
     assert made.status_code == 201, made.text
     trace: str = made.json()["id"]
-    while api.get(f"traces/{trace}/archive").json()["archived"] is None:
-        pass
+    until(api, f"traces/{trace}/archive", lambda kept: kept["archived"] is not None)
     return trace
 
 
@@ -44,8 +44,7 @@ def _dropped(api: httpx.Client) -> str:
     """A new trace that only the archive has."""
     trace = _archived(api)
     assert api.post(f"traces/{trace}/archive", json={"drop": True}).status_code == 202
-    while api.get(f"traces/{trace}/archive").json()["local"]:
-        pass
+    until(api, f"traces/{trace}/archive", lambda kept: not kept["local"])
     return trace
 
 
@@ -77,8 +76,7 @@ def test_its_state_is_in_answers_metrics_events_and_warnings(
     with caplog.at_level(logging.INFO):
         second = api.post("traces", content=TABLE.replace("0.049", "0.05"), headers={"Content-Type": "text/csv"})
         assert second.status_code == 201, second.text
-        while (status := api.get("archive").json())["state"] == "ok":
-            pass
+        status = until(api, "archive", lambda archive: archive["state"] != "ok")
     assert (status["state"], status["archived"], status["waiting"]) == ("away", 1, 1)
     assert status["next_try"] >= 0
     system = httpx.get(f"{root}/api/v1/system").json()
@@ -97,8 +95,7 @@ def test_its_state_is_in_answers_metrics_events_and_warnings(
     assert ACCESS not in everything
     assert SECRET not in everything
     proxy.fail("")
-    while api.get("archive").json()["archived"] < 2:
-        pass
+    until(api, "archive", lambda archive: archive["archived"] == 2)
 
 
 def test_the_commands_show_send_and_fetch(
@@ -111,8 +108,7 @@ def test_the_commands_show_send_and_fetch(
     assert said.code == 0
     assert "state:    ok, 1 traces; 0 wait to be sent, 0 fetched" in said.out
     assert "SHA-256" in daq("--server", root, "traces", "archive", trace, "--drop").out
-    while api.get(f"traces/{trace}/archive").json()["local"]:
-        pass
+    until(api, f"traces/{trace}/archive", lambda kept: not kept["local"])
     said = daq("--server", root, "traces", "fetch", trace[:6])
     assert said.code == 0
     assert said.out.startswith(f"{trace}: here and in the archive since ")

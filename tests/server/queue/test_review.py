@@ -26,6 +26,7 @@ from server.store.engine import Store
 from server.store.experiments import ExperimentStore, NotApprovedError
 from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at, tokens_of
 from tests.server.inside import service_inside
+from tests.server.polling import until
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 MACHINE = load_machine("ma2000")
@@ -180,8 +181,7 @@ def _content(person: Person, experiment: str) -> str:
 
 
 def _until_it_waits_for(robot: httpx.Client, what: str) -> None:
-    while what not in robot.get("/queue").json()["waiting_for"]:
-        pass
+    until(robot, "/queue", lambda queue: what in queue["waiting_for"])
 
 
 def _end_of(person: Person, experiment: str) -> dict[str, object]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.server.polling import until
 from tests.server.service import Service
 
 
@@ -99,8 +100,7 @@ def test_an_experiment_waits_while_a_client_has_the_control_and_then_for_a_perso
     mine = _lease(service)
     spec = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
     made = service.robot.post("/experiments", json={"spec": spec}).json()
-    while not (waiting_for := service.robot.get("/queue").json()["waiting_for"]):
-        pass
+    waiting_for = until(service.robot, "/queue", lambda queue: queue["waiting_for"])["waiting_for"]
     assert waiting_for == "somebody has control of the robot"
     service.robot.delete("/control", headers=mine)
     queue = service.robot.get("/queue").json()
