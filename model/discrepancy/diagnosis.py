@@ -56,12 +56,14 @@ class Candidate(FrozenRecord):
     `evidence` is the fall of −2 log posterior less the cost of its own parameters (BIC; for a tone's frequency the
     number of tones tried); above 0 it explains more than it costs. `misfit` is the mean square of the weighted residual
     that it leaves: near 1 for the right effect. `refitted` says whether all tolerance parameters were fitted again with
-    it, or it was only probed.
+    it, or it was only probed. `evidence_held_out` is what held-out records say for it, nothing fitted to them; None
+    where there are none, or they were not asked.
     """
 
     effect: str
     joints: tuple[int, ...]
     evidence: float
+    evidence_held_out: float | None = None
     misfit: float | None = None
     refitted: bool = False
     parameters: dict[str, FoundValue] = {}

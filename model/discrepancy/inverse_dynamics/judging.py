@@ -41,13 +41,9 @@ other method."""
 
 @dataclass(frozen=True)
 class Judgement:
-    """What was made of a candidate that has the evidence it needs.
-
-    told: what held-out records say for it, as evidence. refusal: why it is not taken; None where it is.
-    """
+    """What was made of a candidate that has the evidence it needs. refusal: why it is not taken; None where it is."""
 
     comparison: Comparison
-    told: float
     refusal: Refusal | None
 
     @property
@@ -65,22 +61,15 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     """
     if chosen.evidence <= 0:
         return None
-    told, most = evidence_held_out(standing, chosen), explains_most(standing, chosen)
-    if chosen.evidence + told < needed_evidence(standing, chosen, explains_most=most):
+    most = explains_most(standing, chosen)
+    if chosen.evidence + chosen.told < needed_evidence(standing, chosen, explains_most=most):
         return None
     if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
         return None
     comparison = compare(standing, chosen)
     if comparison is None:
         return None
-    return Judgement(comparison, told, _refusal(standing, comparison, explains_most=most))
-
-
-def evidence_held_out(standing: Standing, chosen: Fitted) -> float:
-    """What held-out records say for an effect, beside its evidence on the fitted ones; 0 where there are none."""
-    if not standing.case.held_out:
-        return 0.0
-    return holdout.evidence(standing.now, chosen.fit, standing.case.held_out)
+    return Judgement(comparison, _refusal(standing, comparison, explains_most=most))
 
 
 def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) -> float:

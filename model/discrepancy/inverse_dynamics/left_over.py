@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 
@@ -34,16 +34,17 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     return tuple(j for j, left in zip(standing.model.machine.modelled_joints, beyond, strict=True) if left)
 
 
-def first_contradicted(standing: Standing, lowered: Collection[int]) -> int | None:
+def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
     """Index of the first step that the residual contradicts; None where it contradicts none.
 
     Args:
-        lowered: indices of the steps that lower what the file states.
+        lowered: names of numbers that the file states and that steps have lowered.
     """
     shapes, left = remaining_shapes(standing.now, standing.case), set(joints_left_over(standing))
     for index, step in enumerate(standing.steps):
         joints = left & set(step.joints) if step.adopted else ()
-        if any(index in lowered or _bends(standing.steps, step, j, shapes) for j in joints):
+        lowers = bool(lowered & set(step.parameters))
+        if any(lowers or _bends(standing.steps, step, j, shapes) for j in joints):
             return index
     return None
 

@@ -17,6 +17,7 @@ from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.discrepancy.inverse_dynamics.trial import Start
 from model.effects.library import named_in_answers
+from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
@@ -35,6 +36,11 @@ ALIKE = 0.97
 JOINT_GAIN = 12.0
 """Fall of the squares above which a joint is taken into an effect that acts on several."""
 
+FILE_IS_RIGHT = 2 * float(np.log(100.0))
+"""Handicap of a number of the machine file against effects of the library, as evidence. That a file states a number
+with a deviation and is wrong by many of them is assumed to be a hundred times rarer than an effect that it leaves out:
+on one axis a winding of twice the stated resistance does nearly what a payload does."""
+
 
 @dataclass(frozen=True)
 class Fitted:
@@ -52,6 +58,13 @@ class Fitted:
     """Those of its parameters that the file states, as it states them; their priors are lifted."""
     relief: float = 0.0
     """Share of the fall of −2 log posterior that is of priors: numbers that no longer have to be off."""
+    told: float = 0.0
+    """What held-out records say for it, as evidence; 0 where there are none."""
+
+    @property
+    def log_odds(self) -> float:
+        """Evidence of all records with the prior odds of its kind: what it competes with other candidates by."""
+        return self.evidence + self.told - (FILE_IS_RIGHT if self.effect in MACHINE_NUMBERS else 0.0)
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -185,7 +198,11 @@ def _weighted_squares(now: BalanceFit) -> list[float]:
 
 
 def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe]) -> Fitted:
-    """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet."""
+    """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet.
+
+    A fit that ends above the one without the effect has lost its way: what the tolerances had taken over of the effect
+    was there twice where it began. It is begun again from no effect at all, which is where that other fit stands.
+    """
     effect, joints = probes[0].trial.effect, _joints(probes)
     lacking = tuple(j for p in probes if not p.trial.stated for j in p.trial.joints)
     wider = model if all(p.trial.stated for p in probes) else model.with_effect(effect, lacking)
@@ -197,6 +214,9 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[
     unknowns = (*kept, *(free_unknown(p) for p in own))
     balance = TorqueBalance(wider, now.balance.records)
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
+    if fitted.criterion > now.criterion:
+        null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
+        fitted = fit(balance, unknowns, {**now.values, **start, **null}, now.data, now.noise.memory)
     return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
 
 
@@ -217,7 +237,7 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
         )
         for f in found
     ]
-    return sorted(weighed, key=lambda f: -f.evidence)
+    return sorted(weighed, key=lambda f: -f.log_odds)
 
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

@@ -41,14 +41,14 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
         joints=chosen.joints,
         parameters=found_values(chosen.fit, chosen.parameters),
         evidence=chosen.evidence,
-        evidence_held_out=judgement.told if case.held_out else None,
-        margin=chosen.evidence - max([0.0, *(r.evidence for r in rivals)]),
+        evidence_held_out=chosen.told if case.held_out else None,
+        margin=min([chosen.evidence, *(chosen.log_odds - r.log_odds for r in rivals)]),
         candidates=list_candidates(case, found),
         group=_group(case, chosen, rivals),
         rmse_fit=signal_errors(model, compared.fitted_before, compared.fitted_after, case.noise),
         rmse_holdout=signal_errors(model, compared.before, compared.after, case.noise) if case.held_out else (),
         excess_removed_holdout=(
-            _excess_removed(case.noise, compared.fitted_before, compared.before, compared.after)
+            excess_removed(case.noise, compared.fitted_before, compared.before, compared.after)
             if case.held_out
             else None
         ),
@@ -80,6 +80,7 @@ def _candidate(case: TorqueCase, c: Fitted) -> Candidate:
         effect=c.effect,
         joints=c.joints,
         evidence=c.evidence,
+        evidence_held_out=c.told if case.held_out else None,
         refitted=True,
         misfit=float(np.nanmean(squares / case.noise**2)),
         parameters=values,
@@ -100,7 +101,7 @@ def _group(case: TorqueCase, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[
     near = [r for r in rivals if _cannot_be_told(case.options, chosen, r)]
     if not near:
         return ()
-    group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
+    group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.log_odds)
     return tuple(_candidate(case, c) for c in group)
 
 
@@ -111,14 +112,14 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     less likely before anything was recorded, and not refuted. Noise alone brings one for every parameter, which is
     taken off. Such a rival has to be one that would be suspected by itself.
     """
-    needed, lead = needed_lead(options, chosen, rival), chosen.evidence - rival.evidence
+    needed, lead = needed_lead(options, chosen, rival), chosen.log_odds - rival.log_odds
     if lead < needed:
         return True
     of_records = lead + (chosen.cost - len(chosen.parameters)) - (rival.cost - len(rival.parameters))
     return of_records < needed and rival.evidence >= SUSPECTED
 
 
-def _excess_removed(noise: Floats, fitted: Floats, before: Floats, after: Floats) -> float | None:
+def excess_removed(noise: Floats, fitted: Floats, before: Floats, after: Floats) -> float | None:
     """Share of the held-out variance above noise that is gone, joints weighted by their fitted mean square.
 
     Args:

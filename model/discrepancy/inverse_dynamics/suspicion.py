@@ -9,7 +9,6 @@ from model.discrepancy.inverse_dynamics.comparison import compare
 from model.discrepancy.inverse_dynamics.judging import (
     CHANCES,
     SUSPECTED,
-    evidence_held_out,
     explains_most,
     needed_evidence,
 )
@@ -32,7 +31,7 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
     for chosen in found.fitted[:CHANCES]:
         if chosen.evidence <= 0:
             continue
-        total = chosen.evidence + evidence_held_out(standing, chosen)
+        total = chosen.evidence + chosen.told
         needed = needed_evidence(standing, chosen, explains_most=explains_most(standing, chosen))
         if not SUSPECTED <= total < needed:
             continue

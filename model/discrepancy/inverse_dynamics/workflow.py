@@ -2,81 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Suspicion
 from model.discrepancy.grounds import Note, Refusal
+from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
+from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.judging import CHANCES, judge
+from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
+from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
-from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.step_record import list_candidates, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import withdrawn
-from model.inverse_dynamics.drive_timing import timing_unknowns
-from model.inverse_dynamics.recorded_sizes import recorded_sizes
-from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.machine_model.posterior import load_posterior
+
+REVISIONS = 2
+"""Times that all effects are looked for once more, at most: again where the first time has changed one."""
+STRUCTURE = "leaves-more-than-noise"
+"""Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
+BEGUN_WITH = 2
+"""Refused effects with which a pair is begun, at most."""
 
 
 @dataclass
 class TorqueWorkflow:
-    """State of a diagnosis: model and fit so far, the steps taken, and the ranking of a step that added nothing."""
+    """State of a diagnosis: what was found so far, and the ranking of a step that added nothing."""
 
     model: Model
     case: TorqueCase
     controller: JudgedController
     progress: Progress
     cancel: Cancel
-    added: dict[str, Parameter] = field(default_factory=dict)
-    steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
     at_bounds: list[Note] = field(default_factory=list)
     """Effects that would have been named, had their sizes not ended where no machine is."""
     suspicion: Suspicion | None = None
-    stated: dict[str, Parameter] = field(default_factory=dict)
-    """Numbers that steps have named although the file states them, as it states them."""
-    lowered: set[int] = field(default_factory=set)
-    """Steps (indices) that lower what the file states. A law that is missing may do that as well."""
 
     def __post_init__(self) -> None:
-        self.given = self.model
-        self.now = self._fit(self.model, {}, self.added)
-        self.first = self.now
-        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE, "fitted": len(self._known_before)}
+        self.refitter = Refitter(self.model, self.case)
+        self.found = self.refitter.begin()
+        self.first = self.found.now
+        fitted = len(self.refitter.known_before)
+        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE, "fitted": fitted}
         self.notes.append(Note(kind="tolerance-source", values=source))
 
-    @property
-    def standing(self) -> Standing:
-        """Where the diagnosis stands now."""
-        return Standing(self.case, self.given, self.model, self.now, tuple(self.steps))
-
     def run(self) -> None:
-        """Take steps until nothing more is significant or holds."""
-        while len([s for s in self.steps if s.adopted]) < self.case.options.most_steps:
-            done = len(self.steps)
-            self._report(0.1, "what is missing")
-            found = self._search()
-            if not self._adopt(found):
-                self.tried = list_candidates(self.case, found)
-                self.suspicion = suspect(self.standing, found)
-                self.at_bounds = self._on_sizes_at_bounds(found)
+        """Take steps until nothing more is significant or holds, then look for every effect once more."""
+        self._take_steps()
+        for _ in range(REVISIONS):
+            if not self._revise():
                 break
-            self._report(0.9, "what is not needed any more")
-            self._prune(done)
+            self._take_steps()
         self._withdraw_wrong_laws()
+        if len(self.found.adopted) > 1:
+            self.found = describe_in_order(self.refitter, self.found)
 
     def answer(self, traces: Sequence[str], held_out: Sequence[str], cutoff: float) -> Diagnosis:
         """The whole answer, except for its sentences and the times that it took.
@@ -86,47 +75,61 @@ class TorqueWorkflow:
             cutoff: of the torques, Hz.
         """
         outcome = Outcome(
-            standing=self.standing,
+            standing=self.refitter.standing(self.found),
             controller=self.controller,
             first=self.first,
-            added=self.added,
-            stated=self.stated,
+            added=self.found.added,
+            stated=self.found.stated,
             tried=self.tried,
             suspicion=self.suspicion,
             notes=(*self.notes, *self.at_bounds),
         )
         return answer_of(outcome, traces, held_out, cutoff)
 
+    def _take_steps(self) -> None:
+        while len(self.found.adopted) < self.case.options.most_steps:
+            before = self.found
+            self._report(0.1, "what is missing")
+            findings = self._search(before)
+            self.found = self._adopt(before, findings)
+            if not _has_more(self.found, before):
+                self.found = self._adopt_pair(before, self.found, findings)
+            if not _has_more(self.found, before):
+                self.tried = list_candidates(self.case, findings)
+                self.suspicion = suspect(self.refitter.standing(self.found), findings)
+                self.at_bounds = self._on_sizes_at_bounds(findings)
+                break
+            self._report(0.9, "what is not needed any more")
+            self._prune(len(before.steps))
+
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
-        whole = self.case.options.most_steps
-        self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
+        whole, done = self.case.options.most_steps, len(self.found.steps)
+        self.progress(min(0.99, (done + fraction) / (whole + 1)), f"step {done + 1}: {text}")
 
-    def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
-        """The model fitted again, with the parameters that the diagnosis has `added` without priors."""
-        records, names = self.case.records, frozenset(added)
-        before = tolerances(self.given, sizes=recorded_sizes(self.given, records), fitted=self._known_before)[0]
-        own = [u for u in before if u.name not in names]
-        known = {u.name for u in own}
-        sizes = {**recorded_sizes(model, records), **added}
-        found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
-        unknowns = (*own, *found, *timing_unknowns(model))
-        return fit(TorqueBalance(model, self.case.records), unknowns, begin, self.case.data)
+    def _search(self, found: Found, joints: tuple[int, ...] = ()) -> Findings:
+        """What a step finds, without what the records do not resolve, the most probable by all records first.
 
-    @cached_property
-    def _known_before(self) -> Mapping[str, float]:
-        """Deviations of the given model's numbers, by name, that earlier fits to other records know better."""
-        return load_posterior(self.given, (r.name for r in (*self.case.records, *self.case.held_out)))
-
-    def _search(self) -> Findings:
-        """What a step found, without what the records do not resolve."""
-        found = search(self.model, self.now, self.case, self._report, self.cancel)
-        resolved = [is_resolved(f, self.now, self.case) for f in found.fitted]
+        Args:
+            joints: to look on; empty for all that may be looked on.
+        """
+        options = self.case.options.model_copy(update={"joints": joints} if joints else {})
+        findings = search(found.model, found.now, replace(self.case, options=options), self._report, self.cancel)
+        fitted = sorted(self._with_held_out(found, findings.fitted), key=lambda f: -f.log_odds)
+        resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
-            found,
-            fitted=tuple(f for f, is_one in zip(found.fitted, resolved, strict=True) if is_one),
-            unresolved=tuple(f for f, is_one in zip(found.fitted, resolved, strict=True) if not is_one),
+            findings,
+            fitted=tuple(f for f, is_one in zip(fitted, resolved, strict=True) if is_one),
+            unresolved=tuple(f for f, is_one in zip(fitted, resolved, strict=True) if not is_one),
         )
+
+    def _with_held_out(self, found: Found, candidates: Sequence[Fitted]) -> list[Fitted]:
+        """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
+        held = self.case.held_out
+        asked = [c for c in candidates if held and c.evidence > 0]
+        told = holdout.evidence(found.now, [c.fit for c in asked], held)
+        others = [c for c in candidates if not any(c is one for one in asked)]
+        return [*(replace(c, told=one) for c, one in zip(asked, told, strict=True)), *others]
 
     def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
         """What would have been enough evidence to be named, had its size not ended where no machine is."""
@@ -134,70 +137,125 @@ class TorqueWorkflow:
         best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
         return [_size_at_bound(f) for f in best.values()]
 
-    def _adopt(self, found: Findings) -> bool:
-        """Adopt the best candidate that holds. False when there is none."""
+    def _adopt(self, found: Found, findings: Findings) -> Found:
+        """With the best candidate that holds, if there is one, and the steps that were refused before it."""
         refused: list[Fitted] = []
         passed_over: list[Fitted] = []  # they explain noise, or other records speak against them: no rivals either
-        for chosen in found.fitted[:CHANCES]:
-            judgement = judge(self.standing, chosen, refused)
+        standing, steps = self.refitter.standing(found), list(found.steps)
+        for chosen in findings.fitted[:CHANCES]:
+            judgement = judge(standing, chosen, refused)
             if judgement is None:
                 passed_over.append(chosen)
                 continue
-            self.steps.append(record_step(self.standing, found, judgement, [*refused, *passed_over]))
+            steps.append(record_step(standing, findings, judgement, [*refused, *passed_over]))
             if judgement.refusal is None:
-                self._take(chosen)
-                return True
+                return replace(self.refitter.take(found, chosen), steps=tuple(steps))
             refused.append(chosen)
-        return False
+        return replace(found, steps=tuple(steps))
 
-    def _take(self, chosen: Fitted) -> None:
-        friction = bool(chosen.stated) and all(p.effect is not None for p in chosen.stated)
-        if friction and all(chosen.fit.values[p.name] < p.value for p in chosen.stated):
-            self.lowered.add(len(self.steps) - 1)
-        self.stated |= {p.name: p for p in chosen.stated}
-        self.added |= {p.name: p for p in chosen.parameters}
-        self.model = chosen.model.with_values(chosen.fit.model_values)
-        self.now = self._fit(self.model, chosen.fit.values, self.added)
+    def _adopt_pair(self, before: Found, after: Found, findings: Findings) -> Found:
+        """With two effects on a joint of which each takes too little of what is no noise, and both together take most;
+        else as it is after the step that adopted nothing.
+
+        Args:
+            before, after: before that step, and with what it refused. findings: of that step.
+        """
+        refusals = {(s.effect, s.joints): s for s in after.steps[len(before.steps) :] if _leaves_structure(s)}
+        for first in [f for f in findings.fitted if (f.effect, f.joints) in refusals][:BEGUN_WITH]:
+            half = self.refitter.take(before, first)
+            beside = self._search(half, first.joints)
+            for second in beside.fitted[:CHANCES]:
+                if not set(first.joints) & set(second.joints):
+                    continue
+                judgement = judge(self.refitter.standing(before), second, ())
+                if judgement is None or judgement.refusal is not None:
+                    continue
+                begun = refusals[first.effect, first.joints]
+                taken = begun.model_copy(update={"adopted": True, "refusal": None})
+                added = record_step(self.refitter.standing(half), beside, judgement, ())
+                steps = (*(s for s in after.steps if s is not begun), taken, added)
+                return replace(self.refitter.take(half, second), steps=steps)
+        return after
+
+    def _revise(self) -> bool:
+        """Look for every effect once more with all others in place: those found first were held against their rivals
+        while others were missing. Whether another effect or joint is named."""
+        before = [(s.effect, s.joints) for s in self.found.adopted]
+        for key in before if len(before) > 1 else []:
+            step = next((s for s in self.found.adopted if (s.effect, s.joints) == key), None)
+            if step is not None:
+                self._report(0.9, "whether another effect explains it better")
+                self.found = self._look_again(self.found, step)
+        for step in [s for s in self.found.adopted if has_own_shape(s)]:
+            for joint in step.joints:
+                self._report(0.9, "whether another effect explains it better")
+                self.found = self._look_again_on(self.found, step.effect, joint)
+        return [(s.effect, s.joints) for s in self.found.adopted] != before
+
+    def _look_again(self, found: Found, step: Step) -> Found:
+        """With what explains best what an effect explained: itself, or another one; nothing, where it has become
+        superfluous."""
+        others = tuple(s for s in found.steps if s is not step)
+        without = replace(self.refitter.remove(found, step), steps=others)
+        findings = self._search(without, step.joints)
+        again = self._adopt(without, findings)
+        if _has_more(again, without):
+            return replace(again, steps=(*others, again.steps[-1]))
+        mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
+        if all(f.evidence + f.told >= SUSPECTED for f in mine):
+            return found
+        return self._superfluous(without, found, step)
+
+    def _look_again_on(self, found: Found, effect: str | None, joint: int) -> Found:
+        """With another effect on one of the joints of an effect, where that explains it better."""
+        step = next((s for s in found.adopted if s.effect == effect and joint in s.joints and len(s.joints) > 1), None)
+        if step is None:
+            return found
+        part, rest = split_step(found.model, step, joint)
+        others = tuple(rest if s is step else s for s in found.steps)
+        without = replace(self.refitter.remove(found, part), steps=others)
+        again = self._adopt(without, self._search(without, (joint,)))
+        if not _has_more(again, without) or again.steps[-1].effect == effect:
+            return found
+        return replace(again, steps=(*others, again.steps[-1]))
 
     def _prune(self, latest: int) -> None:
         """Take out effects of earlier steps that the latest one has made superfluous."""
-        for index, step in enumerate(self.steps[:latest]):
+        for step in self.found.steps[:latest]:
             if not step.adopted or step.effect is None:
                 continue
-            kept = {name: p for name, p in self.added.items() if name not in step.parameters}
-            without = self._without(step)
-            smaller = self._fit(without, self.now.values, kept)
-            if evidence(smaller, self.now, self.now.noise.memory, len(step.parameters), 1) < 0:
-                self.model, self.now = without.with_values(smaller.model_values), smaller
-                self.added = kept
-                gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
-                self.steps[index] = step.model_copy(update=gone)
-                self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
+            now, without = self.found.now, self.refitter.remove(self.found, step)
+            if evidence(without.now, now, now.noise.memory, len(step.parameters), 1) < 0:
+                self.found = self._superfluous(without, self.found, step)
+
+    def _superfluous(self, without: Found, found: Found, step: Step) -> Found:
+        """Without an effect, whose step is told as superfluous."""
+        gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
+        number = next(k for k, s in enumerate(found.steps) if s is step)
+        self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": number + 1}))
+        return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
 
     def _withdraw_wrong_laws(self) -> None:
         """Take back effects that the residual contradicts, and all effects after them: friction that was lowered far
         below what the file states where something is still missing, and viscous friction whose own residual bends
         with speed."""
-        while (first := first_contradicted(self.standing, self.lowered)) is not None:
-            wrong = self.steps[first].joints
-            for index, step in enumerate(self.steps[first:], start=first):
+        while (first := first_contradicted(self.refitter.standing(self.found), self.found.lowered)) is not None:
+            wrong = self.found.steps[first].joints
+            for index, step in enumerate(self.found.steps[first:], start=first):
                 if not step.adopted:
                     continue
-                self.model = self._without(step)
-                self.added = {name: p for name, p in self.added.items() if name not in step.parameters}
-                self.steps[index] = withdrawn(step, wrong)
-            self.now = self._fit(self.model, {}, self.added)
+                steps = list(self.found.steps)
+                steps[index] = withdrawn(step, wrong)
+                self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
             self.suspicion, self.tried, self.at_bounds = None, (), []  # they were of the model with these effects
 
-    def _without(self, step: Step) -> Model:
-        """The model without the effect of a step, but for joints of which the file states it."""
-        stated = {
-            j for name in step.parameters if name in self.given.by_name for j in self.given.parameter(name).joints
-        }
-        joints = tuple(j for j in step.joints if j not in stated)
-        if step.effect is None or (step.joints and not joints):
-            return self.model
-        return self.model.without_effect(step.effect, joints or None)
+
+def _has_more(after: Found, before: Found) -> bool:
+    return len(after.adopted) > len(before.adopted)
+
+
+def _leaves_structure(step: Step) -> bool:
+    return step.refusal is not None and step.refusal.kind == STRUCTURE
 
 
 def _own_bounds(found: Fitted) -> list[Parameter]:

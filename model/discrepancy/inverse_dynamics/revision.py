@@ -1,0 +1,57 @@
+"""Steps of an answer told anew, after effects were looked for with all others in place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+from model.discrepancy.diagnosis import Step
+from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.estimates import signal_errors
+from model.discrepancy.inverse_dynamics.found import Found, Refitter
+from model.discrepancy.inverse_dynamics.step_record import excess_removed
+from model.machine_model.model import Model
+
+
+def has_own_shape(step: Step) -> bool:
+    """Whether an effect acts on several joints with more than a size on each: it may stand for simpler effects that
+    differ from joint to joint, as a bent sensor does for one that is shifted and one of another scale."""
+    return len(step.joints) > 1 and len(step.parameters) > len(step.joints)
+
+
+def split_step(model: Model, step: Step, joint: int) -> tuple[Step, Step]:
+    """The part of a step that is of one of its joints, and the rest."""
+    own = {name for name in step.parameters if model.parameter(name).joints == (joint,)}
+    part = {name: value for name, value in step.parameters.items() if name in own}
+    rest = {name: value for name, value in step.parameters.items() if name not in own}
+    others = tuple(j for j in step.joints if j != joint)
+    return (
+        step.model_copy(update={"joints": (joint,), "parameters": part}),
+        step.model_copy(update={"joints": others, "parameters": rest}),
+    )
+
+
+def describe_in_order(refitter: Refitter, found: Found) -> Found:
+    """With errors of every adopted step before and after it, where only those before it are in place: a step that was
+    looked for again has those of a model with the later ones."""
+    stages = [found]
+    for step in reversed(found.adopted):
+        stages.append(refitter.remove(stages[-1], step))
+    told = [
+        _with_errors(refitter, step, before, after)
+        for step, (after, before) in zip(reversed(found.adopted), pairwise(stages), strict=True)
+    ]
+    named = iter(reversed(told))
+    return replace(found, steps=tuple(next(named) if step.adopted else step for step in found.steps))
+
+
+def _with_errors(refitter: Refitter, step: Step, before: Found, after: Found) -> Step:
+    case = refitter.case
+    fits = (before.now, after.now)
+    fitted = [holdout.mean_squares(case.stretches, f.residual) for f in fits]
+    update: dict[str, object] = {"rmse_fit": signal_errors(after.model, fitted[0], fitted[1], case.noise)}
+    if case.held_out:
+        held = [holdout.held_out_squares(f.balance.model, f.values, case.held_out) for f in fits]
+        update["rmse_holdout"] = signal_errors(after.model, held[0], held[1], case.noise)
+        update["excess_removed_holdout"] = excess_removed(case.noise, fitted[0], held[0], held[1])
+    return step.model_copy(update=update)
