@@ -176,7 +176,11 @@ class Where(FrozenRecord):
 
 class RemainingShape(FrozenRecord):
     """What none of the known effects explains, as a torque at a joint against something, so that a person can invent
-    the effect: torque (N·m, N) in bins of `against`, with its standard deviation."""
+    the effect: torque (N·m, N) in bins of `against`, with its standard deviation.
+
+    against_motion: the torque is counted against the direction of motion, as friction acts: where it goes with
+    position, a joint rubs more at some places.
+    """
 
     joint: int
     against: AgainstWhat
@@ -187,6 +191,12 @@ class RemainingShape(FrozenRecord):
     deviation: tuple[float | None, ...]
     explained: float
     """Share of the remaining torque's variance that this dependence explains."""
+    against_motion: bool = False
+
+    @property
+    def quantity(self) -> str:
+        """What the torque goes with, in words."""
+        return f"{self.against}, against the motion" if self.against_motion else self.against
 
     @property
     def filled_bins(self) -> int:

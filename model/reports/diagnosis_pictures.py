@@ -126,7 +126,8 @@ def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:
             if kept:
                 x, y, e = np.array(kept).T
                 place.errorbar(x, y, e, fmt="o-", ms=3, lw=1.0, color=COLOURS[(one.joint - 1) % len(COLOURS)])
-            place.set_title(f"joint {one.joint}: explains {100 * one.explained:.0f} %", fontsize=7.4)
+            what = "friction explains" if one.against_motion else "explains"
+            place.set_title(f"joint {one.joint}: {what} {100 * one.explained:.0f} %", fontsize=7.4)
             place.set_xlabel(one.against + ("" if unit == "1" else f" / {unit}"))
             if place is axes[0] or one.torque_unit != shown[0].torque_unit:
                 place.set_ylabel(f"{'force' if one.torque_unit == 'N' else 'torque'} / {one.torque_unit}")

@@ -145,7 +145,7 @@ def _shapes(shapes: Sequence[RemainingShape]) -> Table:
     rows = tuple(
         (
             Cell(f"joint {s.joint}"),
-            Cell(s.against),
+            Cell(s.quantity),
             Cell(_span([t for t in s.torque if t is not None], s.torque_unit), number=True),
             Cell(f"{100 * s.explained:.0f} %", number=True),
         )

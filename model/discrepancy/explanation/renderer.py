@@ -223,8 +223,9 @@ def suspicion_words(found: Suspicion) -> str:
 def shape_words(shape: RemainingShape) -> str:
     """A torque that is left, and what it goes with."""
     torques = [t for t in shape.torque if t is not None]
+    what = "friction" if shape.against_motion else "a torque"
     return (
-        f"a torque at joint {shape.joint} of {plain(min(torques))} to {plain(max(torques))} {shape.torque_unit} that "
+        f"{what} at joint {shape.joint} of {plain(min(torques))} to {plain(max(torques))} {shape.torque_unit} that "
         f"goes with {shape.against}"
     )
 

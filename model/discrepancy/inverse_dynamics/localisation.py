@@ -94,7 +94,7 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
                         trace=i,
                     )
                 )
-        dependences += [_dependence(joint, a, b, u) for a, b, u in _bins(now, case, j)]
+        dependences += [_dependence(joint, a, b, u) for a, b, u in _Signals(now, case, j).bins()]
         phase = max(squares, key=lambda p: squares[p])
         relative = float(sizes[j]) / floor[j]
         rms, unit = relative * floor[j], torque_unit(model, joint)
@@ -121,13 +121,13 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
     for j, joint in enumerate(model.machine.modelled_joints):
         if sizes[j] < BEYOND_NOISE * case.noise[j]:
             continue
-        every = [
-            (b.explained, a, b, u)
-            for a, b, u in _bins(now, case, j)
-            if b.significance > SHAPE_SIGNIFICANCE and b.explained > SHAPE_SHARE
-        ]
-        if every:
-            explained, against, bins, unit = max(every, key=lambda e: e[0])
+        signals = _Signals(now, case, j)
+        every = [(b, a, u, False) for a, b, u in signals.bins()]
+        if (rubs := signals.friction_by_place()) is not None:
+            every.append((rubs, "position", signals.quantities["position"][1], True))
+        shown = [e for e in every if e[0].significance > SHAPE_SIGNIFICANCE and e[0].explained > SHAPE_SHARE]
+        if shown:
+            bins, against, unit, against_motion = max(shown, key=lambda e: e[0].explained)
             found.append(
                 RemainingShape(
                     joint=joint,
@@ -137,7 +137,8 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
                     centres=tuple(map(float, bins.centres)),
                     torque=_optional(bins.mean),
                     deviation=_optional(bins.deviation),
-                    explained=explained,
+                    explained=bins.explained,
+                    against_motion=against_motion,
                 )
             )
     return tuple(found)
@@ -168,37 +169,51 @@ def _time(record: RecordedMotion, row: int) -> float:
     return round(float(record.time[record.edge] + row * record.every * record.period - record.time[0]), 4)
 
 
-def _bins(now: BalanceFit, case: TorqueCase, j: int) -> list[tuple[AgainstWhat, Bins, str]]:
-    """Dependences of the residual of joint index `j`: quantity, bins, unit of the quantity."""
-    model, records, residual = now.balance.model, now.balance.records, now.residual
-    joint = model.machine.joint(model.machine.modelled_joints[j])
-    angle = "rad" if joint.kind == "revolute" else "m"
-    torque = torque_unit(model, model.machine.modelled_joints[j])
-    drive = {"dc_motor": "V", "current": "A"}.get(joint.drive.kind, torque)
-    begins = np.cumsum([0, *(len(r) for r in residual)])
-    own = tuple(slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j])
-    count = residual[0].shape[1]
-    speed = np.concatenate([r.speed[r.rows] for r in records])
-    times = [np.repeat((r.time[r.rows] - r.time[0])[:, None], count, axis=1) for r in records]
-    quantities: dict[AgainstWhat, tuple[Floats, str]] = {
-        "time": (np.concatenate(times), "s"),
-        "position": (np.concatenate([r.position[r.rows] for r in records]), angle),
-        "speed": (speed, f"{angle}/s"),
-        "direction": (np.sign(speed), "1"),
-        "drive": (np.concatenate([r.drive[r.rows] for r in records]), drive),
-    }
-    known = Quantities(
-        {name: values for name, (values, _) in quantities.items()},
-        {name: (unit,) * count for name, (_, unit) in quantities.items()},
-        own,
-    )
-    signal = np.concatenate(list(residual))[:, j]
-    found = []
-    for against in AGAINST:
-        bins = dependence(signal, j, against, known, LEAST * float(case.noise[j]))
-        if bins is not None:
-            found.append((against, bins, known.units[against][j]))
-    return found
+class _Signals:
+    """The residual of a joint (index), and what it may depend on, all records in a row."""
+
+    def __init__(self, now: BalanceFit, case: TorqueCase, j: int) -> None:
+        records, residual = now.balance.records, now.residual
+        number = now.balance.model.machine.modelled_joints[j]
+        joint = now.balance.model.machine.joint(number)
+        angle = "rad" if joint.kind == "revolute" else "m"
+        drive = {"dc_motor": "V", "current": "A"}.get(joint.drive.kind, torque_unit(now.balance.model, number))
+        begins = np.cumsum([0, *(len(r) for r in residual)])
+        count = residual[0].shape[1]
+        times = [np.repeat((r.time[r.rows] - r.time[0])[:, None], count, axis=1) for r in records]
+        speed = np.concatenate([r.speed[r.rows] for r in records])
+        self.joint = j
+        self.stretches = tuple(
+            slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j]
+        )
+        self.signal = np.concatenate(list(residual))[:, j]
+        self.floor = LEAST * float(case.noise[j])
+        self.quantities: dict[AgainstWhat, tuple[Floats, str]] = {
+            "time": (np.concatenate(times), "s"),
+            "position": (np.concatenate([r.position[r.rows] for r in records]), angle),
+            "speed": (speed, f"{angle}/s"),
+            "direction": (np.sign(speed), "1"),
+            "drive": (np.concatenate([r.drive[r.rows] for r in records]), drive),
+        }
+
+    def bins(self) -> list[tuple[AgainstWhat, Bins, str]]:
+        """Dependences of the residual: quantity, bins, unit of the quantity."""
+        found = [(a, self._dependence(self.signal, a), self.quantities[a][1]) for a in AGAINST]
+        return [(against, bins, unit) for against, bins, unit in found if bins is not None]
+
+    def friction_by_place(self) -> Bins | None:
+        """The residual against the motion in bins of position, positive where it opposes that: friction of a tight spot
+        changes its sign with the motion, so that its mean over both directions shows nothing."""
+        return self._dependence(-self.signal * self.quantities["direction"][0][:, self.joint], "position")
+
+    def _dependence(self, signal: Floats, against: AgainstWhat) -> Bins | None:
+        count = self.quantities["time"][0].shape[1]
+        known = Quantities(
+            {name: values for name, (values, _) in self.quantities.items()},
+            {name: (unit,) * count for name, (_, unit) in self.quantities.items()},
+            self.stretches,
+        )
+        return dependence(signal, self.joint, against, known, self.floor)
 
 
 def _dependence(joint: int, against: AgainstWhat, bins: Bins, unit: str) -> Dependence:

@@ -14,6 +14,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
+from model.discrepancy.inverse_dynamics.stated_numbers import take_back
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.discrepancy.inverse_dynamics.trial import Start
 from model.effects.library import named_in_answers
@@ -201,7 +202,8 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet.
 
     A fit that ends above the one without the effect has lost its way: what the tolerances had taken over of the effect
-    was there twice where it began. It is begun again from no effect at all, which is where that other fit stands.
+    was there twice where it began. It is begun again from no effect at all, which is where that other fit stands, or
+    from an effect that has taken back what the tolerances took.
     """
     effect, joints = probes[0].trial.effect, _joints(probes)
     lacking = tuple(j for p in probes if not p.trial.stated for j in p.trial.joints)
@@ -216,7 +218,8 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
     if fitted.criterion > now.criterion:
         null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
-        fitted = fit(balance, unknowns, {**now.values, **start, **null}, now.data, now.noise.memory)
+        begin = {**now.values, **start, **null, **take_back(effect, own, now)}
+        fitted = fit(balance, unknowns, begin, now.data, now.noise.memory)
     return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
 
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from model import layout as at
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -69,6 +71,24 @@ def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[T
         if moved:
             # both constants of a motor are of one magnet: one that is held would hold the other
             yield _lifted(model, name, joints, now, numbers if name == "wrong_torque_constant" else moved)
+
+
+def take_back(effect: str, own: Sequence[Parameter], now: BalanceFit) -> dict[str, float]:
+    """Values with which an effect has taken over what the fit has made of stated numbers, which are as stated again:
+    the torques are those of the fit. Empty for effects whose torque is a sum with that of the numbers, where a fit goes
+    from one to the other in a step.
+
+    Both constants of a magnet are multiplied by what a weakened one has left.
+    """
+    values: dict[str, float] = {}
+    for loss in own if effect == "weakened_magnet" else ():
+        both = [u for u in _expected(now).values() if u.parameter.part in MAGNET and u.joints == loss.joints]
+        if not both:
+            continue
+        left = float(np.mean([now.values[u.name] / u.expected for u in both]))
+        values[loss.name] = float(np.clip(1.0 - left, loss.low, loss.high))
+        values |= {u.name: now.values[u.name] / (1.0 - values[loss.name]) for u in both}
+    return values
 
 
 def _expected(now: BalanceFit) -> dict[str, Unknown]:

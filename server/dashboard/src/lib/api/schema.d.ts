@@ -5278,6 +5278,9 @@ export interface components {
          * RemainingShape
          * @description What none of the known effects explains, as a torque at a joint against something, so that a person can invent
          *     the effect: torque (N·m, N) in bins of `against`, with its standard deviation.
+         *
+         *     against_motion: the torque is counted against the direction of motion, as friction acts: where it goes with
+         *     position, a joint rubs more at some places.
          */
         RemainingShape: {
             /** Joint */
@@ -5299,6 +5302,11 @@ export interface components {
             deviation: (number | null)[];
             /** Explained */
             explained: number;
+            /**
+             * Against Motion
+             * @default false
+             */
+            against_motion?: boolean;
         };
         /**
          * ResetRequest
@@ -6395,6 +6403,8 @@ export interface components {
             joints: number[];
             /** Evidence */
             evidence: number;
+            /** Evidence Held Out */
+            evidence_held_out?: number | null;
             /** Misfit */
             misfit?: number | null;
             /**
