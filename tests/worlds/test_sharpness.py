@@ -29,6 +29,15 @@ def test_an_effect_of_some_size_is_seen_and_one_of_hardly_any_is_not(sound: Rig,
     assert (none.d_prime > 20.0) == is_seen
 
 
+@pytest.mark.parametrize(("ratio", "is_seen"), [(1.5, False), (6.0, True)])
+def test_friction_that_a_file_may_be_wrong_about_is_not_seen(sound: Rig, ratio: float, is_seen: bool) -> None:
+    """The file states it to 30 %: a sound arm has up to three times of it."""
+    (stated,) = (t.factor for t in sound.tolerances if t.name == "coulomb")
+    own = float(sound.joints["coulomb"][0])
+    rig = hide(sound, "coulomb_friction", 1, 0, {"coulomb": (ratio * stated - 1.0) * own})
+    assert (sharpness(rig, ())[0].d_prime > 20.0) == is_seen
+
+
 def test_a_shifted_centre_and_a_heavier_link_are_one_to_an_axis(sound: Rig) -> None:
     rig = hide(sound, "centre_of_mass", 1, 0, {"shift": 0.2 * sound.bodies.links[0].a})
     none, _, mass, friction = sharpness(rig, ("link_mass", "viscous_friction"))

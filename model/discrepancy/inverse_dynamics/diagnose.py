@@ -33,8 +33,9 @@ is found. The noise's variance grows with the fifth power of the cutoff, and slo
 show below a lower one as well; gears that give and delays show below the highest alone."""
 FRICTION = "friction"
 """The family of effects that only the highest cutoff tells apart."""
-JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss"})
-"""Effects outside that family whose torque jumps as friction's does, where motion or drive turns."""
+JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss", "supply_limit"})
+"""Effects outside that family whose torque jumps as friction's does, where motion or drive turns, or breaks off where
+the drive is at its limit."""
 LEAST_OF_TORQUE = 1e-3
 """Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
 a sound rig with 20 bits, gears were said to lose 0.09 % of it."""

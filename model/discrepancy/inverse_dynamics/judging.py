@@ -41,9 +41,14 @@ other method."""
 
 @dataclass(frozen=True)
 class Judgement:
-    """What was made of a candidate that has the evidence it needs. refusal: why it is not taken; None where it is."""
+    """What was made of a candidate that has the evidence it needs.
+
+    noises_left: least residual that it leaves on a joint of its own, in noise floors. refusal: why it is not taken;
+    None where it is.
+    """
 
     comparison: Comparison
+    noises_left: float
     refusal: Refusal | None
 
     @property
@@ -69,7 +74,8 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     comparison = compare(standing, chosen)
     if comparison is None:
         return None
-    return Judgement(comparison, _refusal(standing, comparison, explains_most=most))
+    noises = _noises_left(standing, comparison)
+    return Judgement(comparison, noises, _refusal(standing, comparison, noises, explains_most=most))
 
 
 def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) -> float:
@@ -120,14 +126,14 @@ def explains_most(standing: Standing, chosen: Fitted) -> bool:
     )
 
 
-def _refusal(standing: Standing, comparison: Comparison, *, explains_most: bool) -> Refusal | None:
+def _refusal(standing: Standing, comparison: Comparison, noises: float, *, explains_most: bool) -> Refusal | None:
     """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
     for another machine than the file describes. An effect that is there brings stated numbers back; one that explains
     most of what is left is there, whatever it does to them."""
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
-    if (noises := _noises_left(standing, comparison)) > NO_NOISE and comparison.removed < NO_PART:
+    if noises > NO_NOISE and comparison.removed < NO_PART:
         return Refusal(kind="leaves-more-than-noise", numbers={"share": comparison.removed, "noises": noises})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})

@@ -14,7 +14,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
-from model.discrepancy.inverse_dynamics.left_over import first_contradicted
+from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
@@ -154,8 +154,8 @@ class TorqueWorkflow:
         return replace(found, steps=tuple(steps))
 
     def _adopt_pair(self, before: Found, after: Found, findings: Findings) -> Found:
-        """With two effects on a joint of which each takes too little of what is no noise, and both together take most;
-        else as it is after the step that adopted nothing.
+        """With two effects on a joint of which each takes too little of what is no noise, and both leave little more
+        than noise; else as it is after the step that adopted nothing.
 
         Args:
             before, after: before that step, and with what it refused. findings: of that step.
@@ -168,7 +168,7 @@ class TorqueWorkflow:
                 if not set(first.joints) & set(second.joints):
                     continue
                 judgement = judge(self.refitter.standing(before), second, ())
-                if judgement is None or judgement.refusal is not None:
+                if judgement is None or judgement.refusal is not None or judgement.noises_left > FAR_ABOVE_NOISE:
                     continue
                 begun = refusals[first.effect, first.joints]
                 taken = begun.model_copy(update={"adopted": True, "refusal": None})

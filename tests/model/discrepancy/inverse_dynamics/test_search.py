@@ -36,7 +36,7 @@ def rubbing() -> TorqueWorkflow:
 
 @pytest.fixture(scope="module")
 def found(rubbing: TorqueWorkflow) -> tuple[Fitted, ...]:
-    return search(rubbing.model, rubbing.now, rubbing.case, lambda *_: None, Never()).fitted
+    return search(rubbing.model, rubbing.found.now, rubbing.case, lambda *_: None, Never()).fitted
 
 
 def probe(workflow: TorqueWorkflow, effect: str, joint: int, gain: float) -> Probe:
@@ -47,14 +47,14 @@ def test_of_a_joint_the_three_that_explain_most_of_it_are_fitted_beside_the_most
     rubbing: TorqueWorkflow,
 ) -> None:
     """Seven effects of another joint promise more; of joint 1, only what explains the larger part is fitted as well."""
-    (whole,) = _weighted_squares(rubbing.now)
+    (whole,) = _weighted_squares(rubbing.found.now)
     others = [probe(rubbing, f"other_{k}", 2, 10 * whole + k) for k in range(SHORTLIST)]
     own = [probe(rubbing, f"own_{k}", 1, (0.9 - 0.05 * k) * whole) for k in range(OF_A_JOINT + 2)]
     small = [probe(rubbing, "small", 1, 0.45 * whole)]
-    listed = [p[0].trial.effect for p in _shortlist([*others, *own, *small], rubbing.now)]
+    listed = [p[0].trial.effect for p in _shortlist([*others, *own, *small], rubbing.found.now)]
     assert set(listed[:SHORTLIST]) == {p.trial.effect for p in others}
     assert listed[SHORTLIST:] == ["own_0", "own_1", "own_2"]
-    assert "small" not in [p[0].trial.effect for p in _shortlist([*others, *small], rubbing.now)]
+    assert "small" not in [p[0].trial.effect for p in _shortlist([*others, *small], rubbing.found.now)]
 
 
 def test_the_first_candidates_are_fitted_to_their_ends(found: tuple[Fitted, ...]) -> None:
@@ -74,9 +74,11 @@ def test_an_effect_with_less_than_half_the_evidence_of_a_refused_rival_is_not_na
 ) -> None:
     chosen = next(f for f in found if f.effect == "coulomb_friction")
     rival = replace(chosen, effect="viscous_friction", evidence=chosen.evidence / (share * BESIDE_REFUSED))
-    assert (judge(rubbing.standing, chosen, [rival]) is not None) is taken
+    assert (judge(rubbing.refitter.standing(rubbing.found), chosen, [rival]) is not None) is taken
     elsewhere = replace(rival, joints=(2,))
-    assert judge(rubbing.standing, chosen, [elsewhere]) is not None, "it explains another joint's torque"
+    assert judge(rubbing.refitter.standing(rubbing.found), chosen, [elsewhere]) is not None, (
+        "it explains another joint's torque"
+    )
 
 
 @pytest.mark.parametrize(

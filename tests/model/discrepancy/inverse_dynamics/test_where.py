@@ -30,7 +30,7 @@ def rubbing() -> TorqueWorkflow:
 def test_a_size_at_its_bound_is_told_with_its_value(rubbing: TorqueWorkflow) -> None:
     wider = rubbing.model.with_effect("link_mass", (1,))
     (p,) = (q for q in wider.parameters if q.effect == "link_mass")
-    now = replace(rubbing.now, values={**rubbing.now.values, p.name: p.high})
+    now = replace(rubbing.found.now, values={**rubbing.found.now.values, p.name: p.high})
     note = _size_at_bound(Fitted("link_mass", (1,), wider, (p,), now, 80.0))
     assert (note.kind, note.values["effect"], note.values["value"]) == ("size-at-bound", "link_mass", p.high)
     assert f"added at the end of what it may be, {p.high:g} kg" in note_words(note)
@@ -39,17 +39,17 @@ def test_a_size_at_its_bound_is_told_with_its_value(rubbing: TorqueWorkflow) -> 
 def test_a_bound_that_only_the_record_sets_is_no_end_of_what_machines_are(rubbing: TorqueWorkflow) -> None:
     wider = rubbing.model.with_effect("coulomb_friction", (1,))
     (p,) = (replace(q, high=3.0) for q in wider.parameters if q.effect == "coulomb_friction")
-    now = replace(rubbing.now, values={**rubbing.now.values, p.name: 3.0})
+    now = replace(rubbing.found.now, values={**rubbing.found.now.values, p.name: 3.0})
     found = Fitted("coulomb_friction", (1,), wider, (p,), now, 80.0)
     assert sizes_at_bounds(found) == [p]
     assert _own_bounds(found) == []
 
 
 def test_the_joint_of_the_largest_residual_is_named(rubbing: TorqueWorkflow) -> None:
-    where = locate(rubbing.now, rubbing.case)
+    where = locate(rubbing.found.now, rubbing.case)
     assert where.worst is not None
     assert (where.joint, where.worst.joint, where.largest) == (1, 1, None)
-    (sizes,) = (np.sqrt(rubbing.case.stretches.mean_squares(rubbing.now.residual)),)
+    (sizes,) = (np.sqrt(rubbing.case.stretches.mean_squares(rubbing.found.now.residual)),)
     assert where.worst.rms == pytest.approx(sizes[0])
     assert where.worst.ratio == pytest.approx(sizes[0] / rubbing.case.noise[0])
 
@@ -61,8 +61,8 @@ def test_the_joint_of_the_largest_torque_is_told_beside_the_one_farthest_above_i
     records = recorded_motions(traces, model.machine, 3.0)
     case = TorqueCase(records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
     flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
-    residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.now.residual]
-    where = locate(replace(flow.now, residual=residual), case)
+    residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.found.now.residual]
+    where = locate(replace(flow.found.now, residual=residual), case)
     assert where.worst is not None
     assert where.largest is not None
     assert (where.joint, where.worst.joint, where.largest.joint) == (6, 6, 2)
