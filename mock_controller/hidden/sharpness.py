@@ -28,9 +28,9 @@ from mock_controller.plant import default_plant
 
 NOT_TOLD = 4.9
 """d′ below which a search ends, since the records do not tell (the threshold is 5)."""
-_DECIDES = 150.0
+_DECIDES = 30.0
 """d′ with linear tolerances above which they are not refitted by simulation."""
-_MOSTLY_EXPLAINED = 0.1
+_MOSTLY_EXPLAINED = 0.2
 """Share of the difference: below it, tolerances do most of the work, and are refitted whatever is left."""
 _BEGUN = 3
 """Number of starts that a search continues from."""
@@ -44,6 +44,8 @@ _STEPS = 12
 """Steps of a refit of everything from one start."""
 _AS_PREDICTED = 0.1
 """Share by which a refit may deviate from what linear tolerances predict for that to count as confirmed."""
+_CLEAR = 10.0
+"""d′ above which a prediction that one simulation confirms is not refined."""
 _WORTH = 15.0
 """d′ below which all derivatives are formed anew once, which costs a simulation for each of 44 parameters."""
 _STEP, _TOLERANCE_STEP = 0.02, 0.2
@@ -188,6 +190,9 @@ class _Refit:
         best, least = np.zeros(0), math.inf
         for moved in (answer, np.zeros(self._names)):
             start = np.clip(np.concatenate([self._place, moved]), self._low, self._high)
+            looked = math.sqrt(square(self._left(start)))
+            if linear > _CLEAR and abs(looked - linear) < _AS_PREDICTED * linear:
+                return looked
             at, there = descend(problem, start, _STEPS, 0, self._first_slopes(start))
             if (d_prime := math.sqrt(square(there))) < least:
                 best, least = at, d_prime
