@@ -51,6 +51,14 @@ def blind(
         float | None,
         typer.Option(min=0, help="Begin nothing more after this time, in s; the same command continues. 0: the table."),
     ] = None,
+    sharpness: Annotated[
+        bool,
+        typer.Option(
+            "--sharpness",
+            help="Work out which effects the records of a trial's single effects can tell apart, for answers that have "
+            "been sealed and scored.",
+        ),
+    ] = False,
     hashes: Annotated[
         bool,
         typer.Option("--hashes", help="Print the hashes and versions that a registration must hold, and run nothing."),
@@ -71,20 +79,18 @@ def blind(
         return
     if parse_address(executor).kind == "local":
         require_extra("model", "daq blind", "numba")
-    if registration is not None:
-        if seeds is not None:
-            raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")
-        if cases is not None:
-            raise SpecError("--cases and --registration: a registered run has all cases that it registers")
-        if own := [n for n in ("kinds", "loads", "experiment", "acquire") if _asked_for(context, n)]:
-            raise SpecError(f"--{own[0]} and --registration: a registered run takes this from its registration")
-        chosen, experiment, acquire, drawn = _registered(registration, run)
+    if sharpness:
+        campaign, chosen = _after_the_answers(context, folder)
     else:
-        if seeds is None:
+        if registration is not None:
+            _refuse_beside_registration(context)
+            chosen, experiment, acquire, drawn = _registered(registration, run)
+        elif seeds is None:
             raise SpecError("--seeds or --registration: one of them is needed")
-        chosen, drawn = _chosen(seeds, kinds, loads, cases), None
-    kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
-    campaign = Campaign(kept, load_machine("ma2000"), until=until)
+        else:
+            chosen, drawn = _chosen(seeds, kinds, loads, cases), None
+        kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
+        campaign = Campaign(kept, load_machine("ma2000"), until=until)
     count = len(set(chosen))
     with ending(open_workers(executor)) as workers:
         left = campaign.run(chosen, workers, lambda number, said: console().print(f"{number}/{count}  {said}"), seconds)
@@ -92,6 +98,37 @@ def blind(
     if left:
         console().print(f"{left} cases are not done; the same command continues with them")
         raise typer.Exit(exit_codes.FAULT)
+
+
+def _refuse_beside_registration(context: typer.Context) -> None:
+    """Raises SpecError for options that a registered run does not take."""
+    why = {
+        "seeds": "name one of them; a registered trial draws its own",
+        "cases": "a registered run has all cases that it registers",
+        **dict.fromkeys(
+            ("kinds", "loads", "experiment", "acquire"), "a registered run takes this from its registration"
+        ),
+    }
+    if own := [name for name in why if _asked_for(context, name)]:
+        raise SpecError(f"--{own[0]} and --registration: {why[own[0]]}")
+
+
+def _after_the_answers(context: typer.Context, folder: Path) -> tuple[Campaign, list[int]]:
+    """The trial of a folder, and its cases whose answers ask for d′ of rivals.
+
+    Raises SpecError for other options, where no trial is in the folder, and where no answer has been sealed and scored.
+    """
+    from daq_cli.trial.campaign import Campaign
+    from daq_cli.trial.folder import TrialFolder
+    from daq_cli.trial.sharpness import rivals_wanted
+
+    others = ("seeds", "cases", "kinds", "loads", "experiment", "acquire", "registration", "run", "until")
+    if own := [name for name in others if _asked_for(context, name)]:
+        raise SpecError(f"--{own[0]} and --sharpness: the arms are those of the folder")
+    kept = TrialFolder.present(folder.absolute())
+    if not kept.rows("score"):
+        raise SpecError(f"{folder}: no answer has been sealed and scored; --sharpness comes after the answers")
+    return Campaign(kept, load_machine("ma2000"), until="sharpness"), rivals_wanted(kept)
 
 
 def _asked_for(context: typer.Context, option: str) -> bool:

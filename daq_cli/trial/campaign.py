@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ from daq_cli.trial.folder import STAGES, Stage, TrialFolder
 from daq_cli.trial.mock_side import TrialStageError, detect, reveal
 from daq_cli.trial.recording import Recorded, record
 from daq_cli.trial.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
+from daq_cli.trial.sharpness import sealed_answer, with_rivals, work_out_sharpness
 from model.discrepancy.diagnosis import Acquired, NextExperiment
 from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
@@ -126,7 +126,8 @@ class Campaign:
     def scores(self) -> list[Score]:
         """The scores of all cases in the folder."""
         self.folder.reload()
-        return [Score.model_validate(row) for row in self.folder.rows("score")]
+        rows = self.folder.rows("score")
+        return [with_rivals(Score.model_validate(row), self.folder.row("sharpness", row["seed"])) for row in rows]
 
     def table(self) -> TrialTable:
         """The table of all scores."""
@@ -141,6 +142,8 @@ class Campaign:
                 return detect(seed, self._set_points, tangents)
         if stage == "record":
             return self._record(seed)
+        if stage == "sharpness":
+            return work_out_sharpness(self.folder, seed, self._machine(seed), self.experiment)
         return self._diagnose(seed) if stage == "diagnose" else self._score(seed)
 
     def _row(self, stage: Stage, seed: int) -> dict[str, Any]:
@@ -218,9 +221,6 @@ class Campaign:
         if "failure" in sealed:
             found = score_of_failure(parse_truth(reveal(seed)), seen, sealed["seconds"])
         else:
-            text = (self.folder.path / "answers" / sealed["answer"]).read_bytes()
-            if sha256(text).hexdigest() != sealed["sha256"]:
-                raise TrialStageError(f"answer {sealed['answer']}: is not the one that was sealed")
-            answer = SealedAnswer(text, sealed["seconds"]).read()
+            answer = sealed_answer(self.folder, seed).read()
             found = score(parse_truth(reveal(seed)), seen, answer, self._machine(seed))
         return found.model_dump(mode="json")

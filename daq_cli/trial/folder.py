@@ -18,8 +18,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 
-Stage = Literal["detect", "record", "diagnose", "score"]
-STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score")
+Stage = Literal["detect", "record", "diagnose", "score", "sharpness"]
+STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score", "sharpness")
+"""In their order. The last is carried out on request, once answers have been scored."""
 _CAMPAIGN = "trial.json"
 
 
@@ -71,6 +72,14 @@ class TrialFolder:
         finally:
             aside.unlink()
         folder = cls(path, asked)
+        folder._finish_lines()
+        folder.reload()
+        return folder
+
+    @classmethod
+    def present(cls, path: Path) -> TrialFolder:
+        """The folder of a trial that has begun, whatever its options. Raises SpecError where there is none."""
+        folder = cls(path, _read_asked(path / _CAMPAIGN))
         folder._finish_lines()
         folder.reload()
         return folder

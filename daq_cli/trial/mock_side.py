@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +27,24 @@ def reveal(seed: int) -> dict[str, Any]:
     return _line("mock_controller.reveal", str(seed))
 
 
+def tell_apart(
+    seed: int, experiments: Sequence[Path], rivals: Iterable[tuple[str, tuple[int, ...]]], cache: Path
+) -> dict[str, Any]:
+    """d′ of effects (with the joints that were named) from the one that the arm hides, in experiments that were
+    recorded together. Raises TrialStageError."""
+    files = [word for file in experiments for word in ("--experiment", str(file))]
+    named = [word for effect, joints in rivals for word in ("--rival", f"{effect}:{','.join(map(str, joints))}")]
+    return _line("mock_controller.sharpness", str(seed), *files, *named, "--cache", str(cache))
+
+
 def _line(module: str, *arguments: str) -> dict[str, Any]:
     done = subprocess.run(
-        [sys.executable, "-m", module, *arguments], capture_output=True, text=True, check=False, start_new_session=True
+        [sys.executable, "-m", module, *arguments],
+        env={"OPENBLAS_NUM_THREADS": "1"} | os.environ,  # threads of thin products wait for each other
+        capture_output=True,
+        text=True,
+        check=False,
+        start_new_session=True,
     )
     try:
         line: dict[str, Any] = json.loads(done.stdout)

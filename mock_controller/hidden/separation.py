@@ -178,12 +178,12 @@ def separation(
     imitate the effect, exactly or nearly, the refit starts from those.
     """
     one = reading_deviation(parts.board)
-    step_us = _step_length(parts)
+    step_us = step_length(parts)
     present = modelled_readings(parts, experiment) if present is None else present
     sound = replace(parts, modifications=without)
 
     def left_at(moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        there, rest = _move_parameters(sound, known, moved, step_us)
+        there, rest = move_parameters(sound, known, moved, step_us)
         absent = readings(there, experiment, step_us=step_us)[:, :MODELLED]
         left: NDArray[np.float64] = ((present - absent) / one).ravel() - known.matrix @ rest
         return left
@@ -220,10 +220,10 @@ def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
 
 def modelled_readings(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
     """Readings (counts, (periods, MODELLED)) of the complete arm."""
-    return readings(parts, experiment, step_us=_step_length(parts))[:, :MODELLED]
+    return readings(parts, experiment, step_us=step_length(parts))[:, :MODELLED]
 
 
-def _step_length(parts: LoopParts) -> int:
+def step_length(parts: LoopParts) -> int:
     """Step of the plant (µs): coarse if the drive changes only at coarse steps and every gear is rigid."""
     fine = parts.board.timing.computing_delay % _COARSE_STEP_US or of_kind(parts.modifications, ChangesTransmission)
     return STEP_US if fine else _COARSE_STEP_US
@@ -274,7 +274,7 @@ def _separation_of(before: float, left: NDArray[np.float64], moved: NDArray[np.f
     return Separation(float(np.sqrt(squared)), before, by_name)
 
 
-def _move_parameters(
+def move_parameters(
     parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
 ) -> tuple[LoopParts, NDArray[np.float64]]:
     """The arm with its tolerance parameters moved by a number of their standard deviations, and the remainder of the

@@ -12,6 +12,8 @@ from model.machine_model.effect_parameters import effect_parameters
 from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 
+SINGLE = ("single", "later_single")
+"""Kinds of arms with one effect of the library and nothing else."""
 FIRST = 3
 """Number of names that count for "among the first three"."""
 
@@ -70,6 +72,10 @@ class Score(FrozenRecord):
     excess_removed_whole: float | None = None
     """Share of the held-out excess of the given model that was removed: the contribution of the whole diagnosis."""
     covered: tuple[Covered, ...] = ()
+    groups: int = 0
+    """Number of adopted steps that gave a group instead of a name."""
+    rivals: dict[str, float] = {}
+    """d′ of effects that the answer names beside or instead of the hidden one, where it has been worked out."""
     seconds: float
     robot_seconds: float
 
@@ -83,6 +89,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
         "verdict": answer.verdict,
         "place": _place(answer, named),
         "answered": tuple(dict.fromkeys((*named, *group))),
+        "groups": len(grouping_steps(answer)),
         "seconds": answer.seconds,
         "robot_seconds": answer.robot_seconds,
     }
@@ -161,10 +168,14 @@ def group_of(answer: Diagnosis) -> tuple[str, ...]:
 
     Groups that were withdrawn, or refused by held-out traces, are no answer.
     """
+    return tuple(dict.fromkeys(candidate.effect for step in grouping_steps(answer) for candidate in step.group))
+
+
+def grouping_steps(answer: Diagnosis) -> list[Step]:
+    """The adopted steps of an ambiguous answer that gave a group instead of a name."""
     if answer.verdict != "ambiguous":
-        return ()
-    groups = (step.group for step in answer.steps if step.adopted and not _one_name(step))
-    return tuple(dict.fromkeys(candidate.effect for group in groups for candidate in group))
+        return []
+    return [step for step in answer.steps if step.adopted and not _one_name(step)]
 
 
 def excess_removed(answer: Diagnosis) -> float | None:

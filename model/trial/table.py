@@ -9,11 +9,9 @@ import numpy as np
 
 from daq.contracts.frozen import FrozenRecord
 from model.trial.rates import Rate, rate
-from model.trial.score import Score
+from model.trial.score import SINGLE, Score
+from model.trial.sharpness import as_sharp
 from model.trial.truth import is_mock_friction
-
-SINGLE = ("single", "later_single")
-"""Kinds of arms with one effect of the library and nothing else."""
 
 
 class Line(FrozenRecord):
@@ -77,6 +75,7 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
     intervals = [covered.inside for s in single for covered in s.covered]
     lines = (
         Line(what="named right, strict", rate=rate(s.named_right for s in single), reach="≥ 92 %"),
+        _sharpness_line(single),
         Line(what="friction kinds merged", rate=rate(s.merged_right for s in single), reach="≥ 97 %"),
         Line(what="named right, or in the group that was given", rate=rate(s.in_answer for s in single)),
         Line(what="right name among the first three", rate=rate(s.in_first for s in single), reach="≥ 97 %"),
@@ -109,6 +108,13 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
         by_open_effect=_effects([s for s in every if s.kind == "open_set"], lambda s: s.honest),
         confusion=_confusion(single),
     )
+
+
+def _sharpness_line(single: Sequence[Score]) -> Line:
+    outcomes = [as_sharp(s) for s in single]
+    unknown = outcomes.count(None)
+    what = "as sharp as the record allows" + (f" ({unknown} not worked out)" if unknown else "")
+    return Line(what=what, rate=rate(outcomes), reach="≥ 95 %")
 
 
 def quantiles(values: Iterable[float | None]) -> Quantiles:

@@ -194,6 +194,6 @@ def test_looking_less_often_and_in_coarser_steps_gives_the_same(
     quick = separation(parts, short(), known)
     monkeypatch.setattr(hidden_separation, "_AS_PREDICTED", -1.0)
     monkeypatch.setattr(hidden_separation, "_CLEAR", math.inf)
-    monkeypatch.setattr(hidden_separation, "_step_length", lambda _parts: 1000)
+    monkeypatch.setattr(hidden_separation, "step_length", lambda _parts: 1000)
     thorough = separation(parts, short(), known)
     assert quick.d_prime == pytest.approx(thorough.d_prime, rel=0.1 if quick.d_prime > 15 else 0.05)
