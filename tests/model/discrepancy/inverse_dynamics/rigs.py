@@ -63,6 +63,9 @@ SLIDE = {
     "hum": 0.0,
     "hertz": 1.7,
     "loss": 0.0,
+    "tight": 0.0,
+    "tight_at": 0.03,
+    "tight_width": 0.02,
 }
 ENCODER = 5e-6
 
@@ -114,7 +117,7 @@ def slide_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) 
         u = force(t, q, v)
         way = np.tanh(v / 5e-4)
         rub = p["viscous"] * v + (p["coulomb"] + p["stribeck"] * np.exp(-abs(v) / p["stribeck_speed"])) * way
-        rub += p["loss"] * abs(u) * way
+        rub += p["loss"] * abs(u) * way + p["tight"] * np.exp(-(((q - p["tight_at"]) / p["tight_width"]) ** 2)) * way
         other = -p["spring"] * (q - 0.02) + p["ripple"] * np.sin(p["cycles"] * q)
         other += p["hum"] * np.sin(2 * np.pi * p["hertz"] * t + 0.4)
         return [v, (u - rub + other) / p["mass"]]

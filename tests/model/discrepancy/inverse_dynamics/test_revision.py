@@ -1,14 +1,25 @@
-"""Effects that are looked for once more with all others in place, and effects of which each takes too little alone."""
+"""How candidates compete, and effects that are looked for once more with all others in place."""
 
 from __future__ import annotations
 
 import pytest
 
+from daq.contracts.machine import Machine
+from daq.contracts.progress import Never, silent
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.search import FILE_IS_RIGHT, Fitted, search
+from model.discrepancy.inverse_dynamics.stated_numbers import take_back
+from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.inverse_dynamics.readings import choose_cutoff, torque_noise
+from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.model.discrepancy.inverse_dynamics.searches import sliding
 
 
 def adopted(found: Diagnosis) -> set[tuple[str | None, tuple[int, ...]]]:
@@ -37,3 +48,55 @@ def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() ->
         assert fitted > 1.2 * first > 1.2 * 1.2 * second > 0.0
     earlier, later = (s for s in found.steps if s.adopted)
     assert later.rmse_fit[0].before == pytest.approx(earlier.rmse_fit[0].after)
+
+
+def candidate(effect: str, flow: TorqueWorkflow, evidence: float, told: float = 0.0) -> Fitted:
+    return Fitted(effect, (1,), flow.model, (), flow.first, evidence, told=told)
+
+
+def test_the_file_is_trusted_against_an_effect_but_not_against_any_evidence() -> None:
+    flow = sliding({"coulomb": 8.0}, TorqueOptions())
+    load = candidate("payload", flow, 40.0)
+    assert candidate("wrong_resistance", flow, 40.0).log_odds < load.log_odds
+    assert candidate("wrong_resistance", flow, 41.0 + FILE_IS_RIGHT).log_odds > load.log_odds
+    assert candidate("gear_loss", flow, 30.0, told=15.0).log_odds > load.log_odds
+
+
+def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> None:
+    """A fit as good as another one gets the same evidence, whatever the correlation of its own residual."""
+    flow = sliding({"coulomb": 8.0}, TorqueOptions(effects=("coulomb_friction", "stribeck_friction")))
+    found = search(flow.model, flow.first, flow.case, silent, Never()).fitted
+    coulomb = next(f.fit for f in found if f.effect == "coulomb_friction")
+    other = next(f.fit for f in found if f.effect != "coulomb_friction")
+    alone = holdout.evidence(flow.first, [coulomb], flow.case.held_out)
+    both = holdout.evidence(flow.first, [coulomb, other, coulomb], flow.case.held_out)
+    assert both[0] == both[2] > 30.0
+    assert both[0] >= both[1]
+    assert both[0] == pytest.approx(alone[0], rel=0.5)
+    assert holdout.evidence(flow.first, [], flow.case.held_out) == []
+
+
+def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
+    traces = [rigs.bench_trace(seed, {"constant": 0.042, "back_emf": 0.042}) for seed in (1, 2)]
+    model = base_model(weak_bench())
+    cutoff = choose_cutoff(traces, model.machine)
+    fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
+    case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), TorqueOptions())
+    flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    wider = model.with_effect("weakened_magnet", (1,))
+    own = [p for p in wider.parameters if p.effect == "weakened_magnet"]
+    begun = take_back("weakened_magnet", own, flow.first)
+    assert begun[own[0].name] == pytest.approx(0.16, abs=0.03)
+    for part in ("torque_constant", "back_emf_constant"):
+        assert begun[f"joint1.motor.{part}"] == pytest.approx(0.05, rel=0.03)
+    assert take_back("viscous_friction", own, flow.first) == {}
+    found = diagnose_torques(model, traces[:1], traces[1:])
+    assert adopted(found) == {("weakened_magnet", (1,))}, found.summary
+
+
+def weak_bench() -> Machine:
+    """The bench with both constants of its magnet stated to 2 %."""
+    drive = rigs.bench_machine().model_dump()
+    motor = drive["joints"][0]["drive"]
+    motor["torque_constant"]["deviation"] = motor["back_emf_constant"]["deviation"] = 0.001
+    return Machine.model_validate(drive)

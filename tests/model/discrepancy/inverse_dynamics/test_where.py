@@ -9,7 +9,9 @@ import pytest
 
 from daq.contracts.progress import Never, silent
 from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.explanation.renderer import what_is_left
 from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -25,6 +27,23 @@ from tests.model.discrepancy.inverse_dynamics.searches import sliding
 @pytest.fixture(scope="module")
 def rubbing() -> TorqueWorkflow:
     return sliding({"coulomb": 8.0}, TorqueOptions(effects=("coulomb_friction",)))
+
+
+def test_friction_at_a_place_is_seen_where_it_is_and_is_unknown() -> None:
+    """Forwards it pushes back, backwards it pushes forwards: its mean over both directions is nothing."""
+    traces = [rigs.slide_trace(seed, {"tight": 3.0}, duration=8.0) for seed in (1, 2)]
+    found = diagnose_torques(
+        base_model(rigs.slide_machine()), traces[:1], traces[1:], TorqueOptions(effects=("spring_torque",))
+    )
+    assert found.verdict == "unknown-effect", found.summary
+    (shape,) = found.remaining
+    assert (shape.against, shape.against_motion) == ("position", True)
+    assert shape.explained > 0.4
+    place = max(zip(shape.centres, shape.torque, strict=True), key=lambda b: b[1] or 0.0)
+    assert place[0] == pytest.approx(rigs.SLIDE["tight_at"], abs=0.03)
+    assert place[1] is not None
+    assert place[1] > 0.5
+    assert what_is_left(found.remaining).startswith("friction at joint 1 of ")
 
 
 def test_a_size_at_its_bound_is_told_with_its_value(rubbing: TorqueWorkflow) -> None:
