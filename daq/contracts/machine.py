@@ -31,7 +31,7 @@ from daq.contracts.quantity import (
     Volt,
     in_unit,
 )
-from firmware_protocol.invalid import first_invalid
+from daq.contracts.refused import refused_words
 from firmware_protocol.units import POSTURE_UNITS, DriveScale, JointCalibration
 
 
@@ -392,8 +392,7 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
     try:
         return Machine.model_validate(parse_toml(text, origin))
     except ValidationError as error:
-        first = first_invalid(error)
-        raise SpecError(f"{origin}: {first.where('machine', first=1)}: {first.message}") from error
+        raise SpecError(f"{origin}: {refused_words(error, Machine, 'machine')}") from error
 
 
 def load_machine(name_or_path: str) -> Machine:

@@ -44,7 +44,7 @@ def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: s
         ("--joints turn --tip foot", "--tip foot: is no link that the last joint carries; it carries column, boom"),
         ("--joints turn --drives nothing.toml", "machine 'nothing.toml': no such file"),
         ("--joints turn --drives ma2000", "drives of ma2000: none of its joints (waist, shoulder"),
-        ("--joints turn --name Turn", "arm.urdf: name: String should match pattern"),
+        ("--joints turn --name Turn", "arm.urdf: name: found 'Turn', must match"),
         ("--joints turn -o arm.urdf", "arm.urdf: is there already; name another file with -o"),
         ("--joints turn -o there/arm.toml", "there is no folder"),
     ],
