@@ -90,6 +90,7 @@ zero
 
 weird
 other
+volts
 V
 2.5
 0.01
@@ -107,6 +108,7 @@ def test_what_is_asked_becomes_part_of_the_file(urdf: str) -> None:
     assert done.returncode == 0, done.stderr
     assert "1 'zero': write a number" in done.stderr
     assert "'weird': answer torque, current, other, or Enter" in done.stderr
+    assert "'volts': answer V, A, N·m, N, count, %, 1, or Enter for V" in done.stderr
     turn, lift = load_machine("reach-arm.toml").joints
     assert turn.drive.kind == "current"
     assert (turn.drive.torque_constant.value, turn.drive.gear_ratio.value) == (0.05, 100.0)

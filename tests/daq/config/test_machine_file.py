@@ -28,6 +28,66 @@ def complaint(name: str, wanted: str, given: str) -> str:
 @pytest.mark.parametrize(
     ("name", "wanted", "given", "said"),
     [
+        ("line_stage", '"N·s/m"', '"furlong"', "joints.1: friction.viscous: unit is 'furlong', must be 'N·s/m' on a"),
+        ("line_stage", '"N·s/m"', '"N·m·s/rad"', "unit is 'N·m·s/rad', must be 'N·s/m' on a joint that slides"),
+        ("line_stage", 'unit = "N"', 'unit = "stone"', "joints.1: friction.coulomb: unit is 'stone', must be 'N' on a"),
+        (
+            "single_axis",
+            'unit = "N·m"',
+            'unit = "N"',
+            "friction.coulomb: unit is 'N', must be 'N·m' on a joint that tu",
+        ),
+        ("single_axis", '"N·m/V"', '"N·m/furlong"', "joints.1: drive.gain: unit is 'N·m/furlong', must be N·m per uni"),
+        ("single_axis", '"N·m/V"', '"N/V"', "such as 'N·m/V', on a joint that turns"),
+        ("single_axis", '"kg·m²"', '"kg"', "drive.inertia: unit is 'kg', must be 'kg·m²' on a joint that turns"),
+        (
+            "line_stage",
+            '5e-5, unit = "m"',
+            '5e-5, unit = "rad"',
+            "controller.set_point_resolution: unit is 'rad', must",
+        ),
+        (
+            "line_stage",
+            LIMIT,
+            LIMIT.replace("V", "hp"),
+            "controller.output_limit: unit is 'hp', must be 'V' on these jo",
+        ),
+        (
+            "line_stage",
+            LIMIT,
+            "output_limit = [{L}, {L}]".replace("{L}", LIMIT[15:].replace("V", "A")),
+            "limit.1: unit is 'A'",
+        ),
+        (
+            "single_axis",
+            'period = { value = 0.005, unit = "s"',
+            'period = { value = 5, unit = "ms"',
+            "period: unit is 'ms'",
+        ),
+        (
+            "linear_axis",
+            '0.6, unit = "m"',
+            '0.6, unit = "rad"',
+            "joints.1: sensor.range: unit is 'rad', must be 'm' on a",
+        ),
+    ],
+)
+def test_an_unknown_unit_is_refused_with_those_that_are_allowed(name: str, wanted: str, given: str, said: str) -> None:
+    assert said in complaint(name, wanted, given)
+
+
+def test_a_moving_mass_of_a_sliding_drive_may_be_in_kilograms_and_a_gain_may_leave_its_drive_open() -> None:
+    text = (EXAMPLES / "linear_axis.toml").read_text("utf-8")
+    gain = 'gain = { value = 1.0, unit = "N/N", source = "the force is recorded" }'
+    assert gain in text
+    with_mass = f'{gain.replace("N/N", "N")}, inertia = {{ value = 0.4, unit = "kg", source = "scales" }}'
+    drive = parse_machine(text.replace(gain, with_mass)).joint(1)
+    assert drive.drive_units == ("V", "A", "N·m", "N", "count", "%", "1")
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted", "given", "said"),
+    [
         (
             "line_stage",
             "output_limit",
@@ -57,6 +117,7 @@ def complaint(name: str, wanted: str, given: str) -> str:
         ("single_axis", '"revolute"', '"turning"', "joints.1.kind: found 'turning', must be 'revolute' or 'prismatic'"),
         ("single_axis", "version = 1", "version = 2", "version: found 2, must be 1"),
         ("single_axis", "[9.81, 0.0, 0.0]", "[9.81, 0.0]", "gravity.3: is missing"),
+        ("single_axis", "[9.81, 0.0, 0.0]", "[9.81, 0.0, nan]", "gravity.3: found nan, must be a finite number"),
         ("single_axis", "[9.81, 0.0, 0.0]", "9.81", "gravity: found 9.81, must be a list"),
         (
             "single_axis",
