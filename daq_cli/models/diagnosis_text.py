@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from daq_cli.models.gap_text import gap_lines
 from model.discrepancy.diagnosis import in_order
 from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
-from model.effects.names import effect_on
+from model.effects.names import capitalised, effect_on
 from model.units import shown_unit
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def answer_text(found: Diagnosis) -> str:
     warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
     for number in sorted(warnings):
         lines += ["", *_filled("WARNING", found.notes[number])]
+    lines += ["", *_filled("method", capitalised(method_words(found)) + ".")]
     for number, step in enumerate(found.steps, start=1):
         lines += ["", *([f"step {number} of {len(found.steps)}"] if len(found.steps) > 1 else [])]
         lines += _step(step, found.steps[: number - 1])

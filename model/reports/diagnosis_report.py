@@ -10,11 +10,11 @@ from model.discrepancy.diagnosis import (
     Acquired,
     Diagnosis,
     RemainingShape,
-    Step,
     clear_shape,
 )
 from model.discrepancy.explanation.class_words import class_words
 from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
 from model.effects.names import capitalised
 from model.reports.diagnosis_map import map_picture
@@ -50,7 +50,7 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     if not any(s.adopted for s in found.steps):
         sections += _nothing_added(found, of)
     if comparison is not None:
-        sections.append(_overlays(comparison, found.steps))
+        sections.append(_overlays(comparison, found))
     elif of.overlays:
         sections.append(Section("Overlays", (Text(of.overlays, "quiet"),)))
     sections.append(_remaining(found, of))
@@ -68,6 +68,7 @@ def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
     return (
         ("diagnosis of", machine.title),
         ("verdict", VERDICTS[found.verdict]),
+        ("method", method_words(found)),
         (
             "model before",
             f"{found.model_before.identity}, {effect_list([u.name for u in found.model_before.effects])}",
@@ -101,9 +102,9 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
     return sections
 
 
-def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
+def _overlays(comparison: Comparison, found: Diagnosis) -> Section:
     motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True)
-    taken = any(s.adopted for s in steps)
+    taken = any(s.adopted for s in found.steps)
     text = "Before is the model as it was given; after, its tolerance parameters are fitted" + (
         " as well. What each effect brought by itself stands in the table of the gap. "
         if taken
@@ -113,6 +114,8 @@ def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
         "The simulations here are of the closed loop alone: they are given the set points and the start, and nothing "
         "else of the record."
     )
+    if found.method == "inverse-dynamics":
+        text += " They were made for this page: the answer rests on the balance of torques alone."
     return Section("Measured, before and after", (Text(text), *motion.blocks))
 
 
@@ -197,7 +200,7 @@ def _without_experiment(found: Diagnosis) -> str:
         return "Nothing is left to tell apart."
     if found.verdict == "named" or found.method == "output-error":
         return "No further experiment is asked for."
-    text = "Nothing was simulated, so no experiment is proposed, though one may be needed."
+    text = "No rival was simulated, so no experiment is proposed, though one may be needed."
     if isinstance(found.model_before.machine.controller, NoController):
         return text
     return f"{text} Of traces with set points, `daq diagnose --next FILE` simulates the loop and looks for one."
