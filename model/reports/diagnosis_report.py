@@ -13,6 +13,7 @@ from model.discrepancy.diagnosis import (
     clear_shape,
 )
 from model.discrepancy.explanation.class_words import class_words
+from model.discrepancy.explanation.fitted_numbers import FittedNumber, most_moved, stated_numbers, with_deviation
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
@@ -45,10 +46,13 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     """
     of = compared(found)
     sections = [] if found.gap is None else [gap_section(found.gap)]
+    stated = stated_numbers(found)
     for number in range(1, len(found.steps) + 1):
-        sections += step_sections(number, found.steps, of)
+        sections += step_sections(number, found.steps, of, stated)
     if not any(s.adopted for s in found.steps):
         sections += _nothing_added(found, of)
+    if moved := most_moved(found):
+        sections.append(_moved(moved))
     if comparison is not None:
         sections.append(_overlays(comparison, found))
     elif of.overlays:
@@ -117,6 +121,21 @@ def _overlays(comparison: Comparison, found: Diagnosis) -> Section:
     if found.method == "inverse-dynamics":
         text += " They were made for this page: the answer rests on the balance of torques alone."
     return Section("Measured, before and after", (Text(text), *motion.blocks))
+
+
+def _moved(numbers: Sequence[FittedNumber]) -> Section:
+    rows = tuple(
+        (
+            Cell(n.name),
+            Cell(with_deviation(n.stated, n.deviation, n.unit), number=True),
+            Cell(with_deviation(n.fitted, None, n.unit), number=True),
+            Cell(f"{n.distance:.1f}", number=True),
+        )
+        for n in numbers
+    )
+    caption = "Those that moved furthest, in deviations that the machine file states; five at most."
+    table = Table(("number", "in the file", "fitted", "stated deviations"), rows, caption)
+    return Section("What the fit made of the machine's numbers", (table,))
 
 
 def _remaining(found: Diagnosis, of: Compared) -> Section:
