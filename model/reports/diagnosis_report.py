@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from daq.contracts.machine import NoController
 from model.comparison.compare import Comparison
@@ -24,7 +24,7 @@ from model.reports.diagnosis_steps import step_sections, where_blocks
 from model.reports.diagnosis_words import Compared, compared
 from model.reports.gap import gap_section
 from model.reports.motion import motion_section
-from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed
+from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed, trace_names
 
 VERDICTS = {
     "nothing-significant": "nothing significant: the model explains these traces within their noise",
@@ -37,13 +37,17 @@ LABELS = ("before", "after")
 """Labels of the models in the comparison that this report shows."""
 
 
-def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> Report:
+def diagnosis_report(
+    found: Diagnosis, comparison: Comparison | None = None, files: Mapping[str, str] | None = None
+) -> Report:
     """The page of a diagnosis.
 
     Args:
         comparison: of the models before and after (labelled `LABELS`), on the traces fitted to and held out; overlays
             are left out without it.
+        files: names of the traces' files, by number, where they are known.
     """
+    files = files or {}
     of = compared(found)
     sections = [] if found.gap is None else [gap_section(found.gap)]
     stated = stated_numbers(found)
@@ -54,7 +58,7 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     if moved := most_moved(found):
         sections.append(_moved(moved))
     if comparison is not None:
-        sections.append(_overlays(comparison, found))
+        sections.append(_overlays(comparison, found, files))
     elif of.overlays:
         sections.append(Section("Overlays", (Text(of.overlays, "quiet"),)))
     sections.append(_remaining(found, of))
@@ -64,10 +68,10 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     if found.notes:
         sections.append(Section("What to know about this answer", (Points(found.notes),)))
     title = capitalised(headline(found))
-    return Report(title, found.summary, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
+    return Report(title, found.summary, _facts(found, files), tuple(sections), f"Error and residual: {of.residual}.")
 
 
-def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
+def _facts(found: Diagnosis, files: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     machine = found.model_after.machine
     return (
         ("diagnosis of", machine.title),
@@ -81,8 +85,13 @@ def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
             "model after",
             f"{found.model_after.identity}, {effect_list([u.name for u in found.model_after.effects])}",
         ),
-        ("fitted to", listed(found.traces)),
-        ("held out", listed(found.holdout) if found.holdout else "none: nothing below was judged on other data"),
+        ("fitted to", listed(trace_names(found.traces, files))),
+        (
+            "held out",
+            listed(trace_names(found.holdout, files))
+            if found.holdout
+            else "none: nothing below was judged on other data",
+        ),
         ("time", f"took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"),
     )
 
@@ -106,8 +115,8 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
     return sections
 
 
-def _overlays(comparison: Comparison, found: Diagnosis) -> Section:
-    motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True)
+def _overlays(comparison: Comparison, found: Diagnosis, files: Mapping[str, str]) -> Section:
+    motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True, files=files)
     taken = any(s.adopted for s in found.steps)
     text = "Before is the model as it was given; after, its tolerance parameters are fitted" + (
         " as well. What each effect brought by itself stands in the table of the gap. "

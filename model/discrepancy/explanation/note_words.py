@@ -175,10 +175,8 @@ def _torque_left(v: Values) -> str:
 
 
 def _unfinished_record(v: Values) -> str:
-    return (
-        f"trace {v['trace']} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are "
-        "were used"
-    )
+    called = v.get("file") or f"trace {v['trace']}"
+    return f"{called} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are were used"
 
 
 def _rounded(value: float, unit: str) -> str:
