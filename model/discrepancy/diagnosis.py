@@ -65,6 +65,11 @@ class Candidate(FrozenRecord):
     misfit: float | None = None
     refitted: bool = False
     parameters: dict[str, FoundValue] = {}
+    evidence_held_out: float | None = None
+    """What held-out traces say for it, which decides together with `evidence`."""
+    needed: float | None = None
+    """Sum of both from which it would be named. Like the line above, in torques, of the best candidate of a step that
+    added nothing; else None."""
 
 
 class SignalError(FrozenRecord):

@@ -11,6 +11,7 @@ from model.discrepancy.diagnosis import (
     Diagnosis,
     RemainingShape,
     clear_shape,
+    in_order,
 )
 from model.discrepancy.explanation.class_words import class_words
 from model.discrepancy.explanation.fitted_numbers import FittedNumber, most_moved, stated_numbers, with_deviation
@@ -108,8 +109,10 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
         if found.where is not None:
             sections.append(Section("Where they disagree", where_blocks(found.where, found.rmse_fit, of)))
         if found.candidates:
-            picture = evidence_picture(found.candidates, needed=found.significant)
             needed = found.significant
+            fitted, _ = in_order(found.candidates)
+            own = fitted[0].needed if fitted else None  # the others may need more or less
+            picture = evidence_picture(found.candidates, needed=needed if own is None else own)
             words = () if needed is None else (Text(best_tried(found.candidates, needed)),)
             sections.append(Section("What was tried", (*words, picture)))
     return sections

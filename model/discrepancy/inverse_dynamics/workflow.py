@@ -18,7 +18,7 @@ from model.discrepancy.inverse_dynamics.left_over import first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.discrepancy.inverse_dynamics.step_record import list_candidates, record_step
+from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import withdrawn
@@ -70,7 +70,7 @@ class TorqueWorkflow:
             self._report(0.1, "what is missing")
             found = self._search()
             if not self._adopt(found):
-                self.tried = list_candidates(self.case, found)
+                self.tried = list_tried(self.standing, found)
                 self.suspicion = suspect(self.standing, found)
                 self.at_bounds = self._on_sizes_at_bounds(found)
                 break

@@ -6409,6 +6409,10 @@ export interface components {
             parameters?: {
                 [key: string]: components["schemas"]["FoundValue"];
             };
+            /** Evidence Held Out */
+            evidence_held_out?: number | null;
+            /** Needed */
+            needed?: number | null;
             /** Called */
             called: string;
         };
