@@ -63,7 +63,7 @@ def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tup
         raise TraceError(f"{repeated[-1]}: given more than once; it would count double")
     records = tuple(_record(trace, machine, signal) for trace in traces)
     if not any(_moves(record, machine, signal) for record in records):
-        called = ", ".join(t.called for t in traces)
+        called = ", ".join(t.file or t.record.trace_id for t in traces)
         raise TraceError(
             f"no motion: no joint of {called} moves by {LEAST_MOTION_COUNTS:g} counts of its sensor or more"
         )
