@@ -36,9 +36,11 @@ def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, 
 
 
 def standard_deviations(now: BalanceFit) -> dict[str, float]:
-    """Standard deviations of the unknowns that change the residual at all, by name."""
+    """Standard deviations of the unknowns that change the residual at all, by name; empty where none does."""
     slopes = now.slopes()
     used = [u for u in now.unknowns if any(np.abs(s).max() > 0 for s in slopes[u.name])]
+    if not used:  # no record tells anything of any joint
+        return {}
     scale = np.array([u.scale for u in used])
     scores, information = [], np.zeros((len(used), len(used)))
     for j in range(len(now.data.floor)):
