@@ -33,8 +33,12 @@ class Invalid:
 
 def first_invalid(error: ValidationError) -> Invalid:
     """The first of the values that `error` is about."""
-    first = error.errors()[0]
-    return Invalid(first["loc"], message_of(first), first["input"], first["type"], first.get("ctx", {}))
+    return invalid_of(error.errors()[0])
+
+
+def invalid_of(error: Mapping[str, Any]) -> Invalid:
+    """One of pydantic's errors."""
+    return Invalid(error["loc"], message_of(error), error["input"], error["type"], error.get("ctx", {}))
 
 
 def message_of(error: Mapping[str, Any]) -> str:

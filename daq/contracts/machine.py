@@ -13,12 +13,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, FiniteFloat, ValidationError, model_validator
 
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
+from daq.contracts.machine_units import RECORDED_IN, UNITS, JointUnits, drive_unit_of, require_unit, require_units
 from daq.contracts.quantity import (
     Inertia,
     JointValue,
@@ -31,7 +32,7 @@ from daq.contracts.quantity import (
     Volt,
     in_unit,
 )
-from firmware_protocol.invalid import first_invalid
+from daq.contracts.refused import refused_words
 from firmware_protocol.units import POSTURE_UNITS, DriveScale, JointCalibration
 
 
@@ -41,6 +42,8 @@ def _positive(quantity: Quantity) -> Quantity:
     return quantity
 
 
+Product = Annotated[Quantity, in_unit("kg·m²")]
+"""Of inertia, of either sign."""
 Size = Annotated[Quantity, AfterValidator(_positive)]
 Sizes = Size | tuple[Size, ...]
 """A number for all joints, or one a joint."""
@@ -85,7 +88,7 @@ class Body(FrozenRecord):
     """Mass of the link."""
     centre: tuple[Metre, Metre, Metre]
     """Centre of mass in the link's own frame: x, y, z."""
-    inertia: tuple[Inertia, Inertia, Inertia, Quantity, Quantity, Quantity]
+    inertia: tuple[Inertia, Inertia, Inertia, Product, Product, Product]
     """About the centre of mass: xx, yy, zz, xy, xz, yz."""
 
 
@@ -126,8 +129,8 @@ class PlainGain(FrozenRecord):
 
     kind: Literal["gain"]
     gain: Quantity
-    """Torque or force at the joint for a unit of the recorded drive (`N·m/V`, `N/N`)."""
-    inertia: Inertia | None = None
+    """Torque or force at the joint for a unit of the recorded drive (`N·m/V`, `N/N`): V, A, N·m, N, count, % or 1."""
+    inertia: Annotated[Quantity, in_unit("kg·m²", "kg", at_least=0.0)] | None = None
     """Of the drive, at the joint; kg on a sliding joint."""
 
 
@@ -195,6 +198,32 @@ class Joint(FrozenRecord):
     sensor: Sensor | None = None
     """See Sensor; none: exact positions."""
 
+    @model_validator(mode="after")
+    def _units_suit(self) -> Self:
+        units, drive, sensor = UNITS[self.kind], self.drive, self.sensor
+        require_unit("friction.viscous", self.friction.viscous, (units.viscous,), units.what)
+        require_unit("friction.coulomb", self.friction.coulomb, (units.torque,), units.what)
+        if isinstance(drive, PlainGain):
+            drive_unit_of(drive.gain, units)
+            require_unit("drive.inertia", drive.inertia, units.inertia, units.what)
+        if sensor is not None and sensor.measures == "position":
+            require_unit("sensor.range", sensor.range, (units.position,), units.what)
+            require_unit("sensor.at_zero", sensor.at_zero, (units.position,), units.what)
+        return self
+
+    @property
+    def units(self) -> JointUnits:
+        """Units of position, torque (force) and friction at the joint."""
+        return UNITS[self.kind]
+
+    @property
+    def drive_units(self) -> tuple[str, ...]:
+        """The units that its recorded drive may have: one, but for a gain that does not say it."""
+        if isinstance(self.drive, PlainGain):
+            stated = drive_unit_of(self.drive.gain, self.units)
+            return RECORDED_IN if stated is None else (stated,)
+        return ("V",) if isinstance(self.drive, DcMotor) else ("A",)
+
     @property
     def dc_motor(self) -> DcMotor:
         """The motor. Raises SpecError when the drive is none."""
@@ -232,9 +261,9 @@ class SampledPid(FrozenRecord):
     """Of control."""
     delay: Second
     """From reading a position to the change of the drive."""
-    gains: tuple[tuple[float, float, float], ...]
+    gains: tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...]
     """P (drive's unit per rad or m), I (per rad·s), D (s/rad) per joint."""
-    velocity_gains: tuple[tuple[float, float, float], ...] | None = None
+    velocity_gains: tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...] | None = None
     """P, I, D per joint of an inner loop on speed; none: no such loop."""
     drive_resolution: Sizes | None = None
     """Step of the output, unit of the drive; none: not rounded."""
@@ -277,7 +306,7 @@ class Machine(FrozenRecord):
     """For people."""
     notes: str = ""
     """For people."""
-    gravity: tuple[float, float, float]
+    gravity: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
     """In the base's axes, m/s²."""
     joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
     """From the base on; see Joint."""
@@ -289,7 +318,7 @@ class Machine(FrozenRecord):
     """See BoardPid, SampledPid and NoController."""
     limits: Limits = Limits()
     """What the arm may do ([safety](safety.md)): experiments are planned within it."""
-    rest_posture: tuple[float, ...] | None = None
+    rest_posture: tuple[FiniteFloat, ...] | None = None
     """Position of every joint at rest, rad or m: where springs are expected to be slack."""
 
     @model_validator(mode="after")
@@ -308,6 +337,10 @@ class Machine(FrozenRecord):
                 stated = getattr(self.controller, name)
                 if isinstance(stated, tuple) and len(stated) != count:
                     raise ValueError(f"controller.{name} has {len(stated)} numbers for {count} joints")
+                if name != "gain_error":
+                    positions = name == "set_point_resolution"
+                    allowed = [(j.units.position,) if positions else j.drive_units for j in self.joints]
+                    require_units(f"controller.{name}", stated, allowed)
             rows = self.controller.velocity_gains
             if rows is not None and len(rows) != count:
                 raise ValueError(f"controller.velocity_gains has {len(rows)} rows for {count} joints")
@@ -392,8 +425,7 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
     try:
         return Machine.model_validate(parse_toml(text, origin))
     except ValidationError as error:
-        first = first_invalid(error)
-        raise SpecError(f"{origin}: {first.where('machine', first=1)}: {first.message}") from error
+        raise SpecError(f"{origin}: {refused_words(error, Machine, 'machine')}") from error
 
 
 def load_machine(name_or_path: str) -> Machine:

@@ -38,12 +38,13 @@ class Quantity(FrozenRecord):
         return self.value
 
 
-def in_unit(unit: str, *, above: float | None = None, at_least: float | None = None) -> Any:
-    """Validator that a quantity is written in `unit` and lies above (or at least at) a bound."""
+def in_unit(unit: str, *others: str, above: float | None = None, at_least: float | None = None) -> Any:
+    """Validator that a quantity is written in `unit` (or in one of the others) and lies above (or at least at) a
+    bound."""
 
     def check(quantity: Quantity) -> Quantity:
-        if quantity.unit != unit:
-            raise ValueError(f"unit is {quantity.unit!r}, must be {unit!r}")
+        if quantity.unit not in (unit, *others):
+            raise ValueError(f"unit is {quantity.unit!r}, must be {' or '.join(map(repr, (unit, *others)))}")
         if above is not None and not quantity.value > above:
             raise ValueError(f"value {quantity.value} {unit} must be above {above}")
         if at_least is not None and not quantity.value >= at_least:

@@ -141,6 +141,7 @@ class Trace:
     status:    (n,)   the board's flags (`firmware_protocol.commands.StatusFlag`)
     taken:     (n,)   number of the first control period that used the sample's set points, 0 where it is not known;
                       None where every period has a sample, which shows it
+    file:             what whoever named the file calls it, for messages; empty where that is not known
 
     Raises TraceError when shapes disagree, time does not increase, or a value is not finite.
     """
@@ -159,6 +160,7 @@ class Trace:
     status: Integers | None = None
     taken: Integers | None = None
     events: tuple[TraceEvent, ...] = field(default=())
+    file: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
         """One line: a notebook shows it, and an array of every signal would fill the page."""
@@ -180,7 +182,7 @@ class Trace:
 
         require_extra("robot", "plot()", "matplotlib")
         if len(self) == 0:
-            raise TraceError(f"trace {self.record.trace_id}: has no samples to plot")
+            raise TraceError(f"{self.called}: has no samples to plot")
         return figure_of(self, joints)
 
     def to_pandas(self) -> pd.DataFrame:
@@ -194,24 +196,29 @@ class Trace:
     def __post_init__(self) -> None:
         count = len(self.time)
         if not self.joints or len(set(self.joints)) != len(self.joints):
-            raise TraceError(f"trace {self.record.trace_id}: joints {self.joints} are not one or more different joints")
+            raise TraceError(f"{self.called}: joints {self.joints} are not one or more different joints")
         for name in ("position", "set_point", "error", "drive", "velocity", "power_raw"):
             signal = getattr(self, name)
             if signal is not None and signal.shape != (count, len(self.joints)):
                 wanted = (count, len(self.joints))
-                raise TraceError(f"trace {self.record.trace_id}: {name} has shape {signal.shape}, expected {wanted}")
+                raise TraceError(f"{self.called}: {name} has shape {signal.shape}, expected {wanted}")
             if signal is not None and not np.isfinite(signal).all():
                 row = int(np.argwhere(~np.isfinite(signal))[0][0])
-                raise TraceError(f"trace {self.record.trace_id}: {name} is not finite at sample {row}")
+                raise TraceError(f"{self.called}: {name} is not finite at sample {row}")
         if not np.isfinite(self.time).all() or (count > 1 and not (np.diff(self.time) > 0).all()):
-            raise TraceError(f"trace {self.record.trace_id}: time must be finite and strictly increasing")
+            raise TraceError(f"{self.called}: time must be finite and strictly increasing")
         for name in ("tick", "host_time", "status", "taken"):
             signal = getattr(self, name)
             if signal is not None and signal.shape != (count,):
-                raise TraceError(f"trace {self.record.trace_id}: {name} has shape {signal.shape}, expected {(count,)}")
+                raise TraceError(f"{self.called}: {name} has shape {signal.shape}, expected {(count,)}")
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def called(self) -> str:
+        """What messages call the trace: its file where that is known, else its number."""
+        return self.file or f"trace {self.record.trace_id}"
 
     @property
     def missing(self) -> int:
@@ -233,5 +240,5 @@ class Trace:
     def column(self, joint: int) -> int:
         """Column of joint `joint` (from 1). Raises TraceError when the trace has none."""
         if joint not in self.joints:
-            raise TraceError(f"trace {self.record.trace_id}: joint {joint} is not in it; it has {self.joints}")
+            raise TraceError(f"{self.called}: joint {joint} is not in it; it has {self.joints}")
         return self.joints.index(joint)

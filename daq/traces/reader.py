@@ -82,7 +82,7 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
     return Trace(record, joints, events=decoded.events, **signals)
 
 
-def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, NDArray[Any]]:
+def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, Any]:
     """The columns of a trace by name: time, position, and the others that it has."""
     first = decoded.samples[0]
 

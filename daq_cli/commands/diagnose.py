@@ -26,6 +26,7 @@ from daq_cli.models.model_input import (
     TraceFolderOption,
     TracesArgument,
     check_made_for,
+    files_of,
     load_effects,
     machine_of,
     read_model,
@@ -216,4 +217,4 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     if simulated and all(t.set_point is not None for t in (*traces, *held)):
         models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
         comparison = compare(models, [*traces, *held], [t.record.trace_id for t in held])
-    return write_report(diagnosis_report(found, comparison), path)
+    return write_report(diagnosis_report(found, comparison, files_of([*traces, *held])), path)

@@ -21,6 +21,7 @@ from daq_cli.models.model_input import (
     ReportOption,
     TraceFolderOption,
     TracesArgument,
+    files_of,
     load_effects,
     machine_of,
     read_model,
@@ -181,7 +182,9 @@ def _fit_motion(
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
 
-        console().print(f"report: {write_report(fit_report(found, comparison, base), report)}")
+        console().print(
+            f"report: {write_report(fit_report(found, comparison, base, files_of([*traces, *held])), report)}"
+        )
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:

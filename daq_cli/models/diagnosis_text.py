@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from daq_cli.models.gap_text import gap_lines
 from model.discrepancy.diagnosis import in_order
+from model.discrepancy.explanation.fitted_numbers import (
+    FittedNumber,
+    most_moved,
+    stated_beside,
+    stated_numbers,
+    with_deviation,
+)
 from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
-from model.effects.names import effect_on
+from model.effects.names import capitalised, effect_on
 from model.units import shown_unit
 
 if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
+    from model.machine_model.parameter import Parameter
 
 WIDTH = 100
 INDENT = 9
@@ -33,12 +42,16 @@ def answer_text(found: Diagnosis) -> str:
     warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
     for number in sorted(warnings):
         lines += ["", *_filled("WARNING", found.notes[number])]
+    lines += ["", *_filled("method", capitalised(method_words(found)) + ".")]
+    stated = stated_numbers(found)
     for number, step in enumerate(found.steps, start=1):
         lines += ["", *([f"step {number} of {len(found.steps)}"] if len(found.steps) > 1 else [])]
-        lines += _step(step, found.steps[: number - 1])
+        lines += _step(step, found.steps[: number - 1], stated)
     if not found.steps:
         lines += ["", *_without_steps(found)]
     lines += ["", *(_beside("gap", gap_lines(found.gap)) if found.gap is not None else _errors_of(found))]
+    if moved := most_moved(found):
+        lines += ["", *_beside("numbers", _moved(moved))]
     if left := _left(found):
         lines += ["", *left]
     if found.next_experiment is not None:
@@ -49,13 +62,16 @@ def answer_text(found: Diagnosis) -> str:
     return "\n".join(lines)
 
 
-def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
+def _step(step: Step, earlier: Sequence[Step], stated: Mapping[str, Parameter]) -> list[str]:
     lines = _filled("where", step.where.summary)
     lines += _filled("what", step.reason)
     lines += [" " * INDENT + line for line in candidates_lines(step, earlier)]
     if step.parameters:
         lines += _filled("added" if step.adopted else "tried", "")
-        lines += [f"{'':{INDENT}}{name} = {_value(v)}" for name, v in step.parameters.items()]
+        lines += [
+            f"{'':{INDENT}}{name} = {_value(v)}{_beside_file(step, name, v, stated)}"
+            for name, v in step.parameters.items()
+        ]
     if not step.adopted and step.effect is not None:
         lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
     if step.excess_removed_holdout is not None:
@@ -138,6 +154,26 @@ def _value(value: FoundValue) -> str:
     if value.low is None or value.high is None:
         return f"{value.value:.4g}{unit} (not bounded by these traces)"
     return f"{value.value:.4g}{unit} (95 %: {value.low:.4g} to {value.high:.4g})"
+
+
+def _beside_file(step: Step, name: str, value: FoundValue, stated: Mapping[str, Parameter]) -> str:
+    of_file = stated_beside(step.effect, name, value, stated)
+    return f"; the file states {of_file}" if of_file else ""
+
+
+def _moved(numbers: Sequence[FittedNumber]) -> list[str]:
+    """Numbers of the machine file, a line each: as stated, as fitted, and how far apart."""
+    rows = [
+        (n.name, with_deviation(n.stated, n.deviation, n.unit), with_deviation(n.fitted, None, n.unit)) for n in numbers
+    ]
+    name, stated, fitted = (max(map(len, column)) for column in zip(*rows, strict=True))
+    return [
+        "of the machine file that the fit moved most: stated → fitted (stated deviations)",
+        *(
+            f"  {row[0]:<{name}}  {row[1]:>{stated}} → {row[2]:>{fitted}}  ({n.distance:.1f})"
+            for row, n in zip(rows, numbers, strict=True)
+        ),
+    ]
 
 
 def _filled(label: str, text: str, indent: int = INDENT) -> list[str]:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from daq_cli.app.context import console, print_json, print_table
 from daq_cli.app.output_file import replacing
+from daq_cli.models.model_input import files_of
 from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from daq.contracts.trace import Trace
     from model.fitting.options import FitOptions
@@ -38,6 +39,7 @@ def fit_recorded_torques(
     from model.inverse_dynamics.fit import fit_torques
     from model.machine_model.model_file import save_model
 
+    files = files_of([*traces, *held_out])
     with shown_progress("fitting torques") as progress:
         found = fit_torques(begin, traces, held_out, options, progress=progress)
         base = base_parameters(found.model, traces)
@@ -47,7 +49,7 @@ def fit_recorded_torques(
         own = {"base_parameters": base.model_dump(mode="json"), "model": found.model.identity, "file": out}
         print_json(found.model_dump(mode="json", exclude={"model"}) | own)
     else:
-        _print(found)
+        _print(found, files)
         print(headline(base))
         console().print(f"model {found.model.identity}: {out}")
     if report is not None:
@@ -56,27 +58,27 @@ def fit_recorded_torques(
         from model.reports.torque_report import torque_report
 
         curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
-        console().print(f"report: {write_report(torque_report(found, curves, base), report)}")
+        console().print(f"report: {write_report(torque_report(found, curves, base, files), report)}")
 
 
-def _print(found: TorqueFit) -> None:
+def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
     from rich.table import Table
+
+    from model.discrepancy.explanation.note_words import note_words
+    from model.discrepancy.explanation.notes import on_drives_at_limit
+    from model.discrepancy.explanation.renderer import sentence
+    from model.reports.page import trace_names
 
     print_parameters(found.parameters)
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")
     errors = Table("trace", "", "left of the torque", "rms by joint", box=None, header_style="bold")
-    for one in found.errors:
+    for one, name in zip(found.errors, trace_names([e.trace for e in found.errors], files), strict=True):
         rms = ", ".join(f"{left:.3f} of {torque:.3f}" for left, torque in zip(one.rms, one.torque, strict=True))
-        errors.add_row(one.trace, "held out" if one.held_out else "in sample", f"{100 * one.share:.1f} %", rms)
+        errors.add_row(name, "held out" if one.held_out else "in sample", f"{100 * one.share:.1f} %", rms)
     print_table(errors, 120)
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")
-    if found.at_limit:
-        from model.discrepancy.explanation.note_words import note_words
-        from model.discrepancy.explanation.renderer import sentence
-        from model.discrepancy.grounds import Note
-
-        values = {"shares": found.at_limit, "unknown_joints": found.unknown_joints}
-        print(sentence(note_words(Note(kind="drive-at-limit", values=values))))
+    for note in on_drives_at_limit(found.at_limit, found.unknown_joints):
+        print(sentence(note_words(note)))
     print_on_the_edge(found.on_the_edge)

@@ -8,6 +8,7 @@ import typer
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import CurrentDrive, Friction, PlainGain
+from daq.contracts.machine_units import RECORDED_IN
 from daq.contracts.quantity import Quantity
 from daq_cli.app.context import console
 from daq_cli.app.quantities import parse_numbers
@@ -60,7 +61,7 @@ def _drive(name: str, torque: str, inertia: str) -> PlainGain | CurrentDrive | N
     gain: float | None = 1.0
     unit = torque
     if kind == "other":
-        unit = typer.prompt(f"{name}: unit of the recorded drive", default="V", err=True)
+        unit = _recorded_unit(f"{name}: unit of the recorded drive")
         gain = _asked(f"{name}: torque or force at the joint for one {unit}", f"{torque}/{unit}")
     moving = _asked(f"{name}: inertia of the drive, at the joint", inertia)
     if gain is None:
@@ -77,6 +78,14 @@ def _choice(question: str) -> str | None:
         if not answer or answer in KINDS:
             return answer or None
         console().print(f"{answer!r}: answer {', '.join(KINDS)}, or Enter")
+
+
+def _recorded_unit(question: str) -> str:
+    while True:
+        answer = str(typer.prompt(question, default="V", err=True)).strip()
+        if answer in RECORDED_IN:
+            return answer
+        console().print(f"{answer!r}: answer {', '.join(RECORDED_IN)}, or Enter for V")
 
 
 def _asked(question: str, unit: str, above: float | None = None) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -153,11 +154,17 @@ def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -
     found = []
     for name in names:
         if Path(name).suffix == ".csv" and Path(name).is_file():
-            trace = import_csv(Path(name), call.trace_limits)
+            trace, file = import_csv(Path(name), call.trace_limits), name
         else:
-            trace = read_trace(robot.find_trace(place, name), call.trace_limits)
-        found.append(trace)
+            path = robot.find_trace(place, name)
+            trace, file = read_trace(path, call.trace_limits), name if Path(name).is_file() else path.name
+        found.append(replace(trace, file=file))
     return found
+
+
+def files_of(traces: Sequence[Trace]) -> dict[str, str]:
+    """What the command line calls the files of traces, by the number of each."""
+    return {trace.record.trace_id: trace.file for trace in traces if trace.file}
 
 
 def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str] = ()) -> Machine:
@@ -215,7 +222,7 @@ def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[st
 
 
 def _names(traces: Sequence[Trace], names: Sequence[str]) -> list[str]:
-    return list(names) if names else [f"trace {t.record.trace_id}" for t in traces]
+    return list(names) if names else [t.called for t in traces]
 
 
 def _listed(joints: Sequence[int]) -> str:

@@ -56,17 +56,25 @@ class Candidate(FrozenRecord):
     `evidence` is the fall of −2 log posterior less the cost of its own parameters (BIC; for a tone's frequency the
     number of tones tried); above 0 it explains more than it costs. `misfit` is the mean square of the weighted residual
     that it leaves: near 1 for the right effect. `refitted` says whether all tolerance parameters were fitted again with
-    it, or it was only probed. `evidence_held_out` is what held-out records say for it, nothing fitted to them; None
-    where there are none, or they were not asked.
+    it, or it was only probed.
     """
 
     effect: str
     joints: tuple[int, ...]
     evidence: float
-    evidence_held_out: float | None = None
     misfit: float | None = None
     refitted: bool = False
     parameters: dict[str, FoundValue] = {}
+    evidence_held_out: float | None = None
+    """What held-out traces say for it, which decides together with `evidence`, with nothing fitted to them. By torques;
+    None where there are none."""
+    needed: float | None = None
+    """Sum of both from which it would be named: by torques, of the best candidate of a step that added nothing."""
+
+    @property
+    def total(self) -> float:
+        """What all traces say for it, as evidence."""
+        return self.evidence + (self.evidence_held_out or 0.0)
 
 
 class SignalError(FrozenRecord):
@@ -370,11 +378,11 @@ class Diagnosis(FrozenRecord):
 
 
 def in_order(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
-    """The fitted candidates and those that were only probed, each by evidence, the best first.
+    """The fitted candidates and those that were only probed, each by what all traces say for them, the best first.
 
     The two kinds are not comparable: a fit shows what a candidate takes off the residual, a probe extrapolates it.
     """
-    best_first = sorted(candidates, key=lambda c: -c.evidence)
+    best_first = sorted(candidates, key=lambda c: -c.total)
     return [c for c in best_first if c.refitted], [c for c in best_first if not c.refitted]
 
 

@@ -40,6 +40,8 @@ NoteKind = Literal[
     "drive-at-limit",
     "drive-timing",
     "errors-follow-record",
+    "gravity-magnitude",
+    "gravity-reversed",
     "larger-noise",
     "no-experiment-left",
     "not-looked-for",

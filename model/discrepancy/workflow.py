@@ -49,6 +49,4 @@ def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:
     """Raises TraceError for a trace that would be both fitted to and held out."""
     for trace in holdout:
         if any(trace.record.trace_id == other.record.trace_id for other in traces):
-            raise TraceError(
-                f"trace {trace.record.trace_id}: is both fitted to and held out; what is held out must be another trace"
-            )
+            raise TraceError(f"{trace.called}: is both fitted to and held out; what is held out must be another trace")

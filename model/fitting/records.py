@@ -59,12 +59,13 @@ def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tup
     if not traces:
         raise TraceError("no traces: a fit needs at least one")
     names = [t.record.trace_id for t in traces]
-    if repeated := sorted({n for n in names if names.count(n) > 1}):
-        raise TraceError(f"trace {repeated[0]}: given more than once; it would count double")
+    if repeated := [t.called for t in traces if names.count(t.record.trace_id) > 1]:
+        raise TraceError(f"{repeated[-1]}: given more than once; it would count double")
     records = tuple(_record(trace, machine, signal) for trace in traces)
     if not any(_moves(record, machine, signal) for record in records):
+        called = ", ".join(t.file or t.record.trace_id for t in traces)
         raise TraceError(
-            f"no motion: no joint of {', '.join(names)} moves by {LEAST_MOTION_COUNTS:g} counts of its sensor or more"
+            f"no motion: no joint of {called} moves by {LEAST_MOTION_COUNTS:g} counts of its sensor or more"
         )
     return records
 
@@ -99,13 +100,13 @@ def resolution(sensor: Sensor) -> float:
 def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
     name = trace.record.trace_id
     if len(trace) < LEAST_SAMPLES:
-        raise TraceError(f"trace {name}: {len(trace)} samples; a fit needs at least {LEAST_SAMPLES}")
+        raise TraceError(f"{trace.called}: {len(trace)} samples; a fit needs at least {LEAST_SAMPLES}")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
-        raise TraceError(f"trace {name}: made on {trace.record.machine.name}, the model describes {machine.name}")
+        raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
     inputs = inputs_of(trace, machine)
     columns = [trace.column(j) for j in machine.modelled_joints]
     if signal == "velocity" and trace.velocity is None:
-        raise TraceError(f"trace {name}: has no velocity, which is what is to be fitted")
+        raise TraceError(f"{trace.called}: has no velocity, which is what is to be fitted")
     source = trace.velocity if signal == "velocity" and trace.velocity is not None else trace.position
     _check_same_unit(trace, machine)
     inputs = _calm_start(inputs, trace, columns)
@@ -146,7 +147,7 @@ def _check_same_unit(trace: Trace, machine: Machine) -> None:
         if apart > WILD_SHARE * max(travels[j] for j in kinds if kinds[j] == kind):
             larger = float(np.abs(trace.set_point[:, column]).max()), float(np.abs(trace.position[:, column]).max())
             raise TraceError(
-                f"trace {trace.record.trace_id}: joint {joint}: set points (to {larger[0]:.4g}) and positions "
+                f"{trace.called}: joint {joint}: set points (to {larger[0]:.4g}) and positions "
                 f"(to {larger[1]:.4g}) are {apart:.3g} rad apart throughout; both must be in rad from the same zero"
             )
 

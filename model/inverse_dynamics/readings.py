@@ -37,7 +37,10 @@ POSTURES = 20
 
 @dataclass(frozen=True)
 class Readings:
-    """A trace on an even grid of its own sampling, not smoothed. speed: (k, n), None where it is not measured."""
+    """A trace on an even grid of its own sampling, not smoothed. speed: (k, n), None where it is not measured.
+
+    name: the trace's number. called: what messages call it.
+    """
 
     name: str
     time: Floats
@@ -45,6 +48,7 @@ class Readings:
     speed: Floats | None
     drive: Floats
     period: float
+    called: str
 
     @property
     def _noise_density(self) -> Floats:
@@ -110,16 +114,16 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
     """
     name = trace.record.trace_id
     if trace.drive is None:
-        raise TraceError(f"trace {name}: has no recorded drive, without which torques cannot be compared")
+        raise TraceError(f"{trace.called}: has no recorded drive, without which torques cannot be compared")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
-        raise TraceError(f"trace {name}: made on {trace.record.machine.name}, the model describes {machine.name}")
+        raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
     if len(trace) < FEWEST:
-        raise TraceError(f"trace {name}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
+        raise TraceError(f"{trace.called}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
     columns = [trace.column(j) for j in machine.modelled_joints]
     steps = np.diff(trace.time)
     period = float(np.median(steps))
     if steps.max() > LONGEST_GAP[0] * period + LONGEST_GAP[1]:
-        raise TraceError(f"trace {name}: a gap of {steps.max():.3g} s; use a piece without any")
+        raise TraceError(f"{trace.called}: a gap of {steps.max():.3g} s; use a piece without any")
     time = np.arange(trace.time[0], trace.time[-1], period)
 
     def resample(signal: Floats) -> Floats:
@@ -130,9 +134,9 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
     sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
     if any(s is not None and s.measures == "velocity" for s in sensors):
         if speed is None:
-            raise TraceError(f"trace {name}: has no velocity, which the sensors of {machine.name} measure")
+            raise TraceError(f"{trace.called}: has no velocity, which the sensors of {machine.name} measure")
         position = position[0] + cumulative_trapezoid(speed, dx=period, axis=0, initial=0)
-    return Readings(name, time, position, speed, resample(trace.drive), period)
+    return Readings(name, time, position, speed, resample(trace.drive), period, trace.called)
 
 
 def choose_cutoff(traces: Sequence[Trace], machine: Machine) -> float:

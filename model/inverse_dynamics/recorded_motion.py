@@ -242,7 +242,7 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
     moves = _moving(speed, noise, period)
     moving = moves[edge : len(time) - edge : every]
     if not moving.any():
-        raise TraceError(f"trace {readings.name}: no joint moves beyond the noise of its readings")
+        raise TraceError(f"{readings.called}: no joint moves beyond the noise of its readings")
     return RecordedMotion(
         name=readings.name,
         time=time,
@@ -312,13 +312,13 @@ def _check_length(readings: Readings, cutoff: float) -> None:
     highest = 0.4 / readings.period
     if not 0 < cutoff <= highest:
         raise SpecError(
-            f"cutoff {cutoff:g} Hz: trace {readings.name} is sampled every {readings.period:.4g} s, which carries up "
+            f"cutoff {cutoff:g} Hz: {readings.called} is sampled every {readings.period:.4g} s, which carries up "
             f"to {highest:.3g} Hz"
         )
     duration, least = float(readings.time[-1] - readings.time[0]), max(SHORTEST, 4 * EDGE / cutoff)
     if duration < least:
         raise TraceError(
-            f"trace {readings.name}: lasts {duration:.3g} s; a comparison of torques below {cutoff:g} Hz needs "
+            f"{readings.called}: lasts {duration:.3g} s; a comparison of torques below {cutoff:g} Hz needs "
             f"{least:.3g} s"
         )
 

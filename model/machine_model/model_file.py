@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
-from firmware_protocol.invalid import first_invalid
+from daq.contracts.refused import refused_words
 from model.machine_model.model import MODEL_FORMAT, Model
 
 
@@ -40,8 +40,7 @@ def model_of(data: Any, called: str) -> Model:
     try:
         return Model.model_validate(data)
     except ValidationError as error:
-        first = first_invalid(error)
-        raise SpecError(f"model {called}: {first.where('model')}: {first.message}") from error
+        raise SpecError(f"model {called}: {refused_words(error, Model, 'model')}") from error
 
 
 def _check_version(called: str, version: Any) -> None:

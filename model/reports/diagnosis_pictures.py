@@ -65,7 +65,7 @@ def evidence_picture(
         axes.set_ylim((places[-1] if places else 0) - 0.6, 0.6)
         if needed is not None:
             axes.axvline(needed, color=INK, lw=0.8, ls=(0, (4, 2)))
-            axes.annotate(f"needed: {needed:g}", (needed, 0.6), (2, 2), textcoords="offset points", fontsize=6.8)
+            axes.annotate(f"needed: {needed:.3g}", (needed, 0.6), (2, 2), textcoords="offset points", fontsize=6.8)
         axes.set_xlim(0, 1.34 * scale)
         axes.set_xlabel("evidence")
         axes.grid(visible=False, axis="y")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from daq.contracts.machine import NoController
 from model.comparison.compare import Comparison
@@ -10,11 +10,13 @@ from model.discrepancy.diagnosis import (
     Acquired,
     Diagnosis,
     RemainingShape,
-    Step,
     clear_shape,
+    in_order,
 )
 from model.discrepancy.explanation.class_words import class_words
+from model.discrepancy.explanation.fitted_numbers import FittedNumber, most_moved, stated_numbers, with_deviation
 from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
 from model.effects.names import capitalised
 from model.reports.diagnosis_map import map_picture
@@ -23,7 +25,7 @@ from model.reports.diagnosis_steps import step_sections, where_blocks
 from model.reports.diagnosis_words import Compared, compared
 from model.reports.gap import gap_section
 from model.reports.motion import motion_section
-from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed
+from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed, trace_names
 
 VERDICTS = {
     "nothing-significant": "nothing significant: the model explains these traces within their noise",
@@ -36,21 +38,28 @@ LABELS = ("before", "after")
 """Labels of the models in the comparison that this report shows."""
 
 
-def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> Report:
+def diagnosis_report(
+    found: Diagnosis, comparison: Comparison | None = None, files: Mapping[str, str] | None = None
+) -> Report:
     """The page of a diagnosis.
 
     Args:
         comparison: of the models before and after (labelled `LABELS`), on the traces fitted to and held out; overlays
             are left out without it.
+        files: names of the traces' files, by number, where they are known.
     """
+    files = files or {}
     of = compared(found)
     sections = [] if found.gap is None else [gap_section(found.gap)]
+    stated = stated_numbers(found)
     for number in range(1, len(found.steps) + 1):
-        sections += step_sections(number, found.steps, of)
+        sections += step_sections(number, found.steps, of, stated)
     if not any(s.adopted for s in found.steps):
         sections += _nothing_added(found, of)
+    if moved := most_moved(found):
+        sections.append(_moved(moved))
     if comparison is not None:
-        sections.append(_overlays(comparison, found.steps))
+        sections.append(_overlays(comparison, found, files))
     elif of.overlays:
         sections.append(Section("Overlays", (Text(of.overlays, "quiet"),)))
     sections.append(_remaining(found, of))
@@ -60,14 +69,15 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     if found.notes:
         sections.append(Section("What to know about this answer", (Points(found.notes),)))
     title = capitalised(headline(found))
-    return Report(title, found.summary, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
+    return Report(title, found.summary, _facts(found, files), tuple(sections), f"Error and residual: {of.residual}.")
 
 
-def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
+def _facts(found: Diagnosis, files: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     machine = found.model_after.machine
     return (
         ("diagnosis of", machine.title),
         ("verdict", VERDICTS[found.verdict]),
+        ("method", method_words(found)),
         (
             "model before",
             f"{found.model_before.identity}, {effect_list([u.name for u in found.model_before.effects])}",
@@ -76,8 +86,13 @@ def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
             "model after",
             f"{found.model_after.identity}, {effect_list([u.name for u in found.model_after.effects])}",
         ),
-        ("fitted to", listed(found.traces)),
-        ("held out", listed(found.holdout) if found.holdout else "none: nothing below was judged on other data"),
+        ("fitted to", listed(trace_names(found.traces, files))),
+        (
+            "held out",
+            listed(trace_names(found.holdout, files))
+            if found.holdout
+            else "none: nothing below was judged on other data",
+        ),
         ("time", f"took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"),
     )
 
@@ -94,16 +109,18 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
         if found.where is not None:
             sections.append(Section("Where they disagree", where_blocks(found.where, found.rmse_fit, of)))
         if found.candidates:
-            picture = evidence_picture(found.candidates, needed=found.significant)
             needed = found.significant
+            fitted, _ = in_order(found.candidates)
+            own = fitted[0].needed if fitted else None  # the others may need more or less
+            picture = evidence_picture(found.candidates, needed=needed if own is None else own)
             words = () if needed is None else (Text(best_tried(found.candidates, needed)),)
             sections.append(Section("What was tried", (*words, picture)))
     return sections
 
 
-def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
-    motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True)
-    taken = any(s.adopted for s in steps)
+def _overlays(comparison: Comparison, found: Diagnosis, files: Mapping[str, str]) -> Section:
+    motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True, files=files)
+    taken = any(s.adopted for s in found.steps)
     text = "Before is the model as it was given; after, its tolerance parameters are fitted" + (
         " as well. What each effect brought by itself stands in the table of the gap. "
         if taken
@@ -113,7 +130,24 @@ def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
         "The simulations here are of the closed loop alone: they are given the set points and the start, and nothing "
         "else of the record."
     )
+    if found.method == "inverse-dynamics":
+        text += " They were made for this page: the answer rests on the balance of torques alone."
     return Section("Measured, before and after", (Text(text), *motion.blocks))
+
+
+def _moved(numbers: Sequence[FittedNumber]) -> Section:
+    rows = tuple(
+        (
+            Cell(n.name),
+            Cell(with_deviation(n.stated, n.deviation, n.unit), number=True),
+            Cell(with_deviation(n.fitted, None, n.unit), number=True),
+            Cell(f"{n.distance:.1f}", number=True),
+        )
+        for n in numbers
+    )
+    caption = "Those that moved furthest, in deviations that the machine file states; five at most."
+    table = Table(("number", "in the file", "fitted", "stated deviations"), rows, caption)
+    return Section("What the fit made of the machine's numbers", (table,))
 
 
 def _remaining(found: Diagnosis, of: Compared) -> Section:
@@ -197,7 +231,7 @@ def _without_experiment(found: Diagnosis) -> str:
         return "Nothing is left to tell apart."
     if found.verdict == "named" or found.method == "output-error":
         return "No further experiment is asked for."
-    text = "Nothing was simulated, so no experiment is proposed, though one may be needed."
+    text = "No rival was simulated, so no experiment is proposed, though one may be needed."
     if isinstance(found.model_before.machine.controller, NoController):
         return text
     return f"{text} Of traces with set points, `daq diagnose --next FILE` simulates the loop and looks for one."

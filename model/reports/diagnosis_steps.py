@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from model.discrepancy.diagnosis import Candidate, Dependence, FoundValue, SignalError, Step, Where
+from model.discrepancy.diagnosis import Candidate, Dependence, SignalError, Step, Where
+from model.discrepancy.explanation.fitted_numbers import stated_beside
 from model.effects.names import capitalised, placed
+from model.machine_model.parameter import Parameter
 from model.reports.diagnosis_map import dependence_picture, map_picture
 from model.reports.diagnosis_pictures import evidence_picture
 from model.reports.diagnosis_words import Compared, gap
@@ -13,8 +15,9 @@ from model.reports.numbers import column, estimate
 from model.reports.page import Block, Cell, Section, Table, Text
 
 
-def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Section]:
-    """Sections of a step, counted from 1. Where the step before added nothing, the map is not shown again."""
+def step_sections(number: int, steps: Sequence[Step], of: Compared, stated: Mapping[str, Parameter]) -> list[Section]:
+    """Sections of a step, counted from 1; `stated` are the numbers of the machine file, by name. Where
+    the step before added nothing, the map is not shown again."""
     step, before = steps[number - 1], steps[: number - 1]
     turn = f"Step {number}: " if len(steps) > 1 else ""
     if before and before[-1].where == step.where:
@@ -24,9 +27,9 @@ def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Sect
     found = [Section(f"{turn}where they disagree", where)]
     found.append(Section(f"{turn}{'what is missing' if step.adopted else 'what was tried'}", _what(step, before)))
     if step.effect is not None and step.adopted:
-        found.append(Section(f"{turn}what adding it did", _shown(step)))
+        found.append(Section(f"{turn}what adding it did", _shown(step, stated)))
     elif step.effect is not None:
-        found.append(Section(f"{turn}what adding it would have done", _refused(step)))
+        found.append(Section(f"{turn}what adding it would have done", _refused(step, stated)))
     return [Section(capitalised(s.title), s.blocks) for s in found]
 
 
@@ -83,26 +86,30 @@ def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _shown(step: Step) -> tuple[Block, ...]:
+def _shown(step: Step, stated: Mapping[str, Parameter]) -> tuple[Block, ...]:
     blocks: list[Block] = [Text(gap(step), "good")]
     if step.parameters:
         caption = "As the record has it." if step.proof is not None else "As the last fit has them."
-        blocks.append(_parameters(step.parameters, caption))
+        blocks.append(_parameters(step, stated, caption))
     return tuple(blocks)
 
 
-def _refused(step: Step) -> tuple[Block, ...]:
+def _refused(step: Step, stated: Mapping[str, Parameter]) -> tuple[Block, ...]:
     because = step.rejected_because or "it did not lower the held-out error"
     blocks: list[Block] = [Text(f"Not taken into the model: {because}.", "warning")]
     if step.parameters:
-        blocks.append(_parameters(step.parameters, "Not in the model: what the fit with this effect came to."))
+        blocks.append(_parameters(step, stated, "Not in the model: what the fit with this effect came to."))
     return tuple(blocks)
 
 
-def _parameters(parameters: dict[str, FoundValue], caption: str) -> Table:
+def _parameters(step: Step, stated: Mapping[str, Parameter], caption: str) -> Table:
+    """The parameters of a step; with what the machine file states, where it does of any."""
+    of_file = {name: stated_beside(step.effect, name, v, stated) for name, v in step.parameters.items()}
     rows = []
-    for name, v in parameters.items():
+    for name, v in step.parameters.items():
         value, interval = estimate(v.value, v.low, v.high)
         shown = "not bounded by these traces" if interval is None else interval
-        rows.append((Cell(name), Cell(value, number=True), Cell(shown, number=True), Cell(v.unit)))
-    return Table(("parameter", "value", "95 % interval", "unit"), tuple(rows), caption)
+        row = (Cell(name), Cell(value, number=True), Cell(shown, number=True), Cell(v.unit))
+        rows.append((*row, Cell(of_file[name] or "–", number=True)) if any(of_file.values()) else row)
+    head = ("parameter", "value", "95 % interval", "unit", *(("in the file",) if any(of_file.values()) else ()))
+    return Table(head, tuple(rows), caption)

@@ -28,9 +28,9 @@ POSITIONS = Compared(
 def _balanced(torque: str) -> Compared:
     return Compared(
         f"{torque} that the model needs − {torque} that was applied",
-        f"Both {torque}s are taken along the recorded motion, and nothing is simulated.",
-        f"There is no overlay, since nothing was simulated: the map and the errors are of {torque}s along the recorded "
-        "motion.",
+        f"Both {torque}s are taken along the recorded motion; no simulation enters the map.",
+        f"There is no overlay, since the loop was not simulated: the map and the errors are of {torque}s along the "
+        "recorded motion.",
     )
 
 

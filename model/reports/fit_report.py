@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from model.base_parameters.result import BaseParameters
 from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
-from model.reports.page import Cell, Report, Section, Table, Text, effect_list, listed
+from model.reports.page import Cell, Report, Section, Table, Text, effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 
-def fit_report(found: FitResult, comparison: Comparison, base: BaseParameters | None = None) -> Report:
+def fit_report(
+    found: FitResult,
+    comparison: Comparison,
+    base: BaseParameters | None = None,
+    files: Mapping[str, str] | None = None,
+) -> Report:
     """The page of a fit.
 
     `comparison` is of the model before and after, on the traces fitted to and held out; `base`, the base parameters of
-    the fitted model on the traces fitted to.
+    the fitted model on the traces fitted to; `files`, the names of the traces' files by number, where they are known.
     """
+    files = files or {}
     sections = [
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
         *(() if base is None else (base_parameter_section(base),)),
         Section("How large the error is", (agreement_table(comparison.models), *_floor_remark(comparison))),
-        motion_section(comparison.signals, [m.label for m in comparison.models]),
+        motion_section(comparison.signals, [m.label for m in comparison.models], files=files),
         Section("How it was done", (_how(found),)),
     ]
     held = [t.trace for t in comparison.models[-1].traces if t.held_out]
@@ -30,8 +38,8 @@ def fit_report(found: FitResult, comparison: Comparison, base: BaseParameters | 
         ("machine", found.model.machine.title),
         ("model", f"{found.model.identity}, from {found.model.lineage.parent or 'none'}"),
         ("effects", effect_list([use.name for use in found.model.effects])),
-        ("fitted to", f"{listed(found.traces)}: {found.samples} samples"),
-        ("held out", listed(held) if held else "none"),
+        ("fitted to", f"{listed(trace_names(found.traces, files))}: {found.samples} samples"),
+        ("held out", listed(trace_names(held, files)) if held else "none"),
         ("search", f"{found.evaluations} evaluations in {found.seconds:.1f} s; {_ended(found)}"),
     )
     return Report(f"Fit of {found.model.machine.title}", _answer(found, comparison), facts, tuple(sections))

@@ -18,8 +18,8 @@ MEASURES = {"closed-loop": "rms error in closed loop", "torques": "rms error of 
 EXPLAINED = {
     "closed-loop": "The simulation is given the set points and the initial posture, and nothing else of the record. A "
     "dash: it does not stay finite.",
-    "torques": "What drives supply is compared with what the recorded motion needs; nothing is simulated. A dash: what "
-    "is needed is not finite.",
+    "torques": "What drives supply is compared with what the recorded motion needs; no simulation enters these errors. "
+    "A dash: what is needed is not finite.",
 }
 """How the errors come about, by `Gap.measure`."""
 MOST_COLUMNS = 3

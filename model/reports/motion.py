@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,7 @@ from model.reports.figures import (
     thinned,
 )
 from model.reports.motion_closer import closer_picture
-from model.reports.page import Cell, Picture, Section, Table, cells
+from model.reports.page import Cell, Picture, Section, Table, cells, trace_names
 from model.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
@@ -36,15 +37,22 @@ ROLES = {True: "held out", False: "fitted to", None: "all"}
 
 
 def motion_section(
-    signals: Sequence[TraceSignals], labels: Sequence[str], most: int = 8, *, closer: bool = False
+    signals: Sequence[TraceSignals],
+    labels: Sequence[str],
+    most: int = 8,
+    *,
+    closer: bool = False,
+    files: Mapping[str, str] | None = None,
 ) -> Section:
     """A section with one figure for each of the first traces: position above, residual below, one column per joint.
 
     Args:
         closer: also the stretch in which the first model is furthest off.
+        files: names of the traces' files, by number, where they are known.
     """
     pictures: list[Picture] = []
-    for one in signals[:most]:
+    for signal in signals[:most]:
+        one = replace(signal, trace=trace_names([signal.trace], files or {})[0])
         pictures.append(_picture(one, labels))
         if closer and (near := closer_picture(one, labels)) is not None:
             pictures.append(near)

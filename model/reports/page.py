@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -121,6 +121,11 @@ def write_report(report: Report, path: Path) -> Path:
     except OSError as error:
         raise SpecError(f"report {path}: cannot be written: {error.strerror}") from error
     return path
+
+
+def trace_names(traces: Iterable[str], files: Mapping[str, str]) -> list[str]:
+    """What a page calls traces: their files by number, where they are known, else their numbers."""
+    return [files.get(trace) or trace for trace in traces]
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:

@@ -2,29 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from model.base_parameters.result import BaseParameters
+from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.explanation.notes import on_drives_at_limit
+from model.discrepancy.explanation.renderer import sentence
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Report, Section, Table, cells, effect_list, listed
+from model.reports.page import Cell, Picture, Report, Section, Table, Text, cells, effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves], base: BaseParameters | None = None) -> Report:
+RESIDUAL = "Error and residual: torque that the model needs − torque that the recorded drive gave."
+"""At the foot of the page."""
+
+
+def torque_report(
+    found: TorqueFit,
+    curves: Sequence[TorqueCurves],
+    base: BaseParameters | None = None,
+    files: Mapping[str, str] | None = None,
+) -> Report:
     """The page; `curves` are those of the fitted model on the traces to draw, `base` its base parameters on those that
-    were fitted to."""
+    were fitted to, `files` the names of the traces' files by number, where they are known."""
+    files = files or {}
     machine = found.model.machine
     sections = (
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
         *(() if base is None else (base_parameter_section(base),)),
-        Section("What is left of the torque", (_error_table(found), *(_picture(c, found) for c in curves))),
+        Section(
+            "What is left of the torque",
+            (*_at_limit(found), _error_table(found, files), *(_picture(c, found, files) for c in curves)),
+        ),
         Section("How it was done", (_how(found),)),
     )
     fitted, held = ([e.trace for e in found.errors if e.held_out is kind] for kind in (False, True))
@@ -32,11 +48,11 @@ def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves], base: BasePa
         ("machine", machine.title),
         ("model", f"{found.model.identity}, from {found.model.lineage.parent or 'none'}"),
         ("effects", effect_list([use.name for use in found.model.effects])),
-        ("fitted to", listed(fitted)),
-        ("held out", listed(held) if held else "none"),
+        ("fitted to", listed(trace_names(fitted, files))),
+        ("held out", listed(trace_names(held, files)) if held else "none"),
         ("search", f"{found.evaluations} evaluations; {'converged' if found.converged else 'did not converge'}"),
     )
-    return Report(f"Fit of torques of {machine.title}", _answer(found), facts, sections)
+    return Report(f"Fit of torques of {machine.title}", _answer(found), facts, sections, RESIDUAL)
 
 
 def _answer(found: TorqueFit) -> str:
@@ -48,12 +64,19 @@ def _answer(found: TorqueFit) -> str:
     )
 
 
-def _error_table(found: TorqueFit) -> Table:
+def _at_limit(found: TorqueFit) -> tuple[Text, ...]:
+    """Drives that stood at limits that the file does not state, with their share of the time."""
+    return tuple(
+        Text(sentence(note_words(note)), "warning") for note in on_drives_at_limit(found.at_limit, found.unknown_joints)
+    )
+
+
+def _error_table(found: TorqueFit, files: Mapping[str, str]) -> Table:
     rows = []
-    for one in found.errors:
+    for one, name in zip(found.errors, trace_names([e.trace for e in found.errors], files), strict=True):
         for joint, left, torque in zip(found.model.machine.modelled_joints, one.rms, one.torque, strict=True):
             kind = Cell("held out" if one.held_out else "in sample")
-            rows.append((Cell(one.trace), kind, *cells(str(joint), f"{left:.4g}", f"{torque:.4g}")))
+            rows.append((Cell(name), kind, *cells(str(joint), f"{left:.4g}", f"{torque:.4g}")))
     return Table(
         ("trace", "", "joint", "rms left", "rms of the torque"),
         tuple(rows),
@@ -61,7 +84,7 @@ def _error_table(found: TorqueFit) -> Table:
     )
 
 
-def _picture(one: TorqueCurves, found: TorqueFit) -> Picture:
+def _picture(one: TorqueCurves, found: TorqueFit, files: Mapping[str, str]) -> Picture:
     def draw(figure: Figure) -> None:
         for axes, column, joint in zip(
             panels(figure, 1, len(one.joints))[0], range(len(one.joints)), one.joints, strict=True
@@ -76,7 +99,10 @@ def _picture(one: TorqueCurves, found: TorqueFit) -> Picture:
             axes.set_ylabel(f"torque / {unit}" if unit == "N·m" else "force / N")
             axes.legend()
 
-    return Picture(drawn(draw, 2.4), f"{one.trace}: torque of the recorded drive, and what the model leaves of it.")
+    return Picture(
+        drawn(draw, 2.4),
+        f"{trace_names([one.trace], files)[0]}: torque of the recorded drive, and what the model leaves of it.",
+    )
 
 
 def _how(found: TorqueFit) -> Table:

@@ -26,7 +26,7 @@ from daq.contracts.machine import (
     Sensor,
 )
 from daq.contracts.quantity import Quantity
-from firmware_protocol.invalid import first_invalid
+from daq.contracts.refused import refused_words
 from model.arrays import Floats
 from model.robot_files.denavit_hartenberg import Frames, Parameters, frames_of
 from model.robot_files.description import DescribedJoint
@@ -111,8 +111,7 @@ def machine_of_arm(
             limits=Limits(joints=tuple(_limits(joint.joint) for joint in arm.joints)),
         )
     except ValidationError as error:
-        first = first_invalid(error)
-        raise SpecError(f"{source}: {first.where('machine', first=1)}: {first.message}") from error
+        raise SpecError(f"{source}: {refused_words(error, Machine, 'machine')}") from error
 
 
 def _known(names: Sequence[str], drives: Machine | None, parts: Mapping[str, JointParts]) -> list[JointParts]:

@@ -83,7 +83,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     """
     joints = machine.modelled_joints
     if len(trace) < 3:
-        raise TraceError(f"trace {trace.record.trace_id}: {len(trace)} samples; at least 3 are needed")
+        raise TraceError(f"{trace.called}: {len(trace)} samples; at least 3 are needed")
     columns = [trace.column(j) for j in joints]
     measured = trace.position[:, columns]
     _check_unit(trace, measured, machine)
@@ -92,11 +92,9 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     count = int(np.ceil(rows[-1] - 1e-6)) + 1
     controlled = not isinstance(machine.controller, NoController)
     if controlled and trace.set_point is None and trace.drive is None:
-        raise TraceError(f"trace {trace.record.trace_id}: has neither set points nor drive: nothing moves the model")
+        raise TraceError(f"{trace.called}: has neither set points nor drive: nothing moves the model")
     if not controlled and trace.drive is None:
-        raise TraceError(
-            f"trace {trace.record.trace_id}: has no drive, and {machine.name} has no controller to form one"
-        )
+        raise TraceError(f"{trace.called}: has no drive, and {machine.name} has no controller to form one")
     wanted = measured if trace.set_point is None else trace.set_point[:, columns]
     set_points = _held(wanted, _taken_from(trace, rows), count)
     drive = _held(np.zeros_like(measured) if trace.drive is None else trace.drive[:, columns], rows, count)
@@ -131,7 +129,7 @@ def _check_unit(trace: Trace, measured: Floats, machine: Machine) -> None:
         reads_angles = sensor is not None and sensor.measures == "position"  # a tachometer's shaft may turn for ever
         if machine.joint(joint).kind == "revolute" and reads_angles and largest > LARGEST_ANGLE:
             raise TraceError(
-                f"trace {trace.record.trace_id}: joint {joint} reaches {largest:.4g} rad; degrees? "
+                f"{trace.called}: joint {joint} reaches {largest:.4g} rad; degrees? "
                 f"angles must be in rad, up to {LARGEST_ANGLE:g}"
             )
 

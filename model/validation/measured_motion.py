@@ -72,9 +72,9 @@ def smooth_motion(model: Model, trace: Trace, smoothing: float | None = None) ->
         SpecError: for a trace without motion.
     """
     if trace.drive is None:
-        raise TraceError(f"trace {trace.record.trace_id}: has no recorded drive, which the time-domain form needs")
+        raise TraceError(f"{trace.called}: has no recorded drive, which the time-domain form needs")
     if len(trace) < SHORTEST:
-        raise TraceError(f"trace {trace.record.trace_id}: {len(trace)} samples; at least {SHORTEST} are needed")
+        raise TraceError(f"{trace.called}: {len(trace)} samples; at least {SHORTEST} are needed")
     inputs = inputs_of(trace, model.machine)
     columns = [trace.column(j) for j in inputs.joints]
     grid = np.arange(len(inputs), dtype=np.float64)

@@ -44,7 +44,7 @@ def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: s
         ("--joints turn --tip foot", "--tip foot: is no link that the last joint carries; it carries column, boom"),
         ("--joints turn --drives nothing.toml", "machine 'nothing.toml': no such file"),
         ("--joints turn --drives ma2000", "drives of ma2000: none of its joints (waist, shoulder"),
-        ("--joints turn --name Turn", "arm.urdf: name: String should match pattern"),
+        ("--joints turn --name Turn", "arm.urdf: name: found 'Turn', must match"),
         ("--joints turn -o arm.urdf", "arm.urdf: is there already; name another file with -o"),
         ("--joints turn -o there/arm.toml", "there is no folder"),
     ],
@@ -90,6 +90,7 @@ zero
 
 weird
 other
+volts
 V
 2.5
 0.01
@@ -107,6 +108,7 @@ def test_what_is_asked_becomes_part_of_the_file(urdf: str) -> None:
     assert done.returncode == 0, done.stderr
     assert "1 'zero': write a number" in done.stderr
     assert "'weird': answer torque, current, other, or Enter" in done.stderr
+    assert "'volts': answer V, A, N·m, N, count, %, 1, or Enter for V" in done.stderr
     turn, lift = load_machine("reach-arm.toml").joints
     assert turn.drive.kind == "current"
     assert (turn.drive.torque_constant.value, turn.drive.gear_ratio.value) == (0.05, 100.0)

@@ -47,6 +47,22 @@ def _errors_follow_record(v: Values) -> str:
     )
 
 
+def _gravity_magnitude(v: Values) -> str:
+    return (
+        f"the machine file's gravity is {v['magnitude']:.4g} m/s² and not 9.81 m/s², as on the ground: it is stated in "
+        "m/s², along the axes of the base"
+    )
+
+
+def _gravity_reversed(v: Values) -> str:
+    stated = ", ".join(f"{g:.4g}" for g in v["gravity"])
+    return (
+        f"the machine file's gravity, [{stated}] m/s², points the other way than these records say: turned round, it "
+        f"takes {v['removed']:.0%} off the mean square of what the model as given leaves. Check `gravity`, the posture "
+        "in which positions are 0, their direction, and the sign of the drive"
+    )
+
+
 def _larger_noise(v: Values) -> str:
     def of(joint: Values) -> str:
         apart = joint["apart"]
@@ -159,10 +175,8 @@ def _torque_left(v: Values) -> str:
 
 
 def _unfinished_record(v: Values) -> str:
-    return (
-        f"trace {v['trace']} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are "
-        "were used"
-    )
+    called = v.get("file") or f"trace {v['trace']}"
+    return f"{called} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are were used"
 
 
 def _rounded(value: float, unit: str) -> str:
@@ -174,6 +188,8 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "drive-at-limit": _drive_at_limit,
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
+    "gravity-magnitude": _gravity_magnitude,
+    "gravity-reversed": _gravity_reversed,
     "larger-noise": _larger_noise,
     "no-experiment-left": _no_experiment_left,
     "not-looked-for": _not_looked_for,

@@ -31,6 +31,7 @@ def on_unfinished(traces: Sequence[Trace]) -> tuple[Note, ...]:
             kind="unfinished-record",
             values={
                 "trace": t.record.trace_id,
+                **({"file": t.file} if t.file else {}),
                 "outcome": t.record.outcome,
                 "seconds": float(t.time[-1] - t.time[0]),
             },
@@ -38,6 +39,17 @@ def on_unfinished(traces: Sequence[Trace]) -> tuple[Note, ...]:
         for t in traces
         if t.record.outcome not in (None, "complete")
     )
+
+
+def on_drives_at_limit(shares: Sequence[tuple[int, float]], unknown_joints: Sequence[int]) -> tuple[Note, ...]:
+    """A note on drives that stood at limits of which no file tells; none where there are none.
+
+    Args:
+        shares: joints, with the share of the time (0 to 1) that their drives stood there. unknown_joints: those of
+            which a record tells nothing for that reason.
+    """
+    values = {"shares": list(shares), "unknown_joints": list(unknown_joints)}
+    return (Note(kind="drive-at-limit", values=values),) if shares else ()
 
 
 def on_stated_numbers(numbers: Iterable[_Expected], values: Mapping[str, float]) -> tuple[Note, ...]:

@@ -245,8 +245,12 @@ def what_is_left(remaining: Sequence[RemainingShape]) -> str:
     return f"no clear shape: the best, {shape_words(best)}, explains {share}, but {few}"
 
 
-def best_tried(candidates: Sequence[Candidate], needed: float) -> str:
-    """How near the best of the candidates, none of which was added, has come to the evidence that is needed."""
+def best_tried(candidates: Sequence[Candidate], significant: float) -> str:
+    """How near the best of the candidates, none of which was added, has come to the evidence that it needs.
+
+    Args:
+        significant: evidence that a candidate needs which does not say what it needs itself: the most for a first one.
+    """
     fitted, probed = in_order(candidates)
     best = (fitted or probed)[0]
     name = effect_on(best.effect, best.joints)
@@ -254,12 +258,16 @@ def best_tried(candidates: Sequence[Candidate], needed: float) -> str:
     if not fitted:
         return (
             f"None of the candidates promised enough to be fitted. {count}, {name}, promises evidence of "
-            f"{best.evidence:.0f}; an effect is named from {needed:g}."
+            f"{best.evidence:.0f}; an effect is named from {significant:g}."
         )
-    told = f"{count}, {name}, has evidence of {best.evidence:.0f}"
-    if best.evidence >= needed:
-        return f"{told}. It is above the {needed:g} from which an effect is named, but takes off no more than noise."
-    return f"{told}; an effect is named from {needed:g}."
+    told, total = f"{count}, {name}, has evidence of {best.evidence:.0f}", best.total
+    if best.evidence_held_out is not None:
+        told += f" ({total:.0f} with what held-out traces say)"
+    needed = significant if best.needed is None else best.needed
+    subject = "an effect is" if best.needed is None else "it would be"
+    if total >= needed:
+        return f"{told}. It is above the {needed:.3g} from which {subject} named, but takes off no more than noise."
+    return f"{told}; {subject} named from {needed:.3g}."
 
 
 def _nothing(rejected: Step | None) -> str:
@@ -441,8 +449,10 @@ def not_a_finding(answer: Diagnosis, where: Where) -> str:
     if answer.verdict != "nothing-significant":
         return ""
     certain = "σ says how certain the dependence is, not how large: no joint is off by more than noise. "
-    tried = sorted((c for s in answer.steps for c in s.candidates), key=lambda c: -c.evidence)[:1]
-    needed = [] if answer.significant is None else [f"an effect is named from evidence {answer.significant:.0f} on"]
+    last = [c for c in answer.candidates if c.refitted]
+    tried = sorted([*last, *(c for s in answer.steps for c in s.candidates)], key=lambda c: -c.total)[:1]
+    line = next((c.needed for c in tried if c.needed is not None), answer.significant)
+    needed = [] if line is None else [f"an effect is named from evidence {line:.0f} on"]
     best = [f"the best, {placed(c.effect, c.joints)}, has evidence {c.evidence:.0f}" for c in tried]
     because = f": {'; '.join((*needed, *best))}" if needed or best else ""
     return f"{'' if where.joint is not None else certain}This is not a finding{because}."

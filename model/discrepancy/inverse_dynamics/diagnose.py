@@ -15,6 +15,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.notes import on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.gravity_doubts import on_gravity_along
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
@@ -142,6 +143,7 @@ class _Records:
         )
         steps = TorqueWorkflow(model, case, self.controller, progress, self.cancel)
         steps.run()
+        steps.notes += on_gravity_along(model, records)
         steps.notes += on_unfinished((*self.traces, *self.held_out))
         fitted, held = ([t.record.trace_id for t in some] for some in (self.traces, self.held_out))
         return steps.answer(fitted, held, cutoff)

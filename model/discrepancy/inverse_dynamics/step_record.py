@@ -12,7 +12,13 @@ from model.discrepancy.grounds import Reason
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
-from model.discrepancy.inverse_dynamics.judging import SUSPECTED, Judgement, needed_lead
+from model.discrepancy.inverse_dynamics.judging import (
+    SUSPECTED,
+    Judgement,
+    explains_most,
+    needed_evidence,
+    needed_lead,
+)
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
@@ -71,6 +77,17 @@ def list_candidates(case: TorqueCase, found: Findings) -> tuple[Candidate, ...]:
         if (p.trial.effect, p.trial.joints) not in done
     ]
     return (*fitted, *others[: max(0, SHOWN - len(fitted))])
+
+
+def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
+    """The candidates of a step that added nothing; the best of the fitted ones with the evidence that it needed."""
+    listed = list_candidates(standing.case, found)
+    if not found.fitted:
+        return listed
+    best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
+    chosen = found.fitted[best]
+    needed = needed_evidence(standing, chosen, explains_most=explains_most(standing, chosen))
+    return (*listed[:best], listed[best].model_copy(update={"needed": needed}), *listed[best + 1 :])
 
 
 def _candidate(case: TorqueCase, c: Fitted) -> Candidate:

@@ -18,7 +18,7 @@ from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
-from model.discrepancy.inverse_dynamics.step_record import list_candidates, record_step
+from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import withdrawn
@@ -95,7 +95,7 @@ class TorqueWorkflow:
             if not _has_more(self.found, before):
                 self.found = self._adopt_pair(before, self.found, findings)
             if not _has_more(self.found, before):
-                self.tried = list_candidates(self.case, findings)
+                self.tried = list_tried(self.refitter.standing(self.found), findings)
                 self.suspicion = suspect(self.refitter.standing(self.found), findings)
                 self.at_bounds = self._on_sizes_at_bounds(findings)
                 break

@@ -32,7 +32,10 @@ def test_people_read_the_verdict_first_then_where_what_added_shown_asked(answer:
     assert lines[0] == "NAMED  Coulomb friction on joint 2, 8 N·m (7.8 to 8.2)"
     assert max(map(len, lines)) <= WIDTH
     labels = [line.split()[0] for line in lines if line and not line.startswith(" ")]
-    assert labels[:5] == ["NAMED", "where", "what", "added", "shown"]
+    assert labels[:6] == ["NAMED", "method", "where", "what", "added", "shown"]
+    assert lines[2] == "method   Simulation of the closed loop (output error)."
+    torques = answer_text(answer.model_copy(update={"method": "inverse-dynamics"})).splitlines()
+    assert torques[2] == "method   Balance of torques along the recorded motion (inverse dynamics)."
     assert labels.index("ask") > labels.index("shown")
     assert "joint2.coulomb_friction.torque = 8 N·m (95 %: 7.8 to 8.2)" in text
     assert "98.2 % of the held-out variance beyond noise is gone" in text

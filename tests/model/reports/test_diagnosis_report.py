@@ -74,6 +74,35 @@ def test_the_gap_of_the_closed_loop_comes_first(answer: tuple[Diagnosis, Compari
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_the_page_says_which_method_was_used_and_denies_no_simulation_that_it_shows(
+    answer: tuple[Diagnosis, Comparison],
+) -> None:
+    found, comparison = answer
+    assert ("method", "simulation of the closed loop (output error)") in diagnosis_report(found).facts
+    torques = found.model_copy(update={"method": "inverse-dynamics"})
+    report = diagnosis_report(torques, comparison)
+    assert ("method", "balance of torques along the recorded motion (inverse dynamics)") in report.facts
+    said = words(html(report))
+    assert "They were made for this page: the answer rests on the balance of torques alone." in said
+    assert "othing is simulated" not in said
+    assert "othing was simulated" not in said
+    assert "They were made for this page" not in words(html(diagnosis_report(found, comparison)))
+    assert "There is no overlay, since the loop was not simulated" in words(html(diagnosis_report(torques)))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_page_calls_traces_by_their_files_where_these_are_known(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, comparison = answer
+    (fitted,), (held,) = found.traces, found.holdout
+    report = diagnosis_report(found, comparison, {fitted: "bench_1.csv"})
+    assert ("fitted to", "bench_1.csv") in report.facts
+    assert ("held out", held) in report.facts
+    said = words(html(report))
+    assert "bench_1.csv (fitted to). Above: measured" in said
+    assert "bench_1.csv, joint 2" in said
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_step_that_was_not_taken_says_why(answer: tuple[Diagnosis, Comparison]) -> None:
     found, _ = answer
     step = found.steps[0].model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})

@@ -9,7 +9,7 @@ import pytest
 
 from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
 from model.discrepancy.explanation.note_words import note_words
-from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.notes import on_drives_at_limit, on_named_numbers, on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
 from model.discrepancy.grounds import Note, NoteKind, PatternKind
 from model.discrepancy.output_error.observation import observe
@@ -31,6 +31,16 @@ def test_a_record_that_ended_early_is_named() -> None:
     assert note.values == {"trace": "broken", "outcome": "fault", "seconds": seconds}
     assert note_words(note).startswith("trace broken was not recorded to its end (fault)")
     assert f"{seconds:.1f} s" in note_words(note)
+    (note,) = on_unfinished([replace(broken, file="runs/one.csv")])
+    assert note_words(note).startswith("runs/one.csv was not recorded to its end (fault)")
+
+
+def test_a_drive_at_its_limit_is_told_with_its_share_of_the_time() -> None:
+    assert on_drives_at_limit((), ()) == ()
+    (note,) = on_drives_at_limit(((2, 0.126),), (2,))
+    words = note_words(note)
+    assert "stands at its largest value (13% of joint 2's time)" in words
+    assert words.endswith("a record tells nothing of joint 2, which is not examined there")
 
 
 def test_numbers_that_were_named_are_told_beside_what_is_stated_and_are_no_warning() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
+from daq_cli.models.diagnosis_text import answer_text
 from model.discrepancy.workflow import diagnose
 from model.machine_model.model import base_model
 
@@ -25,6 +26,11 @@ def written(folder: Path, name: str = "motor_bench_rig") -> list[Path]:
     rig = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(rig)
     return list(rig.write(folder))
+
+
+def without_numbers(text: str) -> str:
+    """An answer's words and layout; its numbers differ in their last digits from one processor to the next."""
+    return re.sub(r" +", " ", re.sub(r"-?\d+(\.\d+)?", "#", text))
 
 
 def test_the_guide_shows_the_example_machine() -> None:
@@ -52,6 +58,9 @@ def test_the_example_names_the_friction_that_the_rig_hides(tmp_path: Path) -> No
     assert value.value == pytest.approx(0.008, rel=0.03)
     before, after = found.steps[0].rmse_holdout[0].before, found.steps[0].rmse_holdout[0].after
     assert after < 0.2 * before
+    guide = (ROOT / "docs" / "one-joint-rig.md").read_text("utf-8")
+    (sample,) = re.findall(r"```\n(NAMED.*?)```", guide, re.DOTALL)
+    assert without_numbers(answer_text(found)).startswith(without_numbers(sample.rstrip())), "as the guide shows it"
 
 
 def test_a_sliding_axis_names_its_guides_and_its_magnets_and_nothing_else(tmp_path: Path) -> None:

@@ -4439,7 +4439,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "larger-noise" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "size-at-bound" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "gravity-magnitude" | "gravity-reversed" | "larger-noise" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "size-at-bound" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
             /**
              * Values
              * @default {}
@@ -6403,8 +6403,6 @@ export interface components {
             joints: number[];
             /** Evidence */
             evidence: number;
-            /** Evidence Held Out */
-            evidence_held_out?: number | null;
             /** Misfit */
             misfit?: number | null;
             /**
@@ -6419,6 +6417,10 @@ export interface components {
             parameters?: {
                 [key: string]: components["schemas"]["FoundValue"];
             };
+            /** Evidence Held Out */
+            evidence_held_out?: number | null;
+            /** Needed */
+            needed?: number | null;
             /** Called */
             called: string;
         };

@@ -32,7 +32,8 @@ export function turnOf(step: DiagnosisStep): Turn {
 /** The last turn of a diagnosis that added nothing; null where something was added, or nothing was tried. */
 export function turnWithoutStep(found: DiagnosisData): Turn | null {
   if (found.steps.length > 0 || found.candidates.length === 0) return null;
-  const { candidates, significant: needed } = found;
+  const { candidates, significant } = found;
+  const needed = candidates.find((one) => one.needed != null)?.needed ?? significant;
   return { candidates, group: [], effect: null, joints: [], evidence: 0, margin: 0, needed };
 }
 

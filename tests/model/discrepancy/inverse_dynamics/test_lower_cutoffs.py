@@ -1,0 +1,83 @@
+"""Which effects may be named below a lower cutoff: none whose torque jumps, as it is smeared there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from model.discrepancy.diagnosis import Candidate, Diagnosis
+from model.discrepancy.inverse_dynamics import diagnose
+from model.discrepancy.inverse_dynamics.diagnose import JUMPING, LOOKS
+from model.effects.library import library
+from model.machine_model.model import base_model
+from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
+from tests.model.discrepancy.steps import step
+
+MODEL = base_model(slide_machine())
+
+
+def answer(*effects: str, group: tuple[str, ...] = ()) -> Diagnosis:
+    """An answer that names effects, one after the other, the last in a group."""
+    members = tuple(Candidate(effect=name, joints=(1,), evidence=40.0) for name in group)
+    steps = tuple(step(name, group=members if name == effects[-1] else ()) for name in effects)
+    return Diagnosis(
+        verdict="ambiguous" if group else "named" if effects else "nothing-significant",
+        summary="",
+        steps=steps,
+        model_before=MODEL,
+        model_after=MODEL,
+        traces=("a",),
+        seconds=0.0,
+        robot_seconds=0.0,
+    )
+
+
+@dataclass
+class Below:
+    """Records of which each look has its own answer."""
+
+    answers: list[Diagnosis]
+    looked: list[float] = field(default_factory=list)
+
+    def bears(self, cutoff: float) -> bool:
+        return cutoff > 0.0
+
+    def below(self, cutoff: float, progress: Any) -> Diagnosis:
+        progress(1.0, "done")
+        self.looked.append(cutoff)
+        return self.answers[len(self.looked) - 1]
+
+
+def first_finding(*answers: Diagnosis) -> tuple[Diagnosis, int]:
+    """The answer that is given, and how many cutoffs were looked at."""
+    work: Any = Below(list(answers))
+    return diagnose._first_finding(work, 12.0, lambda *_: None), len(work.looked)
+
+
+@pytest.mark.parametrize("effect", [*sorted(JUMPING), "coulomb_friction", "stribeck_friction"])
+def test_an_effect_that_jumps_is_not_named_below_a_lower_cutoff(effect: str) -> None:
+    nothing = answer()
+    found, looks = first_finding(nothing, answer(effect), answer("spring", effect))
+    assert found is nothing
+    assert looks == len(LOOKS)
+    found, _ = first_finding(nothing, answer("spring", group=("spring", effect)), nothing)
+    assert found is nothing, "nor where it may be one of a group"
+
+
+def test_an_effect_that_jumps_is_named_below_the_highest_cutoff() -> None:
+    found, looks = first_finding(answer("dead_zone"))
+    assert [s.effect for s in found.steps] == ["dead_zone"]
+    assert looks == 1
+
+
+def test_a_slow_effect_is_named_below_the_first_cutoff_that_shows_it() -> None:
+    slow = answer("potentiometer_gain")
+    found, looks = first_finding(answer(), slow)
+    assert found is slow
+    assert looks == 2
+
+
+def test_the_effects_that_jump_are_of_the_library() -> None:
+    assert set(library()) >= JUMPING
