@@ -16,6 +16,7 @@ from server.store.engine import Store, migrations
 from server.store.experiments import ExperimentStore
 from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at
 from tests.server.inside import service_inside
+from tests.server.polling import until
 
 PEOPLE = {"vera": "viewer", "anna": "operator", "bert": "operator", "olga": "owner", "ada": "admin"}
 
@@ -69,8 +70,8 @@ def test_owners_and_admins_change_anybody_s(people: dict[str, Person], name: str
 
 def test_a_schedule_has_an_owner_too_and_so_have_its_runs(people: dict[str, Person]) -> None:
     made = people["anna"].ask("POST", "/schedules", {"spec": SPEC, "every": 86400}).json()
-    while not (runs := people["bert"].ask("GET", f"/experiments?schedule={made['id']}").json()["items"]):
-        pass  # the queue submits it
+    begun = until(people["bert"].robot, f"/experiments?schedule={made['id']}", lambda found: found["items"])
+    runs = begun["items"]  # the queue submits it
     assert (runs[0]["owner"], runs[0]["submitted_by"]) == ("anna", f"schedule {made['id']}")
     path = f"/schedules/{made['id']}"
     assert kind_of(people["bert"].ask("PATCH", path, {"active": False})) == (403, "owner-needed")

@@ -26,6 +26,7 @@ from server.store.engine import Store
 from server.store.experiments import ExperimentStore, NotApprovedError
 from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at, tokens_of
 from tests.server.inside import service_inside
+from tests.server.migrated import migrated_store
 from tests.server.polling import until
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
@@ -60,8 +61,7 @@ class WhatBegins(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.folder = tempfile.TemporaryDirectory()
-        self.database = Store(f"sqlite:///{Path(self.folder.name) / 'service.sqlite'}")
-        self.database.migrate()
+        self.database = migrated_store(Path(self.folder.name) / "service.sqlite")
         self.store = ExperimentStore(self.database)
         self.review = next(iter(REVIEWS.values()))
         self.known: dict[str, Known] = {}
@@ -335,8 +335,7 @@ def test_a_simulated_arm_needs_none_and_a_service_without_review_takes_none(
         robot.post("/connect")
         made = robot.post("/experiments", json={"spec": SPEC}).json()
         assert made["needs_approval_of"] is None
-        while robot.get(f"/experiments/{made['id']}?wait=5").json()["state"] != "done":
-            pass
+        until(robot, f"/experiments/{made['id']}?wait=5", lambda found: found["state"] == "done")
     with service_inside(tmp_path / "b", SystemClock(), monkeypatch) as robot:
         made = robot.post("/experiments", json={"spec": SPEC, "at": LATER}).json()
         answer = robot.put(f"/experiments/{made['id']}/approval", json={"content": "0" * 64})
