@@ -12,7 +12,7 @@ from pathlib import Path
 MARK = "MA2000_DAQ_TESTS"
 """Environment variable that the tests' processes inherit: it tells them even when their parent has gone."""
 
-GRACE_S = 20.0
+GRACE_S = 10.0
 """How long what is about to end may still take: seconds, where many processes share a core."""
 
 
