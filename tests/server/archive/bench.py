@@ -56,7 +56,7 @@ class Bench:
         self.told: list[str] = []
         self.counted: list[tuple[str, str, int]] = []
         self._changed = threading.Condition()
-        found = settings_of(bucket, url, **({"timeout": 0.3} | settings))
+        found = settings_of(bucket, url, **settings)
         self.service = ArchiveService(
             ArchiveContext(
                 robot=ROBOT,
