@@ -12,8 +12,8 @@ from pathlib import Path
 MARK = "MA2000_DAQ_TESTS"
 """Environment variable that the tests' processes inherit: it tells them even when their parent has gone."""
 
-GRACE_S = 2.0
-"""How long what is about to end may still take."""
+GRACE_S = 10.0
+"""How long what is about to end may still take: seconds, where many processes share a core."""
 
 
 def mark_this_process() -> None:

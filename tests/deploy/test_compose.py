@@ -17,6 +17,7 @@ from distributed import Client
 
 from tests.deploy.composition import OWN_IMAGE, RAMP, SECRETS, Composition, composition, ended, image
 from tests.repository.tracked import ROOT
+from tests.server.polling import until
 
 SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
 
@@ -25,8 +26,7 @@ SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
 def test_an_experiment_is_recorded_archived_and_fitted_by_the_worker(running: Composition, api: httpx.Client) -> None:
     made = ended(api, f"/experiments/{api.post('/experiments', json={'spec': RAMP}).json()['id']}")
     assert made["state"] == "done", made
-    while api.get(f"/traces/{made['trace']}/archive").json()["archived"] is None:
-        assert running.processes["service"].poll() is None
+    until(api, f"/traces/{made['trace']}/archive", lambda kept: kept["archived"], process=running.processes["service"])
     bucket = running.services["service"]["environment"]["DAQ_ARCHIVE__BUCKET"]
     stored = running.stores["objects"].objects(bucket)
     file = running.folder / "data" / "traces" / api.get(f"/traces/{made['trace']}").json()["entry"]["file"]

@@ -20,6 +20,7 @@ from grafana_foundation_sdk.models.dashboard import Dashboard
 from tests.deploy.composition import RAMP, Composition, ended
 from tests.deploy.expressions import OF_PROMETHEUS, Scraped, wrong
 from tests.repository.tracked import ROOT
+from tests.server.polling import until
 
 DEPLOY = ROOT / "deploy"
 RULES = DEPLOY / "prometheus-rules.yaml"
@@ -36,8 +37,7 @@ def scraped(running: Composition, api: httpx.Client) -> Scraped:
     assert made["state"] == "done", made
     job = api.post("/jobs", json={"kind": "compare", "traces": [made["trace"]], "models": ["machine"]}).json()
     assert ended(api, f"/jobs/{job['id']}")["state"] == "done"
-    while api.get(f"/traces/{made['trace']}/archive").json()["archived"] is None:
-        assert running.processes["service"].poll() is None
+    until(api, f"/traces/{made['trace']}/archive", lambda kept: kept["archived"], process=running.processes["service"])
     assert api.post("/stop").is_success
     assert httpx.get(str(api.base_url), headers={"Authorization": "Bearer nobody-knows-this"}).status_code == 401
     while not (found := _metrics(running, api)).labels.get("daq_stops_total"):

@@ -14,6 +14,7 @@ import pytest
 from daq.traces.reader import read_trace
 from tests.deploy.composition import Composition
 from tests.repository.tracked import ROOT
+from tests.server.polling import until
 
 FIRST = [sys.executable, str(ROOT / "deploy" / "first_process.py")]
 LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 60.0}, "joints": [2]}
@@ -24,12 +25,12 @@ def test_a_killed_service_leaves_a_whole_trace_before_its_container_ends(
     running: Composition, api: httpx.Client
 ) -> None:
     made = api.post("/experiments", json={"spec": LONG}).json()["id"]
-    while " of " not in api.get(f"/experiments/{made}", params={"wait": 0.2}).json()["progress_text"]:
-        assert running.processes["service"].poll() is None
+    service = running.processes["service"]
+    until(api, f"/experiments/{made}", lambda one: " of " in one["progress_text"], {"wait": 0.2}, service)
     first = running.processes.pop("service")
     children = Path(f"/proc/{first.pid}/task/{first.pid}/children").read_text("utf-8").split()
-    (service,) = (int(child) for child in children if b"serve" in Path(f"/proc/{child}/cmdline").read_bytes())
-    os.kill(service, signal.SIGKILL)
+    (serving,) = (int(child) for child in children if b"serve" in Path(f"/proc/{child}/cmdline").read_bytes())
+    os.kill(serving, signal.SIGKILL)
     assert first.wait(30) == 128 + signal.SIGKILL
     traces = running.folder / "data" / "traces"
     assert list(traces.rglob("*.part")) == []

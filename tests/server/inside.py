@@ -25,6 +25,7 @@ from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.clock import SystemClock
 from server.services import Services
+from tests.server.migrated import place_database
 from tests.server.service import MOCK
 
 ANSWER_WITHIN = 100.0
@@ -76,6 +77,8 @@ def service_inside(
         archive=archive or ArchiveSettings(),
         notifications=notifications or NotificationSettings(),
     )
+    if database is None:
+        place_database(folder / "service" / "service.sqlite")
     services = Services(settings, clock)
     gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, audit=services.audit)
     server = _Server(uvicorn.Config(make_app(services, gate), log_config=None, lifespan="on"))

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from subprocess import Popen
 from typing import Any
 
 import httpx
 
 
-def until(client: httpx.Client, path: str, is_so: Callable[[Any], bool]) -> Any:
+def until(
+    client: httpx.Client,
+    path: str,
+    is_so: Callable[[Any], bool],
+    params: Mapping[str, float] | None = None,
+    process: Popen[Any] | None = None,
+) -> Any:
     """Reads `path` until its JSON `is_so`, and returns that. A service that refuses to be asked so often (429) is asked
-    again. The test's own time limit ends the wait."""
+    again. The test's own time limit ends the wait, and so does the end of `process`, without which it is in vain."""
     while True:
-        answer = client.get(path)
-        if answer.status_code == httpx.codes.TOO_MANY_REQUESTS:
-            continue
-        assert answer.status_code == httpx.codes.OK, answer.text
-        if is_so(body := answer.json()):
-            return body
+        answer = client.get(path, params=params)
+        if answer.status_code != httpx.codes.TOO_MANY_REQUESTS:
+            assert answer.status_code == httpx.codes.OK, answer.text
+            if is_so(body := answer.json()):
+                return body
+        assert process is None or process.poll() is None, "the process has ended"

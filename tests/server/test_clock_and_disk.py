@@ -63,9 +63,8 @@ def test_a_clock_that_is_set_back_while_experiments_wait_reorders_and_loses_noth
     assert api.post("connect").status_code == 200
     api.post("queue/resume", json={})
     for number in made:
-        while (state := api.get(f"experiments/{number}", params={"wait": 10}).json()["state"]) in ("queued", "running"):
-            pass
-        assert state == "done"
+        ended = until(api, f"experiments/{number}", lambda one: one["state"] not in ("queued", "running"), {"wait": 10})
+        assert ended["state"] == "done"
     started = [one["experiment"] for one in _listed(api, "events?limit=200") if one["text"] == "started"]
     assert started == made[::-1]  # the newest first
     assert {one["experiment"] for one in _listed(api, "traces")} == set(made)
@@ -76,8 +75,7 @@ def test_what_waits_for_a_moment_waits_longer_when_the_clock_is_set_back(api: ht
     in_a_minute = datetime.now(UTC) + timedelta(minutes=1)
     later = _submit(api, at=in_a_minute.isoformat())
     schedule = api.post("schedules", json={"spec": SHORT, "every": 3600}).json()
-    while not (runs := _listed(api, f"experiments?schedule={schedule['id']}")):
-        pass
+    runs = until(api, f"experiments?schedule={schedule['id']}", lambda found: found["items"])["items"]
     clock.ahead = timedelta(days=-1)
     assert api.get(f"experiments/{later}").json()["state"] == "queued"
     clock.ahead = timedelta(hours=2)

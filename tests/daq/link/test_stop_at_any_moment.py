@@ -11,6 +11,10 @@ from firmware_protocol.framing import FrameDecoder
 from firmware_protocol.joints import JointReading
 from tests.daq.link.scripted import frame_of
 
+PATIENCE = 60.0
+"""Period (s) of the links: how long a request waits by itself for a reply that does not come."""
+WITHIN = 20.0
+"""Time (s) within which a thread is woken by a reply, on a machine that does much else: sooner than by its patience."""
 STOPPED = Stopped(9, (500, 501, 502, 503, 504, 505))
 SNAPSHOT = Snapshot(10, 1, ((1, JointReading(500, 2048, 0, 0)),))
 
@@ -61,15 +65,15 @@ class SampleWaitsForStop:
 def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> None:
     bench = SampleWaitsForStop()
     link = Link(bench)
-    link.set_period(30.0)  # the sample's own patience does not come into it
+    link.set_period(PATIENCE)  # the sample's own patience does not come into it
     samples: list[Snapshot] = []
     sampler = threading.Thread(target=lambda: samples.append(link.request(Sample(9, 1), Snapshot)))
     sampler.start()
-    assert bench.sample_waits.wait(5)
+    assert bench.sample_waits.wait(WITHIN)
     assert link.stop() == STOPPED
     assert not samples
     bench.answer_sample()
-    sampler.join(5)
+    sampler.join(WITHIN)
     assert samples == [SNAPSHOT]
     assert bench.order == [Sample, Stop, Stop]
 
@@ -102,15 +106,15 @@ def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
 
     bench = SlowToConfirm()
     link = Link(bench)
-    link.set_period(30.0)
+    link.set_period(PATIENCE)
     sampler = threading.Thread(target=lambda: link.request(Sample(9, 1), Snapshot))
     sampler.start()
-    assert bench.sample_waits.wait(5)
+    assert bench.sample_waits.wait(WITHIN)
     assert link.stop() == STOPPED
     bench.answer_sample()
-    sampler.join(5)
+    sampler.join(WITHIN)
     assert bench.confirmation is not None
-    bench.confirmation.join(5)
+    bench.confirmation.join(WITHIN)
     assert bench.most_readers == 1
 
 
@@ -129,19 +133,19 @@ def test_a_reply_that_another_thread_has_read_is_handed_on_at_once() -> None:
 
     bench = TwoSamples()
     link = Link(bench)
-    link.set_period(30.0)  # the patience of both
+    link.set_period(PATIENCE)  # the patience of both
     threads = [threading.Thread(target=link.request, args=(Sample(9, 1), Snapshot), daemon=True) for _ in range(2)]
     numbers = []
     for thread in threads:
         thread.start()
-        numbers.append(bench.sequences.get(timeout=5))
+        numbers.append(bench.sequences.get(timeout=WITHIN))
     reply = threading.Timer(0.05, bench.answer, (numbers[1],))
     reply.start()
-    threads[1].join(3)
+    threads[1].join(WITHIN)
     assert not threads[1].is_alive(), "woken by the reply and not by its own patience"
     bench.answer(numbers[0])
-    threads[0].join(3)
-    reply.join(3)
+    threads[0].join(WITHIN)
+    reply.join(WITHIN)
 
 
 def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:

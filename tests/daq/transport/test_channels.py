@@ -101,9 +101,9 @@ def test_close_ends_a_read_that_waits(listener: socket.socket) -> None:
 
     reader = threading.Thread(target=read)
     reader.start()
-    assert reading.wait(5)
+    assert reading.wait(30)
     channel.close()
-    reader.join(5)
+    reader.join(30)
     assert not reader.is_alive()
     assert errors
     assert errors[0].endswith("closed")

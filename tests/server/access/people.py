@@ -10,7 +10,7 @@ import httpx
 
 from daq.contracts.service.queue import Role
 from server.access.tokens import TokenStore
-from server.store.engine import Store
+from tests.server.migrated import migrated_store
 
 SPEC = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "name": "warm-up"}
 LATER = "2100-01-01T00:00:00Z"
@@ -18,8 +18,7 @@ LATER = "2100-01-01T00:00:00Z"
 
 def tokens_of(folder: Path, people: Mapping[str, Role]) -> dict[str, str]:
     """A token for each of them, in the database of the service that keeps its data in `folder`."""
-    store = Store(f"sqlite:///{folder / 'service' / 'service.sqlite'}")
-    store.migrate()
+    store = migrated_store(folder / "service" / "service.sqlite")
     try:
         return {name: TokenStore(store).add(name, role, datetime.now(UTC)) for name, role in people.items()}
     finally:

@@ -20,6 +20,7 @@ from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens, TokenStore
 from server.store.engine import Store
 from tests.server.clocks import HandClock
+from tests.server.migrated import migrated_store
 
 ROBOT = "/api/v1/robots/ma2000"
 PIECE = 1 << 20
@@ -37,8 +38,7 @@ NO_UPLOADS = [
 @pytest.fixture
 def tokens(tmp_path: Path) -> Iterator[KnownTokens]:
     """None that opens anything."""
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    store = migrated_store(tmp_path / "service.sqlite")
     yield KnownTokens(TokenStore(store), HandClock())
     store.close()
 
@@ -150,8 +150,7 @@ class _Hanging(TokenStore):
 
 
 def test_an_old_cookie_delays_no_stop_that_needs_no_token(tmp_path: Path) -> None:
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    store = migrated_store(tmp_path / "service.sqlite")
     tokens = _Hanging(store)
     gate = _gate(KnownTokens(tokens, HandClock()))
     asked = Request("POST", f"{ROBOT}/stop", headers={"cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"})

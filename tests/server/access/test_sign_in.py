@@ -43,6 +43,7 @@ def _configure(folder: Path, issuer: str, port: int, **more: object) -> None:
 [server]
 tokens = "always"
 stop_port = 0
+connect_at_start = false
 
 [server.oidc]
 issuer = "{issuer}"

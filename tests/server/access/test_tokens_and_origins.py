@@ -25,10 +25,10 @@ from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, 
 from server.access.tickets import GOOD_FOR, Tickets
 from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, TokenStore, digest_of
 from server.database_errors import DamagedError
-from server.store.engine import Store
 from server.store.tables import TokenRow
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
+from tests.server.migrated import migrated_store
 from tests.server.other_user import other_users_command_line
 from tests.server.service import Service, running_service
 
@@ -136,8 +136,7 @@ def test_a_ticket_is_good_once_and_for_a_moment() -> None:
 
 def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: Path) -> None:
     clock = HandClock()
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    store = migrated_store(tmp_path / "service.sqlite")
     tokens = TokenStore(store)
     token = tokens.add("anna", "operator", clock.utc())
     with store.reading() as session:
@@ -156,8 +155,7 @@ def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: P
 
 
 def test_whoever_tries_tokens_has_the_database_asked_once(tmp_path: Path) -> None:
-    clock, store, asked = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}"), []
-    store.migrate()
+    clock, store, asked = HandClock(), migrated_store(tmp_path / "service.sqlite"), []
     tokens = TokenStore(store)
     known = KnownTokens(tokens, clock)
     listen(store.engine, "before_cursor_execute", lambda *told: asked.append(told[2]))
@@ -172,8 +170,7 @@ def test_whoever_tries_tokens_has_the_database_asked_once(tmp_path: Path) -> Non
 
 
 def test_who_was_known_still_is_while_the_database_cannot_be_read(tmp_path: Path) -> None:
-    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
     tokens = TokenStore(store)
     token = tokens.add("anna", "operator", clock.utc())
     known, late = KnownTokens(tokens, clock), KnownTokens(tokens, clock)
@@ -188,8 +185,7 @@ def test_who_was_known_still_is_while_the_database_cannot_be_read(tmp_path: Path
 
 
 def test_a_moment_that_is_damaged_keeps_nobody_out(tmp_path: Path) -> None:
-    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
     tokens = TokenStore(store)
     token = tokens.add("anna", "operator", clock.utc())
     tokens.add("bert", "viewer", clock.utc())
@@ -211,8 +207,7 @@ class _Damaged(TokenStore):
 
 
 def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(tmp_path: Path) -> None:
-    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
     tokens = _Damaged(store)
     token = tokens.add("anna", "operator", clock.utc())
     known, sent = KnownTokens(tokens, clock), []
@@ -253,8 +248,7 @@ def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(tmp_path: Path) -
 
 
 def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(tmp_path: Path) -> None:
-    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
     tokens, tickets = TokenStore(store), Tickets(clock)
     token = tokens.add("anna", "operator", clock.utc())
     gate = Gate(KnownTokens(tokens, clock), tickets, open_on_loopback=False, look_every=0.001)

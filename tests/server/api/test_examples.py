@@ -164,8 +164,7 @@ def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
         if answer.status_code == 202:
             service.robot.post("/stop")
             service.until_arm("stopped")
-            while service.status()["activity"] != "none":
-                assert service.process.poll() is None
+            service.until_rest()
             assert service.robot.post("/reset", json={}, headers=lease).status_code == 200
             service.until_arm("idle")
             _hold(service, gains, lease)  # a lead that is stopped leaves limp joints

@@ -71,8 +71,7 @@ def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Serv
 
 def test_a_stop_while_nothing_waits_pauses_the_queue_until_it_is_resumed(service: Service) -> None:
     assert service.robot.post("/stop").json()["confirmed"]
-    while not service.robot.get("/queue").json()["paused"]:
-        assert service.process.poll() is None
+    service.until_paused()
     assert service.robot.post("/reset", json={}).status_code == 200
     service.until_arm("idle")
     queue = service.robot.get("/queue").json()

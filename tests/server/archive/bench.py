@@ -16,10 +16,10 @@ from server.archive.service import ArchiveContext, ArchiveService
 from server.catalogue.catalogue import Catalogue
 from server.clock import SystemClock
 from server.store.archived import ArchivedStore
-from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
 from tests.server.archive.store import CREDENTIALS, settings_of
+from tests.server.migrated import migrated_store
 
 ROBOT = "ma2000"
 QUICK = (0.01, 0.05)
@@ -47,8 +47,7 @@ class Bench:
 
     def __init__(self, folder: Path, bucket: str, url: str, **settings: Any) -> None:
         self.folder = folder
-        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
-        self.store.migrate()
+        self.store = migrated_store(folder / "service.sqlite")
         self.traces = TraceStore(self.store)
         self.archived = ArchivedStore(self.store)
         self.catalogue = Catalogue(folder / "traces", ROBOT, self.traces, ExperimentStore(self.store))
@@ -57,7 +56,7 @@ class Bench:
         self.told: list[str] = []
         self.counted: list[tuple[str, str, int]] = []
         self._changed = threading.Condition()
-        found = settings_of(bucket, url, **({"timeout": 0.3} | settings))
+        found = settings_of(bucket, url, **settings)
         self.service = ArchiveService(
             ArchiveContext(
                 robot=ROBOT,

@@ -189,8 +189,9 @@ HOP = ("connection", "transfer-encoding", "date", "server")
 
 
 def settings_of(bucket: str, url: str, **more: Any) -> ArchiveSettings:
-    """The configuration of an archive."""
-    return ArchiveSettings(bucket=bucket, endpoint=url, **{"timeout": 1.0, **more})
+    """The configuration of an archive. Its requests have the time that they need on a busy machine: a store that is
+    given up too early is asked again, and may never be quick enough."""
+    return ArchiveSettings(bucket=bucket, endpoint=url, **{"timeout": 20.0, **more})
 
 
 def bucket_of(bucket: str, url: str, **more: Any) -> Bucket:

@@ -21,10 +21,10 @@ from daq.traces.naming import trace_path
 from daq.traces.store import write_trace
 from server.catalogue.catalogue import UPLOAD, Catalogue
 from server.problems import ProblemError
-from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
 from tests.server.meanwhile import Meanwhile, raising
+from tests.server.migrated import migrated_store
 
 ROBOT = "ma2000"
 
@@ -49,8 +49,7 @@ class Shelf:
 @pytest.fixture
 def shelf(tmp_path: Path) -> Iterator[Shelf]:
     """In a folder of its own."""
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    store = migrated_store(tmp_path / "service.sqlite")
     traces = TraceStore(store)
     experiments: Any = Meanwhile(ExperimentStore(store))
     catalogue = Catalogue(tmp_path / "traces", ROBOT, traces, experiments)

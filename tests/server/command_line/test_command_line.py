@@ -14,6 +14,7 @@ from daq.traces.reader import read_trace
 from tests.daq.traces.test_ros_bag import bag
 from tests.daq_cli.invoke import CommandLine, Said
 from tests.server.other_user import environment_in, other_users_command_line
+from tests.server.polling import until
 from tests.server.service import DAQ, Service
 
 RAMP = ["run", "ramp", "--joints", "1-3", "--amplitude", "3", "--duration", "0.2", "--settle", "0.1", "--hold", "0.1"]
@@ -98,9 +99,7 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
         text=True,
     )
     try:
-        while not service.robot.get("/queue/experiments").json():
-            assert running.poll() is None
-        mine = service.robot.get("/queue/experiments").json()[0]["id"]
+        mine = until(service.robot, "/queue/experiments", bool, process=running)[0]["id"]
         running.send_signal(signal.SIGINT)
         _, err = running.communicate(timeout=60)
     finally:

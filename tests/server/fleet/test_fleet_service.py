@@ -11,6 +11,7 @@ from daq.client import Client
 from daq.contracts.errors import SpecError
 from daq.traces.reader import read_trace
 from tests.server.fleet_service import FleetService, fleet_service
+from tests.server.polling import until
 
 pytestmark = pytest.mark.slow
 
@@ -89,8 +90,11 @@ def test_a_lease_of_one_arm_that_lapses_pauses_only_its_queue(fleet: FleetServic
     lease = fleet.post("robots/left/control", {})["lease"]
     refused = fleet.client.post("robots/right/jog", json={"velocities": {"1": 0.1}}, headers={"Control-Lease": lease})
     assert refused.status_code >= 400
-    while not by_name(fleet)["left"]["queue"]["paused"]:  # no heartbeat is sent
-        assert fleet.process.poll() is None
+
+    def is_paused(found: Any) -> bool:
+        return any(one["robot"] == "left" and one["queue"]["paused"] for one in found["robots"])
+
+    until(fleet.client, "fleet", is_paused, process=fleet.process)  # no heartbeat is sent
     found = by_name(fleet)
     assert "lapsed" in found["left"]["queue"]["reason"]
     assert not found["right"]["queue"]["paused"]

@@ -43,7 +43,6 @@ from server.jobs.shared_workers import SharedWorkers
 from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
 from server.store.archived import Archived, ArchivedStore
-from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
@@ -51,6 +50,7 @@ from server.store.traces import TraceStore
 from tests.daq.traces.samples import write
 from tests.server.clocks import HandClock
 from tests.server.meanwhile import Meanwhile, raising
+from tests.server.migrated import migrated_store
 from tests.server.store.rows import new_trace
 
 MACHINE = load_machine("ma2000")
@@ -83,8 +83,7 @@ class Bench:
 
     def __init__(self, folder: Path, workers: SharedWorkers | None = None) -> None:
         self.folder = folder / "jobs"
-        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
-        self.store.migrate()
+        self.store = migrated_store(folder / "service.sqlite")
         self.jobs: Any = Meanwhile(JobStore(self.store))
         self.clock = HandClock()
         self.traces: Any = Meanwhile(TraceStore(self.store))

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from server.jobs.mailbox import Mailbox
+from tests.server.polling import until
 from tests.server.service import Service
 
 LONG_FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
@@ -52,11 +53,12 @@ def _submitted(service: Service, request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _until(service: Service, job: str, *states: str) -> dict[str, Any]:
-    while True:
-        found: dict[str, Any] = service.robot.get(f"/jobs/{job}", params={"wait": 1}).json()
-        if found["state"] in states:
-            return found
-        assert found["state"] in ("queued", "running"), found
+    def is_so(found: dict[str, Any]) -> bool:
+        assert found["state"] in ("queued", "running", *states), found
+        return found["state"] in states
+
+    found: dict[str, Any] = until(service.robot, f"/jobs/{job}", is_so, {"wait": 1}, service.process)
+    return found
 
 
 def _ended(service: Service, job: str) -> dict[str, Any]:

@@ -22,12 +22,12 @@ from server.queue.context import QueueContext
 from server.queue.service import QueueService
 from server.robot.control import ControlService
 from server.robot.robot import RobotPlace
-from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from tests.server.clocks import HandClock
 from tests.server.meanwhile import Happening, Meanwhile
+from tests.server.migrated import migrated_store
 
 CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
 MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
@@ -89,8 +89,7 @@ class Bench:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
-        self.store.migrate()
+        self.store = migrated_store(folder / "service.sqlite")
         self.experiments: Any = Meanwhile(ExperimentStore(self.store))
         self.schedules: Any = Meanwhile(ScheduleStore(self.store))
         self.clock = HandClock()

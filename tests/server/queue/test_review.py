@@ -26,7 +26,9 @@ from server.store.engine import Store
 from server.store.experiments import ExperimentStore, NotApprovedError
 from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at, tokens_of
 from tests.server.inside import service_inside
+from tests.server.migrated import migrated_store
 from tests.server.polling import until
+from tests.server.queue.bench import REAL
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 MACHINE = load_machine("ma2000")
@@ -60,8 +62,7 @@ class WhatBegins(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.folder = tempfile.TemporaryDirectory()
-        self.database = Store(f"sqlite:///{Path(self.folder.name) / 'service.sqlite'}")
-        self.database.migrate()
+        self.database = migrated_store(Path(self.folder.name) / "service.sqlite")
         self.store = ExperimentStore(self.database)
         self.review = next(iter(REVIEWS.values()))
         self.known: dict[str, Known] = {}
@@ -156,10 +157,10 @@ test_what_begins_was_approved = WhatBegins.TestCase
 
 @pytest.fixture
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
-    """A service whose experiments another operator must approve. Its mock passes for a real arm."""
+    """A service whose experiments another operator must approve. Its mock passes for a real arm; tests in which nothing
+    begins do not connect it."""
     seems_real(monkeypatch)
     with service_inside(tmp_path, SystemClock(), monkeypatch, review="operator") as client:
-        client.post("/connect")
         yield client
 
 
@@ -171,7 +172,7 @@ def people(robot: httpx.Client, tmp_path: Path) -> dict[str, Person]:
 
 def seems_real(monkeypatch: pytest.MonkeyPatch) -> None:
     def identity(robot: Robot) -> object:
-        return robot._identity and robot._identity.model_copy(update={"simulated": False})
+        return (robot._identity or REAL).model_copy(update={"simulated": False})
 
     monkeypatch.setattr(Robot, "identity", property(identity))
 
@@ -193,6 +194,7 @@ def _end_of(person: Person, experiment: str) -> dict[str, object]:
 
 def test_it_begins_when_somebody_else_has_approved_it_and_says_why_before(people: dict[str, Person]) -> None:
     anna, bert = people["anna"], people["bert"]
+    assert anna.ask("POST", "/connect").status_code == 200
     assert anna.ask("POST", "/queue/resume", {"moves_real_arm": True}).status_code == 200
     identity = anna.submit(at=None)
     _until_it_waits_for(anna.robot, "the approval of 1 experiment by an operator who did not submit it")
@@ -209,6 +211,7 @@ def test_it_begins_when_somebody_else_has_approved_it_and_says_why_before(people
 
 def test_one_that_is_not_approved_holds_up_no_other(people: dict[str, Person]) -> None:
     anna, bert = people["anna"], people["bert"]
+    assert anna.ask("POST", "/connect").status_code == 200
     first, second = anna.submit(at=None, priority=10), anna.submit(at=None)
     bert.ask("PUT", f"/experiments/{second}/approval", {"content": _content(bert, second)})
     anna.ask("POST", "/queue/resume", {"moves_real_arm": True})
@@ -295,6 +298,7 @@ def test_what_was_changed_in_the_database_does_not_begin(people: dict[str, Perso
     with store.writing() as session:
         session.execute(text("UPDATE experiments SET spec = json_set(spec, '$.trajectory.duration', 0.3)"))
     store.close()
+    assert anna.ask("POST", "/connect").status_code == 200
     anna.ask("POST", "/queue/resume", {"moves_real_arm": True})
     _until_it_waits_for(anna.robot, "the approval of 1 experiment")
     assert anna.ask("GET", f"/experiments/{identity}").json()["approval"] is None
@@ -312,20 +316,18 @@ def test_runs_of_a_schedule_have_its_approval(people: dict[str, Person]) -> None
     assert bert.ask("DELETE", path).json()["approval"] is None
 
 
-@pytest.mark.parametrize("name", ["bert", "olga"])
-def test_an_arm_may_need_an_owner_s_approval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_an_arm_may_need_an_owner_s_approval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seems_real(monkeypatch)
     with service_inside(tmp_path, SystemClock(), monkeypatch, review="owner") as robot:
         people = people_at(robot, tmp_path, {"anna": "operator", "bert": "operator", "olga": "owner"})
-        robot.post("/connect")
         identity = people["anna"].submit()
-        found = people[name].ask("GET", f"/experiments/{identity}").json()
-        assert found["needs_approval_of"] == "owner"
-        answer = people[name].ask("PUT", f"/experiments/{identity}/approval", {"content": found["content"]})
-        if name == "bert":
-            assert kind_of(answer) == (403, "owner-needed")
-        else:
-            assert answer.json()["approval"]["as_owner"] is True
+        path = f"/experiments/{identity}/approval"
+        for name in ("bert", "olga"):
+            found = people[name].ask("GET", f"/experiments/{identity}").json()
+            assert found["needs_approval_of"] == "owner", name
+        assert kind_of(people["bert"].ask("PUT", path, {"content": found["content"]})) == (403, "owner-needed")
+        approved = people["olga"].ask("PUT", path, {"content": found["content"]})
+        assert approved.json()["approval"]["as_owner"] is True
 
 
 def test_a_simulated_arm_needs_none_and_a_service_without_review_takes_none(
@@ -335,8 +337,7 @@ def test_a_simulated_arm_needs_none_and_a_service_without_review_takes_none(
         robot.post("/connect")
         made = robot.post("/experiments", json={"spec": SPEC}).json()
         assert made["needs_approval_of"] is None
-        while robot.get(f"/experiments/{made['id']}?wait=5").json()["state"] != "done":
-            pass
+        until(robot, f"/experiments/{made['id']}?wait=5", lambda found: found["state"] == "done")
     with service_inside(tmp_path / "b", SystemClock(), monkeypatch) as robot:
         made = robot.post("/experiments", json={"spec": SPEC, "at": LATER}).json()
         answer = robot.put(f"/experiments/{made['id']}/approval", json={"content": "0" * 64})

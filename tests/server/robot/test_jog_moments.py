@@ -21,7 +21,7 @@ from server.live.outbox import Outbox
 from tests.server.clocks import HandClock
 
 JOG = '{"jog": {"lease": "mine", "velocities": {"1": 0.1}}}'
-WITHIN = 20.0
+WITHIN = 60.0
 """s after which a test has failed."""
 
 

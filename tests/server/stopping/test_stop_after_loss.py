@@ -7,12 +7,7 @@ from pathlib import Path
 import httpx
 
 from tests.mock.process.running import RunningMock
-from tests.server.service import Service, running_service
-
-
-def _until_link(service: Service, state: str) -> None:
-    while service.status()["connection"] != state:
-        assert service.process.poll() is None
+from tests.server.service import running_service
 
 
 def test_a_stop_while_the_link_is_lost_is_not_said_to_be_confirmed_and_is_there_when_the_link_is(
@@ -27,7 +22,7 @@ def test_a_stop_while_the_link_is_lost_is_not_said_to_be_confirmed_and_is_there_
         port = service.client.get("/system").json()["stop_port"]
         for door in (service.url, f"http://127.0.0.1:{port}"):
             mock.control("disconnect")
-            _until_link(service, "lost")
+            service.until_link("lost")
             queue = service.robot.get("/queue").json()
             assert queue["paused"]
             assert queue["reason"].startswith("the link to the robot was lost")

@@ -40,6 +40,7 @@ from server.stopping.tokens import UNKNOWN_FOR, StopTokens, reader_of
 from server.store.engine import Store
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
+from tests.server.migrated import migrated_store
 from tests.server.other_user import other_users_command_line
 from tests.server.service import Service, running_service
 
@@ -195,13 +196,10 @@ def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: P
         service.until_connected()
         assert service.robot.post("/disconnect").status_code == 200
         for stop in (f"{service.robot.base_url}stop", f"{_beside(service)}/stop"):
-            while not service.robot.get("/queue").json()["paused"]:  # first, because the connection has ended
-                assert service.process.poll() is None
+            service.until_paused()  # first, because the connection has ended
             assert service.robot.post("/queue/resume", json={}).json()["paused"] is False
             assert httpx.post(stop, timeout=30).json()["delivered"] is False
-            while not (queue := service.robot.get("/queue").json())["paused"]:
-                assert service.process.poll() is None
-            assert queue["reason"].startswith("local requested a stop")
+            assert service.until_paused()["reason"].startswith("local requested a stop")
 
 
 @pytest.mark.parametrize(
@@ -276,8 +274,7 @@ def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch
 
 
 def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
-    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    store.migrate()
+    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
     tokens = TokenStore(store)
     token = tokens.add("anna", "viewer", clock.utc())
     gate = StopGate(KnownTokens(tokens, clock), False, (), 8300)
@@ -311,8 +308,7 @@ def test_what_a_page_may_connect_to_is_a_name_and_a_port(host: str, origin: str 
 
 def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_is_gone(tmp_path: Path) -> None:
     clock, file = HandClock(), tmp_path / "service.sqlite"
-    store = Store(f"sqlite:///{file}")
-    store.migrate()
+    store = migrated_store(file)
     tokens = TokenStore(store)
     anna, bert = tokens.add("anna", "viewer", clock.utc()), tokens.add("bert", "operator", clock.utc())
     found = StopTokens(reader_of(store.url, file), clock=clock.monotonic)
@@ -342,8 +338,7 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
 @pytest.mark.parametrize("alone", [True, False])
 def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path, alone: bool) -> None:
     file = tmp_path / "service.sqlite"
-    store = Store(f"sqlite:///{file}")
-    store.migrate()
+    store = migrated_store(file)
     token = TokenStore(store).add("anna", "viewer", HandClock().utc())
     person = Person("https://id", "1", "bert", "viewer")
     _, bert = SessionStore(store).begin(person, datetime.now(UTC), timedelta(hours=1))

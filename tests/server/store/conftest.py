@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from server.store.engine import Store
+from tests.server.migrated import migrated_store
 from tests.server.postgresql import PostgresServer, programs, running_postgresql
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def postgresql() -> Iterator[PostgresServer]:
     """A PostgreSQL server with a migrated database `template`."""
     found = programs()
@@ -27,8 +28,7 @@ def postgresql() -> Iterator[PostgresServer]:
 @pytest.fixture
 def sqlite_store(tmp_path: Path) -> Iterator[Store]:
     """A new SQLite database."""
-    made = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    made.migrate()
+    made = migrated_store(tmp_path / "service.sqlite")
     yield made
     made.close()
 

@@ -19,6 +19,7 @@ from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore, NewModel
 from server.store.traces import TraceStore
+from tests.server.migrated import migrated_store
 from tests.server.store.rows import new_trace
 
 ROBOT = "ma2000"
@@ -29,8 +30,7 @@ TRACE = new_trace(0, created=NOW, name="loose belt")
 @pytest.fixture
 def store(tmp_path: Path) -> Iterator[Store]:
     """A new database with one trace."""
-    made = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    made.migrate()
+    made = migrated_store(tmp_path / "service.sqlite")
     TraceStore(made).insert(TRACE)
     yield made
     made.close()
