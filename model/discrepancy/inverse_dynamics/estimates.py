@@ -39,6 +39,8 @@ def standard_deviations(now: BalanceFit) -> dict[str, float]:
     """Standard deviations of the unknowns that change the residual at all, by name; empty where no joint moves."""
     slopes = now.slopes()
     used = [u for u in now.unknowns if any(np.abs(s).max() > 0 for s in slopes[u.name])]
+    if not used or not any(now.data.stretches.by_joint):
+        return {}
     scale = np.array([u.scale for u in used])
     scores, information = [], np.zeros((len(used), len(used)))
     for j in range(len(now.data.floor)):
@@ -47,8 +49,6 @@ def standard_deviations(now: BalanceFit) -> dict[str, float]:
             jacobian = np.stack([slopes[u.name][i][rows, j] for u in used], axis=1) * scale / size
             scores.append(jacobian * (now.residual[i][rows, j] / size)[:, None])
             information += jacobian.T @ jacobian
-    if not scores:
-        return {}
     prior = np.array([0.0 if u.deviation is None else (u.scale / u.deviation) ** 2 for u in used])
     loose = 1e-12 * max(float(np.trace(information)), 1.0)  # a direction without any information gets no interval
     covariance = sandwich(information + loose * np.eye(len(used)), scores, prior, LONGEST_MEMORY)

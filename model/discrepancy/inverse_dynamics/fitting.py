@@ -26,6 +26,10 @@ ROUNDS = 6
 """Rounds of noise model and Gauss-Newton step, at most."""
 STEPS = (1.0, 0.5, 0.2, 0.05)
 """Shares of a Gauss-Newton step that are tried, until one is downhill."""
+DAMPING = 0.3
+"""Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
+along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as
+a whole leads uphill."""
 SETTLED = 1e-2
 """Fall of −2 log posterior in a round below which the fit has settled."""
 
@@ -123,7 +127,7 @@ def _evaluate(
 
 
 def gauss_newton(now: BalanceFit, known: Slopes | None = None) -> dict[str, float]:
-    """Values after one bounded Gauss-Newton step."""
+    """Values after one bounded Gauss-Newton step, damped (Levenberg 1944)."""
     unknowns = now.unknowns
     if not unknowns:
         return {}
@@ -139,8 +143,8 @@ def gauss_newton(now: BalanceFit, known: Slopes | None = None) -> dict[str, floa
     # orthogonal triangles first: the bounded search then works on p rows, not on all samples
     triangle: Floats = np.asarray(np.linalg.qr(np.column_stack([A * scale, -b]), mode="r"))
     solved = lsq_linear(
-        np.concatenate([triangle[:, :-1], rows * scale]),
-        np.concatenate([triangle[:, -1], aims]),
+        np.concatenate([triangle[:, :-1], rows * scale, DAMPING * np.eye(len(unknowns))]),
+        np.concatenate([triangle[:, -1], aims, np.zeros(len(unknowns))]),
         bounds=((low - at - room) / scale, (high - at + room) / scale),
         method="bvls",
     )

@@ -41,22 +41,25 @@ def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[R
     return mean_squares(stretches_of(records), _residuals(model, values, records))
 
 
-def evidence(before: BalanceFit, after: Sequence[BalanceFit], records: tuple[RecordedMotion, ...]) -> list[float]:
+def evidence(
+    before: BalanceFit, after: Sequence[BalanceFit], records: tuple[RecordedMotion, ...], noise: Floats
+) -> list[float]:
     """Fall of −2 log likelihood of records that no fit has seen, by each of several later fits; above 0 where one
     predicts them better than the fit before.
 
     Nothing was fitted to these records, so parameters cost nothing here: by the chain rule of probability it adds to
     the evidence of the fitted records. So that later fits can be compared, one number of independent samples holds for
-    all: on every joint that of the fit that leaves least there.
+    all: on every joint that of the fit that leaves least there. What is below the `noise` (n,) of a joint is no better
+    for being less.
     """
     if not after:
         return []
-    stretches, floor = stretches_of(records), before.data.floor
+    stretches = stretches_of(records)
     first, *last = (_residuals(f.balance.model, f.values, records) for f in (before, *after))
     squares = np.nan_to_num([stretches.mean_squares(residual) for residual in last])
-    memories = np.array([noise_model(stretches, residual, floor).memory for residual in last])
+    memories = np.array([noise_model(stretches, residual, noise).memory for residual in last])
     memory = np.take_along_axis(memories, squares.argmin(axis=0)[np.newaxis], axis=0)[0]
-    costs = [minus_twice_log_likelihood(stretches, residual, memory, floor).sum() for residual in (first, *last)]
+    costs = [minus_twice_log_likelihood(stretches, residual, memory, noise).sum() for residual in (first, *last)]
     return [float(costs[0] - cost) for cost in costs[1:]]
 
 

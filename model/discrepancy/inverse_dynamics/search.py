@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,8 @@ SHORTLIST = 7
 """Most effects that are fitted after probing."""
 REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
+REFINED_ROUNDS = 20
+"""Rounds of these fits, at most: one that has not settled would count as evidence against its effect."""
 LARGER_PART = 0.5
 """Share of a joint's residual from which an effect that explains it is fitted, whatever it promises in evidence."""
 OF_A_JOINT = 3
@@ -101,10 +103,21 @@ class Findings:
     unresolved: tuple[Fitted, ...] = ()
 
 
-def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, cancel: Cancel) -> Findings:
+def search(
+    model: Model,
+    now: BalanceFit,
+    case: TorqueCase,
+    progress: Progress,
+    cancel: Cancel,
+    also_from: Mapping[str, float] | None = None,
+) -> Findings:
     """Try every effect that the model lacks, or that the file states, against the residuals of a fit.
 
     Raises CancelledError when asked to end.
+
+    Args:
+        also_from: values from which candidates are fitted a second time: those of a fit with an effect that was taken
+            out, without which the numbers of the others are far from what they are with it.
     """
     slopes = now.slopes()
     prober = prepare_probes(now, slopes)
@@ -119,7 +132,7 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
     for chosen in _shortlist(probes, now):
         stop_if(cancel)
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
-        found.append(_fit_effect(fitted_model, now, slopes, chosen))
+        found.append(_fit_effect(fitted_model, now, slopes, chosen, also_from))
     places = sum(len(p.trial.starts) for p in probes)
     found = _refined(_weigh(found, now, places), cancel)
     weighed = _weigh(found, now, places)
@@ -128,7 +141,7 @@ def search(model: Model, now: BalanceFit, case: TorqueCase, progress: Progress, 
         fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        found += _refined([_fit_effect(fitted_model, now, slopes, p) for p in fewer], cancel)
+        found += _refined([_fit_effect(fitted_model, now, slopes, p, also_from) for p in fewer], cancel)
         weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
 
@@ -140,7 +153,8 @@ def _refined(found: Sequence[Fitted], cancel: Cancel) -> list[Fitted]:
     for one in found[:REFINED]:
         stop_if(cancel)
         last = one.fit
-        fitted = fit(last.balance, last.unknowns, last.values, last.data, last.noise.memory)
+        own = (last.balance, last.unknowns, last.values, last.data, last.noise.memory)
+        fitted = fit(*own, rounds=REFINED_ROUNDS)
         refined.append(replace(one, fit=fitted))
     return [*refined, *found[REFINED:]]
 
@@ -198,7 +212,13 @@ def _weighted_squares(now: BalanceFit) -> list[float]:
     return [float(left @ left) for left in now.noise.weighted(now.data.stretches, now.residual)]
 
 
-def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe]) -> Fitted:
+def _fit_effect(
+    model: Model,
+    now: BalanceFit,
+    slopes: Slopes,
+    probes: Sequence[Probe],
+    also_from: Mapping[str, float] | None = None,
+) -> Fitted:
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet.
 
     A fit that ends above the one without the effect has lost its way: what the tolerances had taken over of the effect
@@ -220,6 +240,10 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[
         null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
         begin = {**now.values, **start, **null, **take_back(effect, own, now)}
         fitted = fit(balance, unknowns, begin, now.data, now.noise.memory)
+    if also_from is not None:
+        others = {name: value for name, value in also_from.items() if name not in free}
+        second = fit(balance, unknowns, {**now.values, **start, **others}, now.data, now.noise.memory)
+        fitted = min(fitted, second, key=lambda f: f.criterion)
     return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
 
 

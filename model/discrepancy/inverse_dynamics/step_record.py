@@ -127,9 +127,12 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
 
     What a parameter costs is no statement of the records: a rival that explains as much with two parameters more is
     less likely before anything was recorded, and not refuted. Noise alone brings one for every parameter, which is
-    taken off. Such a rival has to be one that would be suspected by itself.
+    taken off. Such a rival has to be one that would be suspected by itself. Held-out records make a lead larger and not
+    smaller: a rival that leaves more of the fitted records may still take something else off others.
     """
-    needed, lead = needed_lead(options, chosen, rival), chosen.log_odds - rival.log_odds
+    needed = needed_lead(options, chosen, rival)
+    lead = chosen.log_odds - rival.log_odds
+    lead = max(lead, lead - (chosen.told - rival.told))
     if lead < needed:
         return True
     of_records = lead + (chosen.cost - len(chosen.parameters)) - (rival.cost - len(rival.parameters))

@@ -107,14 +107,16 @@ class TorqueWorkflow:
         whole, done = self.case.options.most_steps, len(self.found.steps)
         self.progress(min(0.99, (done + fraction) / (whole + 1)), f"step {done + 1}: {text}")
 
-    def _search(self, found: Found, joints: tuple[int, ...] = ()) -> Findings:
+    def _search(self, found: Found, joints: tuple[int, ...] = (), before: Found | None = None) -> Findings:
         """What a step finds, without what the records do not resolve, the most probable by all records first.
 
         Args:
-            joints: to look on; empty for all that may be looked on.
+            joints: to look on; empty for all that may be looked on. before: what was found before an effect was taken
+                out.
         """
         options = self.case.options.model_copy(update={"joints": joints} if joints else {})
-        findings = search(found.model, found.now, replace(self.case, options=options), self._report, self.cancel)
+        case, also_from = replace(self.case, options=options), None if before is None else before.now.values
+        findings = search(found.model, found.now, case, self._report, self.cancel, also_from)
         fitted = sorted(self._with_held_out(found, findings.fitted), key=lambda f: -f.log_odds)
         resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
@@ -127,7 +129,7 @@ class TorqueWorkflow:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
         held = self.case.held_out
         asked = [c for c in candidates if held and c.evidence > 0]
-        told = holdout.evidence(found.now, [c.fit for c in asked], held)
+        told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
         others = [c for c in candidates if not any(c is one for one in asked)]
         return [*(replace(c, told=one) for c, one in zip(asked, told, strict=True)), *others]
 
@@ -197,7 +199,7 @@ class TorqueWorkflow:
         superfluous."""
         others = tuple(s for s in found.steps if s is not step)
         without = replace(self.refitter.remove(found, step), steps=others)
-        findings = self._search(without, step.joints)
+        findings = self._search(without, step.joints, found)
         again = self._adopt(without, findings)
         if _has_more(again, without):
             return replace(again, steps=(*others, again.steps[-1]))
@@ -214,7 +216,7 @@ class TorqueWorkflow:
         part, rest = split_step(found.model, step, joint)
         others = tuple(rest if s is step else s for s in found.steps)
         without = replace(self.refitter.remove(found, part), steps=others)
-        again = self._adopt(without, self._search(without, (joint,)))
+        again = self._adopt(without, self._search(without, (joint,), found))
         if not _has_more(again, without) or again.steps[-1].effect == effect:
             return found
         return replace(again, steps=(*others, again.steps[-1]))

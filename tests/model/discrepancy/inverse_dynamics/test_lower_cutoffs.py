@@ -59,10 +59,10 @@ def first_finding(*answers: Diagnosis) -> tuple[Diagnosis, int]:
 @pytest.mark.parametrize("effect", [*sorted(JUMPING), "coulomb_friction", "stribeck_friction"])
 def test_an_effect_that_jumps_is_not_named_below_a_lower_cutoff(effect: str) -> None:
     nothing = answer()
-    found, looks = first_finding(nothing, answer(effect), answer("spring", effect))
+    found, looks = first_finding(nothing, answer(effect), answer("spring_torque", effect))
     assert found is nothing
     assert looks == len(LOOKS)
-    found, _ = first_finding(nothing, answer("spring", group=("spring", effect)), nothing)
+    found, _ = first_finding(nothing, answer("spring_torque", group=("spring_torque", effect)), nothing)
     assert found is nothing, "nor where it may be one of a group"
 
 

@@ -68,12 +68,12 @@ def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> N
     found = search(flow.model, flow.first, flow.case, silent, Never()).fitted
     coulomb = next(f.fit for f in found if f.effect == "coulomb_friction")
     other = next(f.fit for f in found if f.effect != "coulomb_friction")
-    alone = holdout.evidence(flow.first, [coulomb], flow.case.held_out)
-    both = holdout.evidence(flow.first, [coulomb, other, coulomb], flow.case.held_out)
+    alone = holdout.evidence(flow.first, [coulomb], flow.case.held_out, flow.case.noise)
+    both = holdout.evidence(flow.first, [coulomb, other, coulomb], flow.case.held_out, flow.case.noise)
     assert both[0] == both[2] > 30.0
     assert both[0] >= both[1]
     assert both[0] == pytest.approx(alone[0], rel=0.5)
-    assert holdout.evidence(flow.first, [], flow.case.held_out) == []
+    assert holdout.evidence(flow.first, [], flow.case.held_out, flow.case.noise) == []
 
 
 def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
