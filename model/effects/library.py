@@ -71,7 +71,7 @@ def effect(name: str) -> Effect:
     return found
 
 
-def named_in_answers(name: str) -> Effect:
+def find_named_effect(name: str) -> Effect:
     """What a step of an answer names: an effect, or a number of the machine. Raises SpecError with the names."""
     return MACHINE_NUMBERS.get(name) or effect(name)
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,3 +71,40 @@ def pieces_of(at_limit: NDArray[np.bool_], longest: int) -> list[slice]:
         for begin, end in zip(edges[::2], edges[1::2], strict=True)
         for first in range(int(begin), int(end), longest)
     ]
+
+
+class _Recorded(Protocol):
+    """What is read of a recorded motion."""
+
+    @property
+    def time(self) -> Floats: ...
+    @property
+    def at_limit(self) -> Mask: ...
+    @property
+    def not_known(self) -> Mask: ...
+
+
+@dataclass(frozen=True)
+class DrivesAtLimit:
+    """Where drives stand at limits that no file states.
+
+    shares: joints and their share of the time there, of all records. unknown: joints of which some record tells
+    nothing for that reason; not_examined: those of which none does.
+    """
+
+    shares: tuple[tuple[int, float], ...]
+    unknown: tuple[int, ...]
+    not_examined: tuple[int, ...]
+
+
+def find_drives_at_limit(records: Sequence[_Recorded], joints: Sequence[int]) -> DrivesAtLimit:
+    """How much of records their drives stand at such limits; `joints` are the records' columns."""
+    weights = [float(np.ptp(r.time)) for r in records]
+    shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=weights)
+    unknown = np.array([r.not_known for r in records])
+    some, every = (np.asarray(np.sum(m, axis=0) > 0) for m in (unknown, ~unknown))
+    return DrivesAtLimit(
+        tuple((j, float(share)) for j, share in zip(joints, shares, strict=True) if share > 0.0),
+        tuple(j for j, one in zip(joints, some, strict=True) if one),
+        tuple(j for j, known in zip(joints, every, strict=True) if not known),
+    )

@@ -26,8 +26,9 @@ from model.fitting.robust import influence
 from model.fitting.shown import html_of, known_of, text_of
 from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
+from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.problem import TorqueProblem
-from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_limit, recorded_motion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
@@ -159,7 +160,7 @@ def fit_torques(
             ),
         },
     )
-    limits = drives_at_limit(motions, model.machine.modelled_joints)
+    limits = find_drives_at_limit(motions, model.machine.modelled_joints)
     progress(1.0, "done")
     return TorqueFit(
         model=fitted.with_lineage(lineage),

@@ -46,7 +46,7 @@ def friction_at_rest(level: Floats, motion: LinkMotion, joints: Floats) -> Resti
     )
 
 
-def less_held(left: Floats, friction: RestingFriction, record: RecordedMotion) -> Floats:
+def subtract_held(left: Floats, friction: RestingFriction, record: RecordedMotion) -> Floats:
     """Residual torque (k, n) with friction set-valued where a joint turns or stops for a moment: there it takes any
     torque that holds the joint, with a mean up to its level, in place of a share that follows the speed.
 

@@ -93,7 +93,7 @@ class RecordedMotion:
         smooth = low_pass(torque, self.cutoff, self.period)
         return np.ascontiguousarray(smooth[self.rows])
 
-    def less_unknown(self, torque: Floats) -> Floats:
+    def subtract_unknown(self, torque: Floats) -> Floats:
         """Compared torques (m, n) less what a drive at a limit that no file states explains of them: there it gives
         less than is recorded, and how much less is not known."""
         if not self.at_limit.any():
@@ -111,14 +111,14 @@ class RecordedMotion:
 
     @property
     def unknown_count(self) -> Rows:
-        """(n,) dimensions of a joint's compared torques that `less_unknown` takes away: as many fewer are known."""
+        """(n,) dimensions of a joint's compared torques that `subtract_unknown` takes away: as many fewer are known."""
         sizes = zip(self._unknown_drives, self.moving.sum(axis=0), strict=True)
         return np.array([moving if basis is None else basis.shape[1] for basis, moving in sizes], dtype=np.int64)
 
     @cached_property
     def _unknown_drives(self) -> list[Floats | None]:
-        """By joint, an orthonormal basis (moving, p) of the torques of `less_unknown`; None where there are too many
-        pieces to know anything."""
+        """By joint, an orthonormal basis (moving, p) of the torques of `subtract_unknown`; None where there are too
+        many pieces to know anything."""
         found: list[Floats | None] = []
         wide, longest = _wide(self.cutoff, self.sampled), max(1, round(PIECE / self.cutoff / self.sampled))
         for j, moving in enumerate(self.moving.T):
@@ -262,32 +262,6 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
         moving=moving,
         at_limit=stands_at_limit(readings.drive, machine) & np.repeat(moves, thin, axis=0)[: len(readings.drive)],
         own_speed=readings.has_own_speed,
-    )
-
-
-@dataclass(frozen=True)
-class DrivesAtLimit:
-    """Where drives stand at limits that no file states.
-
-    shares: joints and their share of the time there, of all records. unknown: joints of which some record tells
-    nothing for that reason; not_examined: those of which none does.
-    """
-
-    shares: tuple[tuple[int, float], ...]
-    unknown: tuple[int, ...]
-    not_examined: tuple[int, ...]
-
-
-def drives_at_limit(records: Sequence[RecordedMotion], joints: Sequence[int]) -> DrivesAtLimit:
-    """How much of records their drives stand at such limits; `joints` are the records' columns."""
-    weights = [float(np.ptp(r.time)) for r in records]
-    shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=weights)
-    unknown = np.array([r.not_known for r in records])
-    some, every = (np.asarray(np.sum(m, axis=0) > 0) for m in (unknown, ~unknown))
-    return DrivesAtLimit(
-        tuple((j, float(share)) for j, share in zip(joints, shares, strict=True) if share > 0.0),
-        tuple(j for j, one in zip(joints, some, strict=True) if one),
-        tuple(j for j, known in zip(joints, every, strict=True) if not known),
     )
 
 

@@ -18,7 +18,7 @@ from model.drives.piecewise import EDGE
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
-from model.inverse_dynamics.friction_at_rest import friction_at_rest, less_held
+from model.inverse_dynamics.friction_at_rest import friction_at_rest, subtract_held
 from model.inverse_dynamics.link_motion import SENSOR_COLUMNS, LinkMotion, link_motion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.smoothing import derivative
@@ -98,8 +98,8 @@ class TorqueBalance:
                 gravity[i],
             )
             torque = self._missing(driven, motion.acceleration, needed[i], joints)
-            torque = less_held(torque, friction_at_rest(levels[i], motion, joints), record)
-            result.append(record.less_unknown(record.compared(torque * self._told_per_torque(joints))))
+            torque = subtract_held(torque, friction_at_rest(levels[i], motion, joints), record)
+            result.append(record.subtract_unknown(record.compared(torque * self._told_per_torque(joints))))
         return result
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:
@@ -259,7 +259,9 @@ def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
     """Rate (k,) at which rotor and link move apart for a torque through a transmission with compliance and play. A gear
     that gives and damps follows the torque late; a contact does so far above every cutoff."""
     period = time[1] - time[0]
-    twist = joint[at.COMPLIANCE] * _followed(through, joint[at.COMPLIANCE] * joint[at.TRANSMISSION_DAMPING], period)
+    twist = joint[at.COMPLIANCE] * _follow_with_lag(
+        through, joint[at.COMPLIANCE] * joint[at.TRANSMISSION_DAMPING], period
+    )
     twist = twist + joint[at.CONTACT_COMPLIANCE] * through
     if joint[at.GAP] > 0:
         soft = CONTACT_SHARE * float(np.sqrt(np.mean(through**2))) + 1e-12
@@ -267,7 +269,7 @@ def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
     return derivative(twist, period)
 
 
-def _followed(signal: Floats, time_constant: float, period: float) -> Floats:
+def _follow_with_lag(signal: Floats, time_constant: float, period: float) -> Floats:
     """What follows a signal (k,) with a first-order lag, exactly for one that is straight between its samples."""
     if time_constant <= 0.0:
         return signal

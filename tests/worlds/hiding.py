@@ -133,7 +133,7 @@ def known(name: str, law: int) -> tuple[str, tuple[str, ...]]:
     return OTHER_NAMES.get(name, {}).get(law, (name, ()))
 
 
-def drawn_as(known_as: str) -> tuple[str, int]:
+def find_drawn_law(known_as: str) -> tuple[str, int]:
     """The name by which an effect of the library is drawn, and the first law that the library calls so."""
     for name, others in OTHER_NAMES.items():
         for law, (other, _) in others.items():

@@ -33,7 +33,7 @@ from scipy.optimize import least_squares, lsq_linear
 from tests.worlds.bodies import Bodies, Link
 from tests.worlds.drawing import WORST, generator
 from tests.worlds.engine import Floats, simulate
-from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, drawn_as, effects_of, hide, joints_of
+from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
 from tests.worlds.parameters import Records
 from tests.worlds.rig import Rig, Tolerance
 from tests.worlds.world import COLOURED_CORNER, TRAINING, wanted, without_settling
@@ -145,7 +145,7 @@ class _Comparison:
             own = self._fitted(hidden.name, 0, hidden.joint)
         found.append(Rival("own", math.sqrt(own)))
         for known in names:
-            name, law = drawn_as(known)
+            name, law = find_drawn_law(known)
             if name in OPEN or known == known_as:
                 continue
             if name not in effects_of(self.rig):

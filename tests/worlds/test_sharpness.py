@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.worlds.drawing import sound_rig
-from tests.worlds.hiding import OTHER_NAMES, drawn_as, hide, known
+from tests.worlds.hiding import OTHER_NAMES, find_drawn_law, hide, known
 from tests.worlds.kinds import KINDS
 from tests.worlds.rig import Rig
 from tests.worlds.sharpness import detectability, sharpness
@@ -58,6 +58,6 @@ def test_of_two_effects_each_is_looked_for_beside_the_other(sound: Rig) -> None:
 def test_a_name_of_the_library_is_drawn_by_a_law_that_has_this_name(name: str) -> None:
     for law in OTHER_NAMES[name]:
         library = known(name, law)[0]
-        drawn, first = drawn_as(library)
+        drawn, first = find_drawn_law(library)
         assert drawn == name
         assert known(drawn, first)[0] == library

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from daq.contracts.effects import FORMER_EFFECTS, effect_names
 from model.discrepancy.diagnosis import FoundValue
-from model.effects.library import named_in_answers
+from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_name
 
@@ -142,4 +142,4 @@ def shape_in_torques(effect: str, *, slides: bool) -> str:
     if effect in IN_TORQUES:
         return IN_TORQUES[effect].format(**(SLIDING if slides else TURNING))
     known = effect_names()
-    return known[effect].line if effect in known else named_in_answers(effect).physics
+    return known[effect].line if effect in known else find_named_effect(effect).physics

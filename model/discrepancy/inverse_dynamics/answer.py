@@ -20,8 +20,9 @@ from model.discrepancy.inverse_dynamics.localisation import locate, remaining_sh
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.verdict import verdict
 from model.fitting.unknowns import Unknown
+from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.drive_timing import MOST, samples_late
-from model.inverse_dynamics.recorded_motion import RecordedMotion, drives_at_limit
+from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import summarise_posterior
@@ -78,7 +79,7 @@ def answer_of(outcome: Outcome, traces: Sequence[str], held_out: Sequence[str], 
         where=locate(standing.now, case),
         candidates=outcome.tried,
         remaining=shapes,
-        not_examined=drives_at_limit(case.records, standing.model.machine.modelled_joints).not_examined,
+        not_examined=find_drives_at_limit(case.records, standing.model.machine.modelled_joints).not_examined,
         model_before=standing.given,
         model_after=_resulting_model(outcome, traces),
         traces=tuple(traces),
@@ -164,7 +165,7 @@ def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note
 def _at_limits(standing: Standing) -> tuple[Note, ...]:
     """Where drives were at limits that no file states."""
     joints = standing.model.machine.modelled_joints
-    found = drives_at_limit((*standing.case.records, *standing.case.held_out), joints)
+    found = find_drives_at_limit((*standing.case.records, *standing.case.held_out), joints)
     values = {"shares": list(found.shares), "unknown_joints": list(found.unknown)}
     return (Note(kind="drive-at-limit", values=values),) if found.shares else ()
 

@@ -11,7 +11,7 @@ from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.effects.library import named_in_answers
+from model.effects.library import find_named_effect
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
 MOSTLY = 0.5
@@ -81,7 +81,7 @@ def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Flo
     Args:
         fell, left: mean squares (n,) on the fitted records without and with the candidate.
     """
-    if chosen.joints and named_in_answers(chosen.effect).shared_name.acts_on == "joint torque":
+    if chosen.joints and find_named_effect(chosen.effect).shared_name.acts_on == "joint torque":
         elsewhere = np.array([j not in chosen.joints for j in standing.model.machine.modelled_joints])
         fell = np.where(elsewhere, np.nan, fell)
     return holdout.is_beyond_noise(fell, left, standing.case.noise)

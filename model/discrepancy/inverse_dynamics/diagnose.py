@@ -21,7 +21,7 @@ from model.discrepancy.inverse_dynamics.judged_controller import JudgedControlle
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.effects.library import named_in_answers
+from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
 from model.inverse_dynamics.repeats import repeated_noise
@@ -110,7 +110,7 @@ def _names_slow_effects(answer: Diagnosis) -> bool:
 
 
 def _jumps(name: str) -> bool:
-    return name in JUMPING or named_in_answers(name).shared_name.family == FRICTION
+    return name in JUMPING or find_named_effect(name).shared_name.family == FRICTION
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from model.discrepancy.diagnosis import RemainingShape, Step
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, remaining_shapes
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.effects.library import named_in_answers
+from model.effects.library import find_named_effect
 
 FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
@@ -57,4 +57,4 @@ def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[Remai
 def _only_viscous(steps: Sequence[Step], joint: int) -> bool:
     """Whether viscous friction is the only friction that was named on a joint."""
     named = {s.effect for s in steps if s.adopted and joint in s.joints and s.effect is not None}
-    return {name for name in named if named_in_answers(name).shared_name.family == "friction"} == {VISCOUS}
+    return {name for name in named if find_named_effect(name).shared_name.family == "friction"} == {VISCOUS}

@@ -65,7 +65,7 @@ class Prober:
         null = {p.name: float(p.null) for p in trial.parameters if p.null is not None} | dict(trial.origin)
         best = Probe(trial, 0.0, trial.starts[0])
         if trial.stated:
-            best = Probe(trial, self._lifted(trial), dict(trial.origin))
+            best = Probe(trial, self._lift_priors(trial), dict(trial.origin))
         shares_of_start = (1.0,) if trial.effect in NONLINEAR else (1.0, SMALL)
         for start, share in itertools.product(trial.starts, shares_of_start):
             part = {n: null[n] + share * (start[n] - null[n]) for n in trial.amplitudes}
@@ -78,7 +78,7 @@ class Prober:
                 best = Probe(trial, gain, {**start, **scaled})
         return best
 
-    def _lifted(self, trial: Trial) -> float:
+    def _lift_priors(self, trial: Trial) -> float:
         """What the trial gains by its priors alone, with its numbers where they are."""
         own = (u for u in self.now.unknowns if u.name in trial.origin)
         return sum(prior_distance(u, self.now.values[u.name])[0] ** 2 for u in own)

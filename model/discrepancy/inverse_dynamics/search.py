@@ -17,7 +17,7 @@ from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.stated_numbers import take_back
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.discrepancy.inverse_dynamics.trial import Start
-from model.effects.library import named_in_answers
+from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.torque_balance import TorqueBalance
@@ -80,7 +80,7 @@ class Fitted:
         Friction that falls with speed is Coulomb friction where it hardly falls: the shorter law is then its name. A
         tilted base that gives the torque of friction by direction is another thing, whatever its parameters.
         """
-        family, others = (named_in_answers(f.effect).shared_name.family for f in (self, other))
+        family, others = (find_named_effect(f.effect).shared_name.family for f in (self, other))
         if len(self.parameters) <= len(other.parameters) or family != others:
             return False
         own, theirs = (

@@ -48,7 +48,7 @@ def stated_trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceF
     tolerances = _expected(now)
     mine = (p for p in model.parameters if p.effect == name and p.joints == joints and p.null is not None)
     own = tuple(p for p in mine if p.name in tolerances)
-    return _lifted(model, name, joints, now, [(p, tolerances[p.name]) for p in own]) if own and joints else None
+    return _lift_priors(model, name, joints, now, [(p, tolerances[p.name]) for p in own]) if own and joints else None
 
 
 def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
@@ -70,7 +70,7 @@ def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[T
         moved = [(p, u) for p, u in numbers if abs(prior_distance(u, now.values[p.name])[0]) >= TRIED]
         if moved:
             # both constants of a motor are of one magnet: one that is held would hold the other
-            yield _lifted(model, name, joints, now, numbers if name == "wrong_torque_constant" else moved)
+            yield _lift_priors(model, name, joints, now, numbers if name == "wrong_torque_constant" else moved)
 
 
 def take_back(effect: str, own: Sequence[Parameter], now: BalanceFit) -> dict[str, float]:
@@ -96,7 +96,7 @@ def _expected(now: BalanceFit) -> dict[str, Unknown]:
     return {u.name: u for u in now.unknowns if u.deviation is not None and not u.nuisance}
 
 
-def _lifted(
+def _lift_priors(
     model: Model, name: str, joints: tuple[int, ...], now: BalanceFit, numbers: Sequence[tuple[Parameter, Unknown]]
 ) -> Trial:
     """Stated numbers without their priors."""

@@ -13,7 +13,7 @@ from model import layout as at
 from model.arrays import Floats
 from model.inverse_dynamics import friction_at_rest
 from model.inverse_dynamics import supplied_torque as kernel
-from model.inverse_dynamics.friction_at_rest import RestingFriction, less_held
+from model.inverse_dynamics.friction_at_rest import RestingFriction, subtract_held
 from model.inverse_dynamics.link_motion import LinkMotion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, low_pass
 from model.machine_model.model import base_model
@@ -36,7 +36,7 @@ SHAPE = RECORD.speed.shape
 
 def held(left: Floats, level: float) -> Floats:
     """What friction of this level leaves of a residual torque (k, 1)."""
-    return less_held(left, coulomb(level), RECORD)
+    return subtract_held(left, coulomb(level), RECORD)
 
 
 def coulomb(level: float) -> RestingFriction:
@@ -99,7 +99,7 @@ def test_friction_of_no_level_takes_nothing_of_the_mean() -> None:
 def test_a_joint_that_never_turns_leaves_what_it_left() -> None:
     fast = replace(RECORD, speed=np.full(SHAPE, 1.0))
     left = noise(5)
-    assert less_held(left, coulomb(2.0), fast) is left
+    assert subtract_held(left, coulomb(2.0), fast) is left
 
 
 def test_friction_that_is_more_one_way_holds_more_on_that_side() -> None:
@@ -109,9 +109,9 @@ def test_friction_that_is_more_one_way_holds_more_on_that_side() -> None:
     motion = LinkMotion(RECORD.position, RECORD.speed, RECORD.acceleration, RECORD.contact)
     friction = friction_at_rest.friction_at_rest(np.full(SHAPE, 2.0), motion, joints)
     forwards = np.where(RECORD.turns, -3.5 - friction.sliding, 0.0)  # forwards, friction acts backwards
-    assert np.abs(less_held(forwards, friction, RECORD)[TURNS]).max() == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(subtract_held(forwards, friction, RECORD)[TURNS]).max() == pytest.approx(0.0, abs=1e-9)
     backwards = np.where(RECORD.turns, 3.5 - friction.sliding, 0.0)
-    assert less_held(backwards, friction, RECORD)[TURNS].max() > 1.0
+    assert subtract_held(backwards, friction, RECORD)[TURNS].max() > 1.0
 
 
 @pytest.mark.parametrize("column", [at.STRIBECK, at.BREAKAWAY])

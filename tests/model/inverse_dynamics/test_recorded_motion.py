@@ -131,9 +131,9 @@ def standing(stretch: float, every: float, size: float = 9.0) -> Floats:
 
 
 def share_left(record: RecordedMotion, missing: Floats) -> float:
-    """Share of the mean square of a torque (r,) that `less_unknown` leaves of it."""
+    """Share of the mean square of a torque (r,) that `subtract_unknown` leaves of it."""
     whole = record.compared(low_pass(missing[:: round(record.period / PERIOD), None], 3 * CUTOFF, record.period))
-    left = record.less_unknown(whole)
+    left = record.subtract_unknown(whole)
     moving = record.moving[:, 0]
     return float((left[moving] ** 2).sum() / (whole[moving] ** 2).sum())
 
@@ -161,14 +161,14 @@ def test_a_torque_that_is_missing_elsewhere_is_kept() -> None:
 def test_without_a_limit_torques_are_as_they_were() -> None:
     record = motion_of(4.0 * np.sin(2.7 * TIME))
     torque = np.random.default_rng(5).standard_normal((len(record.moving), 1))
-    assert record.less_unknown(torque) is torque
+    assert record.subtract_unknown(torque) is torque
 
 
 def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:
     record = motion_of(standing(0.16, 0.32))
     assert 0.4 < record.at_limit.mean() < 0.6
     assert share_left(record, np.sin(2.0 * TIME)) < 1e-20
-    resting = record.less_unknown(np.ones((len(record.moving), 1)))[~record.moving[:, 0]]
+    resting = record.subtract_unknown(np.ones((len(record.moving), 1)))[~record.moving[:, 0]]
     assert (resting == 1.0).all(), "samples at rest are not touched"
 
 
@@ -181,9 +181,9 @@ def test_dimensions_that_are_projected_away_count_as_no_samples() -> None:
     assert 0 < record.unknown_count[0] < rows
     assert own.counts.tolist() == [rows - record.unknown_count[0]]
     white = np.random.default_rng(2).standard_normal((len(record.moving), 1))
-    assert float(own.mean_squares([record.less_unknown(white)])[0]) == pytest.approx(1.0, abs=0.25)
+    assert float(own.mean_squares([record.subtract_unknown(white)])[0]) == pytest.approx(1.0, abs=0.25)
     assert every.counts[0] == every.samples == sum(r.stop - r.start for _, r in every.by_joint[0])
-    assert np.isnan(stretches_of([lost]).mean_squares([lost.less_unknown(white)])[0])
+    assert np.isnan(stretches_of([lost]).mean_squares([lost.subtract_unknown(white)])[0])
 
 
 def test_a_wheel_that_turns_many_times_is_low_passed_like_one_that_does_not() -> None:

@@ -17,7 +17,7 @@ from model.fitting.options import FitOptions
 from model.inverse_dynamics.link_motion import link_motion
 from model.inverse_dynamics.recorded_motion import recorded_motion
 from model.inverse_dynamics.smoothing import low_pass
-from model.inverse_dynamics.torque_balance import TorqueBalance, _followed
+from model.inverse_dynamics.torque_balance import TorqueBalance, _follow_with_lag
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
@@ -133,10 +133,10 @@ def test_a_vanishing_error_of_a_sensor_changes_nothing() -> None:
 def test_a_gear_that_damps_follows_a_straight_torque_late(time_constant: float) -> None:
     period = 0.004
     time = period * np.arange(400)
-    followed = _followed(2.0 * time, time_constant, period)
+    followed = _follow_with_lag(2.0 * time, time_constant, period)
     lag = time_constant * (1.0 - np.exp(-time / time_constant)) if time_constant else np.zeros_like(time)
     np.testing.assert_allclose(followed, 2.0 * (time - lag), atol=1e-12)
 
 
 def test_a_gear_that_damps_holds_what_is_constant() -> None:
-    np.testing.assert_allclose(_followed(np.full(50, 3.0), 0.01, 0.004), 3.0)
+    np.testing.assert_allclose(_follow_with_lag(np.full(50, 3.0), 0.01, 0.004), 3.0)

@@ -11,7 +11,7 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.effects.library import library, named_in_answers
+from model.effects.library import find_named_effect, library
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -68,6 +68,6 @@ def test_only_what_the_user_asks_for_is_tried() -> None:
 def test_numbers_of_the_machine_are_named_and_never_added() -> None:
     assert not set(MACHINE_NUMBERS) & set(library())
     for name, number in MACHINE_NUMBERS.items():
-        assert named_in_answers(name) is number
+        assert find_named_effect(name) is number
         assert number.shared_name.name == name
         assert not number.parameters
