@@ -37,14 +37,14 @@ def shown_candidates(
 def evidence_picture(
     candidates: Sequence[Candidate], chosen: Sequence[Candidate] = (), needed: float | None = None
 ) -> Picture:
-    """Fitted candidates by evidence, those that the answer names in full colour; probed ones below them.
+    """Fitted candidates by evidence of fitted and held-out traces, those that the answer names in full colour; probed ones below them.
 
     Args:
         needed: evidence from which an effect is named, drawn as a line.
     """
     named = {(c.effect, c.joints) for c in chosen}
     fitted, probed = shown_candidates(candidates, named)
-    scale = max(1.0, 1.15 * (needed or 0.0), *(c.evidence for c in fitted or probed))
+    scale = max(1.0, 1.15 * (needed or 0.0), *(c.total for c in fitted or probed))
 
     def draw(figure: Figure) -> None:
         axes = panels(figure, 1, 1)[0][0]
@@ -79,13 +79,13 @@ def evidence_picture(
 def _bar(axes: Axes, place: float, c: Candidate, scale: float, *, named: bool) -> None:
     """The bar of a candidate. A probe beyond the scale of the fits is cut off; its number stands beside the bar."""
     colour = COLOURS[(c.joints[0] - 1) % len(COLOURS)] if c.joints else COLOURS[5]
-    length = min(max(c.evidence, 0.0), scale)
+    length = min(max(c.total, 0.0), scale)
     if c.refitted:
         axes.barh(place, length, 0.66, color=colour, alpha=1.0 if named else 0.35, lw=0)
     else:
         axes.barh(place, length, 0.5, facecolor="none", edgecolor=colour, ls=(0, (2, 1.5)), lw=0.8)
-    label = whole(c.evidence) + ("" if c.misfit is None else f", misfit {_misfit(c.misfit)}")
-    beyond = ", beyond the scale" if c.evidence > scale else ""
+    label = whole(c.total) + ("" if c.misfit is None else f", misfit {_misfit(c.misfit)}")
+    beyond = ", beyond the scale" if c.total > scale else ""
     axes.text(length + 0.008 * scale, place, label + beyond, va="center", fontsize=6.8, color=INK)
 
 

@@ -12,6 +12,8 @@ const tried = (effect: string, joint: number, evidence: number, refitted = true)
   misfit: refitted ? 1.1 : null,
   refitted,
   parameters: {},
+  evidence_held_out: null,
+  needed: null,
 });
 const candidates = [
   tried('stribeck_friction', 2, 80),
@@ -46,6 +48,16 @@ describe('candidates', () => {
       'explains 20 less than the best',
       'explains less than its parameters cost',
       'estimated by a quick probe, not fitted',
+    ]);
+  });
+
+  it('are ranked by what held-out traces say as well', () => {
+    const turn = turnOf({ ...step([]), evidence_held_out: 30 });
+    const other = { ...tried('gear_loss', 2, 90), evidence_held_out: 45 };
+    const bars = evidenceBars({ ...turn, candidates: [candidates[1]!, other] }, 10);
+    expect(bars.map((one) => [one.name, one.evidence])).toEqual([
+      ['gear_loss 2', 135],
+      ['coulomb_friction 2', 100],
     ]);
   });
 

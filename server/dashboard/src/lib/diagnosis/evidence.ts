@@ -5,6 +5,7 @@ import type { DiagnosisData, DiagnosisStep, TriedEffect } from '../api/types';
 export interface EvidenceBar {
   name: string;
   joint: number | null;
+  /** Of fitted and held-out traces. */
   evidence: number;
   /** 0 to 1, of the best that was fitted; a probe's promise beyond it is cut off there. */
   width: number;
@@ -18,7 +19,7 @@ export interface EvidenceBar {
 /** What was tried in one turn, and what it led to: an effect, or none. */
 export type Turn = Pick<
   DiagnosisStep,
-  'candidates' | 'group' | 'effect' | 'joints' | 'evidence' | 'margin'
+  'candidates' | 'group' | 'effect' | 'joints' | 'evidence' | 'evidence_held_out' | 'margin'
 > & {
   /** Evidence from which an effect would have been named; null where one was, or where it is not told. */
   needed: number | null;
@@ -34,7 +35,16 @@ export function turnWithoutStep(found: DiagnosisData): Turn | null {
   if (found.steps.length > 0 || found.candidates.length === 0) return null;
   const { candidates, significant } = found;
   const needed = candidates.find((one) => one.needed != null)?.needed ?? significant;
-  return { candidates, group: [], effect: null, joints: [], evidence: 0, margin: 0, needed };
+  return {
+    candidates,
+    group: [],
+    effect: null,
+    joints: [],
+    evidence: 0,
+    evidence_held_out: null,
+    margin: 0,
+    needed,
+  };
 }
 
 /**
@@ -42,16 +52,16 @@ export function turnWithoutStep(found: DiagnosisData): Turn | null {
  * something of. The two are not comparable: a fit shows what a candidate takes off, a probe what it might.
  */
 export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
-  const best = [...turn.candidates].sort((one, other) => other.evidence - one.evidence);
+  const best = [...turn.candidates].sort((one, other) => total(other) - total(one));
   const ranked = [...best.filter((one) => one.refitted), ...best.filter((one) => !one.refitted)];
-  const widest = Math.max(1, turn.needed ?? 1, ranked[0]?.evidence ?? 1);
+  const widest = Math.max(1, turn.needed ?? 1, ranked[0] ? total(ranked[0]) : 1);
   const named = new Set(turn.group.map(key));
   if (turn.effect !== null) named.add(key({ effect: turn.effect, joints: turn.joints }));
   return ranked.slice(0, most).map((one) => ({
     name: one.called,
     joint: one.joints[0] ?? null,
-    evidence: one.evidence,
-    width: Math.min(1, Math.max(0, one.evidence) / widest),
+    evidence: total(one),
+    width: Math.min(1, Math.max(0, total(one)) / widest),
     misfit: one.misfit,
     refitted: one.refitted,
     chosen: named.has(key(one)),
@@ -65,11 +75,16 @@ function reasonOf(one: TriedEffect, turn: Turn, chosen: boolean): string {
     return 'not distinguishable from the others of its group by these traces';
   if (chosen) return `leads the next candidate by ${Math.round(turn.margin)}`;
   if (!one.refitted) return 'estimated by a quick probe, not fitted';
-  if (one.evidence <= 0) return 'explains less than its parameters cost';
-  if (turn.needed !== null && one.evidence < turn.needed)
+  if (total(one) <= 0) return 'explains less than its parameters cost';
+  if (turn.needed !== null && total(one) < turn.needed)
     return `below the ${Math.round(turn.needed)} that are needed`;
   if (turn.effect === null) return 'rejected';
-  return `explains ${Math.round(turn.evidence - one.evidence)} less than the best`;
+  return `explains ${Math.round(total(turn) - total(one))} less than the best`;
+}
+
+/** What fitted and held-out traces say together. */
+function total(one: { evidence: number; evidence_held_out: number | null }): number {
+  return one.evidence + (one.evidence_held_out ?? 0);
 }
 
 function key(one: { effect: string; joints: readonly number[] }): string {
