@@ -37,7 +37,8 @@ def shown_candidates(
 def evidence_picture(
     candidates: Sequence[Candidate], chosen: Sequence[Candidate] = (), needed: float | None = None
 ) -> Picture:
-    """Fitted candidates by evidence of fitted and held-out traces, those that the answer names in full colour; probed ones below them.
+    """Fitted candidates by evidence of fitted and held-out traces, those that the answer names in full colour; probed
+    ones below them.
 
     Args:
         needed: evidence from which an effect is named, drawn as a line.
