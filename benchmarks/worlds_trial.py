@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.worlds import QUESTIONS, TOLD_APART, diagnose, names_of, score
+from benchmarks.worlds_intervals import covered
 from daq.contracts.documents import parse_toml, read_text
 from daq_cli.trial.registered import (
     REGISTERED,
@@ -96,6 +97,10 @@ class Row:
     """None where a name that was given was not compared with the effect, and where the sound arm can imitate it."""
     excess_removed: float | None
     seconds: float
+    intervals: int = 0
+    """Intervals of the effect's sizes that can be compared (`worlds_intervals`), of a single effect that was named."""
+    covering: int = 0
+    """Those of them that cover the truth."""
 
     @property
     def resolved(self) -> bool:
@@ -169,6 +174,7 @@ def row_of(folder: Path, kind: str, number: int) -> Row | None:
     truth, answer = json.loads((place_of(folder, kind, number) / "truth.json").read_text("utf-8")), kept["answer"]
     worth = score(truth, answer)
     names = [" | ".join(sorted(names)) for names in names_of(answer or {"steps": []})]
+    inside = covered(truth, answer)
     alone = [rival["d_prime"] for rival in truth.get("sharpness", []) if rival["name"] == "none"]
     return Row(
         *(kind, number, kept["seed"], kept["case"]),
@@ -185,6 +191,8 @@ def row_of(folder: Path, kind: str, number: int) -> Row | None:
         sharp=worth.sharp,
         excess_removed=excess_removed_whole(Diagnosis.model_validate(answer)) if answer else None,
         seconds=kept["seconds"],
+        intervals=len(inside),
+        covering=sum(inside),
     )
 
 
@@ -247,7 +255,7 @@ def _value(name: str, text: str) -> Any:
         return bool(int(text)) if text else None
     if name in ("d_prime", "excess_removed", "seconds"):
         return float(text) if text else None
-    return int(text) if name in ("number", "seed") else text
+    return int(text) if name in ("number", "seed", "intervals", "covering") else text
 
 
 def table(rows: Sequence[Row]) -> list[str]:
@@ -275,6 +283,12 @@ def table(rows: Sequence[Row]) -> list[str]:
     line(DETECTABLE, TO_REACH["both"], "both", seen)
     line(QUESTIONS["honest"], TO_REACH["honest"], "honest", rows)
     line(DETECTABLE, TO_REACH["honest"], "honest", seen)
+    inside = {kind: [row for row in rows if row.kind == kind and row.intervals] for kind in kinds}
+    if any(inside.values()):
+        counts = [(sum(r.covering for r in some), sum(r.intervals for r in some)) for some in inside.values()]
+        whole = rate(hit for hits, of in counts for hit in (*[True] * hits, *[False] * (of - hits)))
+        cells = " | ".join(f"{hits}/{of}" if of else "–" for hits, of in counts)
+        lines.append(f"| intervals of named single effects that cover the truth | 92–98 % | {whole} | {cells} |")
     late = {kind: sum(row.verdict == "late" for row in rows if row.kind == kind) for kind in kinds}
     lines.append(f"| no answer in the time | | {sum(late.values())} | {' | '.join(map(str, late.values()))} |")
     medians = [f"{np.median([row.seconds for row in rows if row.kind == kind]):.0f}" for kind in kinds]
