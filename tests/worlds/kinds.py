@@ -228,10 +228,6 @@ REPORTED: dict[str, Kind] = {
         motions=("sines", "via points"),
         known_loop=False,
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-rounded-sines": replace(
         _AXIS, rate=(250.0,), bits=(16,), rounding=0.003, limit=0.6, contacts=(SWITCH,), motions=("sines", "sweep")
     ),
@@ -255,6 +251,46 @@ REPORTING: dict[str, Kind] = {
         bits=(17,),
         contacts=(SWITCH,),
         motions=("via points", "sines"),
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-cascade-rounded": replace(
+        _AXIS,
+        controller=CASCADE,
+        rate=(250.0,),
+        bits=(16,),
+        rounding=0.002,
+        contacts=(TANH,),
+        motions=("ramps", "sines"),
+    ),
+    "axis-board-steps": replace(
+        _AXIS, controller=BOARD, rate=(50.0,), bits=(12,), contacts=(BRISTLE,), motions=("steps", "via points")
+    ),
+    "planar-coloured-via": replace(
+        _PLANAR, rate=(250.0,), bits=(15,), coloured=0.5, noise=0.2, contacts=(SWITCH,), motions=("via points",)
+    ),
+    "arm-sweep": replace(_ANTHROPOMORPHIC, rate=(200.0,), bits=(15,), contacts=(BRISTLE,), motions=("sweep", "ramps")),
+    "arm-current-body": replace(
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(18,),
+        contacts=(TANH,),
+        motions=("sines", "via points"),
+        recorded=("drive", "velocity"),
+        known_loop=False,
+        body=True,
+    ),
+    "six-rounded": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        rate=(250.0,),
+        bits=(17,),
+        rounding=0.002,
+        contacts=(SWITCH,),
+        motions=("via points", "random steps"),
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
