@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,16 +42,27 @@ def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[R
     return mean_squares(stretches_of(records), _residuals(model, values, records))
 
 
+@dataclass(frozen=True)
+class Told:
+    """What held-out records say for a fit, as evidence.
+
+    alone: with independent samples counted in its own residual. compared: counted in one way for several fits, so that
+    they can be compared: a fit whose residual is whiter has more samples, and is no better for that.
+    """
+
+    alone: float
+    compared: float
+
+
 def evidence(
     before: BalanceFit, after: Sequence[BalanceFit], records: tuple[RecordedMotion, ...], noise: Floats
-) -> list[float]:
+) -> list[Told]:
     """Fall of −2 log likelihood of records that no fit has seen, by each of several later fits; above 0 where one
     predicts them better than the fit before.
 
     Nothing was fitted to these records, so parameters cost nothing here: by the chain rule of probability it adds to
-    the evidence of the fitted records. So that later fits can be compared, one number of independent samples holds for
-    all: on every joint that of the fit that leaves least there. What is below the `noise` (n,) of a joint is no better
-    for being less.
+    the evidence of the fitted records. Several fits are compared with the memory of the one that leaves least on a
+    joint. What is below the `noise` (n,) of a joint is no better for being less.
     """
     if not after:
         return []
@@ -58,9 +70,13 @@ def evidence(
     first, *last = (_residuals(f.balance.model, f.values, records) for f in (before, *after))
     squares = np.nan_to_num([stretches.mean_squares(residual) for residual in last])
     memories = np.array([noise_model(stretches, residual, noise).memory for residual in last])
-    memory = np.take_along_axis(memories, squares.argmin(axis=0)[np.newaxis], axis=0)[0]
-    costs = [minus_twice_log_likelihood(stretches, residual, memory, noise).sum() for residual in (first, *last)]
-    return [float(costs[0] - cost) for cost in costs[1:]]
+    shared = np.take_along_axis(memories, squares.argmin(axis=0)[np.newaxis], axis=0)[0]
+
+    def fall(residual: Sequence[Floats], memory: Floats) -> float:
+        costs = (minus_twice_log_likelihood(stretches, r, memory, noise).sum() for r in (first, residual))
+        return float(np.subtract(*costs))
+
+    return [Told(fall(left, own), fall(left, shared)) for left, own in zip(last, memories, strict=True)]
 
 
 def block_squares(now: BalanceFit) -> Floats:

@@ -39,6 +39,8 @@ ALIKE = 0.97
 JOINT_GAIN = 12.0
 """Fall of the squares above which a joint is taken into an effect that acts on several."""
 
+RESOLVED_ODDS = 2
+"""Decimals of evidence by which candidates are ordered."""
 FILE_IS_RIGHT = 2 * float(np.log(100.0))
 """Handicap of a number of the machine file against effects of the library, as evidence. That a file states a number
 with a deviation and is wrong by many of them is assumed to be a hundred times rarer than an effect that it leaves out:
@@ -63,11 +65,13 @@ class Fitted:
     """Share of the fall of −2 log posterior that is of priors: numbers that no longer have to be off."""
     told: float = 0.0
     """What held-out records say for it, as evidence; 0 where there are none."""
+    told_compared: float = 0.0
+    """The same, counted as for all other candidates (`holdout.Told`)."""
 
     @property
     def log_odds(self) -> float:
         """Evidence of all records with the prior odds of its kind: what it competes with other candidates by."""
-        return self.evidence + self.told - (FILE_IS_RIGHT if self.effect in MACHINE_NUMBERS else 0.0)
+        return self.evidence + self.told_compared - (FILE_IS_RIGHT if self.effect in MACHINE_NUMBERS else 0.0)
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -264,7 +268,13 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
         )
         for f in found
     ]
-    return sorted(weighed, key=lambda f: -f.log_odds)
+    return sorted(weighed, key=order_by_odds)
+
+
+def order_by_odds(found: Fitted) -> float:
+    """Sort key: the most probable candidate first. Those that differ by rounding alone keep their order, so that no
+    answer depends on the unit of a drive."""
+    return -round(found.log_odds, RESOLVED_ODDS)
 
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

@@ -22,7 +22,7 @@ from model.discrepancy.inverse_dynamics.judging import (
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
-from model.discrepancy.inverse_dynamics.search import Findings, Fitted
+from model.discrepancy.inverse_dynamics.search import Findings, Fitted, order_by_odds
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.machine_model.model import Model
 
@@ -118,7 +118,7 @@ def _group(case: TorqueCase, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[
     near = [r for r in rivals if _cannot_be_told(case.options, chosen, r)]
     if not near:
         return ()
-    group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.log_odds)
+    group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=order_by_odds)
     return tuple(_candidate(case, c) for c in group)
 
 
@@ -132,7 +132,7 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     """
     needed = needed_lead(options, chosen, rival)
     lead = chosen.log_odds - rival.log_odds
-    lead = max(lead, lead - (chosen.told - rival.told))
+    lead = max(lead, lead - (chosen.told_compared - rival.told_compared))
     if lead < needed:
         return True
     of_records = lead + (chosen.cost - len(chosen.parameters)) - (rival.cost - len(rival.parameters))

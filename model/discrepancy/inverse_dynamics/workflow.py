@@ -17,7 +17,7 @@ from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
-from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
+from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, order_by_odds, search
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
@@ -117,7 +117,7 @@ class TorqueWorkflow:
         options = self.case.options.model_copy(update={"joints": joints} if joints else {})
         case, also_from = replace(self.case, options=options), None if before is None else before.now.values
         findings = search(found.model, found.now, case, self._report, self.cancel, also_from)
-        fitted = sorted(self._with_held_out(found, findings.fitted), key=lambda f: -f.log_odds)
+        fitted = sorted(self._with_held_out(found, findings.fitted), key=order_by_odds)
         resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
             findings,
@@ -131,7 +131,10 @@ class TorqueWorkflow:
         asked = [c for c in candidates if held and c.evidence > 0]
         told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
         others = [c for c in candidates if not any(c is one for one in asked)]
-        return [*(replace(c, told=one) for c, one in zip(asked, told, strict=True)), *others]
+        return [
+            *(replace(c, told=one.alone, told_compared=one.compared) for c, one in zip(asked, told, strict=True)),
+            *others,
+        ]
 
     def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
         """What would have been enough evidence to be named, had its size not ended where no machine is."""

@@ -51,7 +51,7 @@ def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() ->
 
 
 def candidate(effect: str, flow: TorqueWorkflow, evidence: float, told: float = 0.0) -> Fitted:
-    return Fitted(effect, (1,), flow.model, (), flow.first, evidence, told=told)
+    return Fitted(effect, (1,), flow.model, (), flow.first, evidence, told=told, told_compared=told)
 
 
 def test_the_file_is_trusted_against_an_effect_but_not_against_any_evidence() -> None:
@@ -70,9 +70,10 @@ def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> N
     other = next(f.fit for f in found if f.effect != "coulomb_friction")
     alone = holdout.evidence(flow.first, [coulomb], flow.case.held_out, flow.case.noise)
     both = holdout.evidence(flow.first, [coulomb, other, coulomb], flow.case.held_out, flow.case.noise)
-    assert both[0] == both[2] > 30.0
-    assert both[0] >= both[1]
-    assert both[0] == pytest.approx(alone[0], rel=0.5)
+    assert both[0] == both[2]
+    assert both[0].compared > 30.0
+    assert both[0].compared >= both[1].compared
+    assert both[0].alone == alone[0].alone == alone[0].compared
     assert holdout.evidence(flow.first, [], flow.case.held_out, flow.case.noise) == []
 
 
