@@ -146,7 +146,7 @@ def _times(value: float, stated: float) -> str:
 
 
 def _taken_out_again(v: Values) -> str:
-    return f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: a later effect explains it"
+    return f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: the others explain it"
 
 
 def _tolerances_fitted_first(v: Values) -> str:
@@ -171,7 +171,9 @@ def _tolerance_source(v: Values) -> str:
 
 def _torque_left(v: Values) -> str:
     records = "held-out traces" if v["held_out"] else "the traces fitted to"
-    return f"torque left unexplained on {records}: {v['before']:.1%} of the recorded before, {v['after']:.1%} after"
+    given = f"{v['given']:.1%} of the recorded by the model as given, " if "given" in v else ""  # older answers lack it
+    shares = f"{given}{v['before']:.1%} with its numbers fitted, {v['after']:.1%} at the end"
+    return f"torque left unexplained on {records}: {shares}"
 
 
 def _unfinished_record(v: Values) -> str:

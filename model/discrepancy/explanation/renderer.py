@@ -366,7 +366,8 @@ def _torque_reason(step: Step, reason: Reason) -> str:
     sizes = ", ".join(_torque_size(v, several=several, slides=reason.slides) for v in step.parameters.values())
     if reason.removed is None:
         return f"{place}{seen} ({sizes})"
-    return f"{place}{seen} ({sizes}); it takes {reason.removed:.0%} off the mean square on records not fitted to"
+    gone = percent_gone(reason.removed, 0)
+    return f"{place}{seen} ({sizes}); it takes {gone} off the mean square on records not fitted to"
 
 
 def _torque_size(value: FoundValue, *, several: bool, slides: bool) -> str:
@@ -453,7 +454,7 @@ def not_a_finding(answer: Diagnosis, where: Where) -> str:
     tried = sorted([*last, *(c for s in answer.steps for c in s.candidates)], key=lambda c: -c.total)[:1]
     line = next((c.needed for c in tried if c.needed is not None), answer.significant)
     needed = [] if line is None else [f"an effect is named from evidence {line:.0f} on"]
-    best = [f"the best, {placed(c.effect, c.joints)}, has evidence {c.evidence:.0f}" for c in tried]
+    best = [f"the best, {placed(c.effect, c.joints)}, has evidence {c.total:.0f}" for c in tried]
     because = f": {'; '.join((*needed, *best))}" if needed or best else ""
     return f"{'' if where.joint is not None else certain}This is not a finding{because}."
 

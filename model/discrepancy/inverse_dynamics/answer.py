@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Suspicion
-from model.discrepancy.explanation.notes import on_named_numbers, on_stated_numbers
+from model.discrepancy.explanation.notes import on_drives_at_limit, on_named_numbers, on_stated_numbers
 from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors, standard_deviations
@@ -144,13 +144,15 @@ def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
 
 
 def _torque_left(outcome: Outcome) -> Note:
-    """Residual as a share of the recorded torque, before and after: the figure that the literature usually gives."""
+    """Residual as a share of the recorded torque, by the model as given, with its numbers fitted, and after: the figure
+    that the literature usually gives."""
     standing = outcome.standing
     held = standing.case.held_out
     records = held or standing.case.records
+    given = holdout.relative_torque_error(standing.given, {}, records)
     before = holdout.relative_torque_error(standing.given, outcome.first.values, records)
     after = holdout.relative_torque_error(standing.model, standing.now.values, records)
-    return Note(kind="torque-left", values={"held_out": bool(held), "before": before, "after": after})
+    return Note(kind="torque-left", values={"held_out": bool(held), "given": given, "before": before, "after": after})
 
 
 def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note, ...]:
@@ -166,8 +168,7 @@ def _at_limits(standing: Standing) -> tuple[Note, ...]:
     """Where drives were at limits that no file states."""
     joints = standing.model.machine.modelled_joints
     found = find_drives_at_limit((*standing.case.records, *standing.case.held_out), joints)
-    values = {"shares": list(found.shares), "unknown_joints": list(found.unknown)}
-    return (Note(kind="drive-at-limit", values=values),) if found.shares else ()
+    return on_drives_at_limit(found.shares, found.unknown)
 
 
 def _timing(standing: Standing) -> tuple[Note, ...]:

@@ -9,6 +9,7 @@ from model.discrepancy.diagnosis import Step
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.estimates import signal_errors
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
+from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
 from model.machine_model.model import Model
 
@@ -32,8 +33,8 @@ def split_step(model: Model, step: Step, joint: int) -> tuple[Step, Step]:
 
 
 def describe_in_order(refitter: Refitter, found: Found) -> Found:
-    """With errors of every adopted step before and after it, where only those before it are in place: a step that was
-    looked for again has those of a model with the later ones."""
+    """With what every adopted step takes off, and where, with only those before it in place: a step that was looked
+    for again was compared with the later ones in place. Its evidence stays that."""
     stages = [found]
     for step in reversed(found.adopted):
         stages.append(refitter.remove(stages[-1], step))
@@ -49,9 +50,17 @@ def _with_errors(refitter: Refitter, step: Step, before: Found, after: Found) ->
     case = refitter.case
     fits = (before.now, after.now)
     fitted = [holdout.mean_squares(case.stretches, f.residual) for f in fits]
-    update: dict[str, object] = {"rmse_fit": signal_errors(after.model, fitted[0], fitted[1], case.noise)}
     if case.held_out:
-        held = [holdout.held_out_squares(f.balance.model, f.values, case.held_out) for f in fits]
-        update["rmse_holdout"] = signal_errors(after.model, held[0], held[1], case.noise)
-        update["excess_removed_holdout"] = excess_removed(case.noise, fitted[0], held[0], held[1])
+        others = [holdout.held_out_squares(f.balance.model, f.values, case.held_out) for f in fits]
+    else:
+        others = [holdout.block_squares(f) for f in fits]
+    removed = holdout.share_removed(fitted[0], fitted[1], others[0], others[1])
+    update: dict[str, object] = {
+        "rmse_fit": signal_errors(after.model, fitted[0], fitted[1], case.noise),
+        "where": locate(before.now, case),
+        "reason_data": step.reason_data.model_copy(update={"removed": removed}) if step.reason_data else None,
+    }
+    if case.held_out:
+        update["rmse_holdout"] = signal_errors(after.model, others[0], others[1], case.noise)
+        update["excess_removed_holdout"] = excess_removed(case.noise, fitted[0], others[0], others[1])
     return step.model_copy(update=update)

@@ -243,7 +243,8 @@ def _fit_effect(
     if fitted.criterion > now.criterion:
         null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
         begin = {**now.values, **start, **null, **take_back(effect, own, now)}
-        fitted = fit(balance, unknowns, begin, now.data, now.noise.memory)
+        again = fit(balance, unknowns, begin, now.data, now.noise.memory)
+        fitted = min(fitted, again, key=lambda f: f.criterion)
     if also_from is not None:
         others = {name: value for name, value in also_from.items() if name not in free}
         second = fit(balance, unknowns, {**now.values, **start, **others}, now.data, now.noise.memory)
@@ -253,7 +254,8 @@ def _fit_effect(
 
 def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted]:
     """The candidates with their evidence, best first; on every joint the residual of the fit that leaves least there
-    decides how many samples are independent."""
+    decides how many samples are independent. A fit without a finite value is none."""
+    found = [f for f in found if np.isfinite(f.fit.criterion)]
     if not found:
         return []
     models = [noise_model(now.data.stretches, f.fit.residual, now.data.floor) for f in found]

@@ -29,6 +29,8 @@ REVISIONS = 2
 """Times that all effects are looked for once more, at most: again where the first time has changed one."""
 STRUCTURE = "leaves-more-than-noise"
 """Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
+SUPERFLUOUS = "superfluous"
+"""Kind of refusal of an effect that nothing needs any more."""
 BEGUN_WITH = 2
 """Refused effects with which a pair is begun, at most."""
 
@@ -64,6 +66,11 @@ class TorqueWorkflow:
                 break
             self._take_steps()
         self._withdraw_wrong_laws()
+        self.notes += [
+            Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
+            for number, step in enumerate(self.found.steps, start=1)
+            if step.refusal is not None and step.refusal.kind == SUPERFLUOUS
+        ]
         if len(self.found.adopted) > 1:
             self.found = describe_in_order(self.refitter, self.found)
 
@@ -87,7 +94,9 @@ class TorqueWorkflow:
         return answer_of(outcome, traces, held_out, cutoff)
 
     def _take_steps(self) -> None:
-        while len(self.found.adopted) < self.case.options.most_steps:
+        for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn
+            if len(self.found.adopted) >= self.case.options.most_steps:
+                break
             before = self.found
             self._report(0.1, "what is missing")
             findings = self._search(before)
@@ -165,6 +174,8 @@ class TorqueWorkflow:
         Args:
             before, after: before that step, and with what it refused. findings: of that step.
         """
+        if len(before.adopted) + 2 > self.case.options.most_steps:
+            return after
         refusals = {(s.effect, s.joints): s for s in after.steps[len(before.steps) :] if _leaves_structure(s)}
         for first in [f for f in findings.fitted if (f.effect, f.joints) in refusals][:BEGUN_WITH]:
             half = self.refitter.take(before, first)
@@ -195,17 +206,18 @@ class TorqueWorkflow:
             for joint in step.joints:
                 self._report(0.9, "whether another effect explains it better")
                 self.found = self._look_again_on(self.found, step.effect, joint)
-        return [(s.effect, s.joints) for s in self.found.adopted] != before
+        return {(s.effect, s.joints) for s in self.found.adopted} != set(before)
 
     def _look_again(self, found: Found, step: Step) -> Found:
         """With what explains best what an effect explained: itself, or another one; nothing, where it has become
         superfluous."""
-        others = tuple(s for s in found.steps if s is not step)
+        place = next(k for k, s in enumerate(found.steps) if s is step)
+        others = (*found.steps[:place], *found.steps[place + 1 :])
         without = replace(self.refitter.remove(found, step), steps=others)
         findings = self._search(without, step.joints, found)
         again = self._adopt(without, findings)
         if _has_more(again, without):
-            return replace(again, steps=(*others, again.steps[-1]))
+            return replace(again, steps=(*others[:place], again.steps[-1], *others[place:]))
         mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
         if all(f.evidence + f.told >= SUSPECTED for f in mine):
             return found
@@ -222,7 +234,7 @@ class TorqueWorkflow:
         again = self._adopt(without, self._search(without, (joint,), found))
         if not _has_more(again, without) or again.steps[-1].effect == effect:
             return found
-        return replace(again, steps=(*others, again.steps[-1]))
+        return self._look_again(replace(again, steps=(*others, again.steps[-1])), rest)
 
     def _prune(self, latest: int) -> None:
         """Take out effects of earlier steps that the latest one has made superfluous."""
@@ -235,9 +247,7 @@ class TorqueWorkflow:
 
     def _superfluous(self, without: Found, found: Found, step: Step) -> Found:
         """Without an effect, whose step is told as superfluous."""
-        gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
-        number = next(k for k, s in enumerate(found.steps) if s is step)
-        self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": number + 1}))
+        gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=SUPERFLUOUS)})
         return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
 
     def _withdraw_wrong_laws(self) -> None:
