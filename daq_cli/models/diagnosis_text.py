@@ -101,7 +101,7 @@ def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
 
 def _candidate(candidate: Candidate) -> str:
     misfit = "" if candidate.misfit is None else f"   misfit {candidate.misfit:.2f}"
-    return f"{candidate.evidence:{COLUMN}.0f}  {effect_on(candidate.effect, candidate.joints)}{misfit}"
+    return f"{candidate.total:{COLUMN}.0f}  {effect_on(candidate.effect, candidate.joints)}{misfit}"
 
 
 def _without_steps(found: Diagnosis) -> list[str]:

@@ -66,8 +66,8 @@ class Candidate(FrozenRecord):
     refitted: bool = False
     parameters: dict[str, FoundValue] = {}
     evidence_held_out: float | None = None
-    """What held-out traces say for it, which decides together with `evidence`, with nothing fitted to them. By torques;
-    None where there are none."""
+    """What held-out traces say for it, which decides together with `evidence`, with nothing fitted to them: counted as
+    for the other candidates, and where `needed` is told, by itself. By torques; None where there are none."""
     needed: float | None = None
     """Sum of both from which it would be named: by torques, of the best candidate of a step that added nothing."""
 

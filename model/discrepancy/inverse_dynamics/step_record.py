@@ -87,7 +87,8 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
     best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
     chosen = found.fitted[best]
     needed = needed_evidence(standing, chosen, explains_most=explains_most(standing, chosen))
-    return (*listed[:best], listed[best].model_copy(update={"needed": needed}), *listed[best + 1 :])
+    told = {"evidence_held_out": chosen.told} if standing.case.held_out else {}
+    return (*listed[:best], listed[best].model_copy(update={"needed": needed, **told}), *listed[best + 1 :])
 
 
 def _candidate(case: TorqueCase, c: Fitted) -> Candidate:
@@ -97,7 +98,7 @@ def _candidate(case: TorqueCase, c: Fitted) -> Candidate:
         effect=c.effect,
         joints=c.joints,
         evidence=c.evidence,
-        evidence_held_out=c.told if case.held_out else None,
+        evidence_held_out=c.told_compared if case.held_out else None,
         refitted=True,
         misfit=float(np.nanmean(squares / case.noise**2)),
         parameters=values,
