@@ -279,6 +279,22 @@ def order_by_odds(found: Fitted) -> float:
     return -round(found.log_odds, RESOLVED_ODDS)
 
 
+def prefer_fewer_joints(found: Sequence[Fitted]) -> list[Fitted]:
+    """Candidates, best first, of which the best gives way to the same effect on fewer joints where the others bring
+    little: `JOINT_GAIN` for each is what a joint is taken in for."""
+    if not found:
+        return []
+    best = found[0]
+
+    def does_as_much(other: Fitted) -> bool:
+        more = len(best.joints) - len(other.joints)
+        is_part = other.effect == best.effect and set(other.joints) < set(best.joints)
+        return is_part and bool(other.joints) and best.log_odds - other.log_odds < more * JOINT_GAIN
+
+    fewer = sorted((f for f in found if does_as_much(f)), key=lambda f: len(f.joints))
+    return [*fewer[:1], *(f for f in found if not any(f is one for one in fewer[:1]))]
+
+
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
     return _fell(before, after, memory) + before.prior - after.prior - cost_of(before, memory, parameters, places)

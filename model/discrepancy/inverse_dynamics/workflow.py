@@ -17,7 +17,14 @@ from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
-from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, order_by_odds, search
+from model.discrepancy.inverse_dynamics.search import (
+    Findings,
+    Fitted,
+    evidence,
+    order_by_odds,
+    prefer_fewer_joints,
+    search,
+)
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
@@ -126,7 +133,7 @@ class TorqueWorkflow:
         options = self.case.options.model_copy(update={"joints": joints} if joints else {})
         case, also_from = replace(self.case, options=options), None if before is None else before.now.values
         findings = search(found.model, found.now, case, self._report, self.cancel, also_from)
-        fitted = sorted(self._with_held_out(found, findings.fitted), key=order_by_odds)
+        fitted = prefer_fewer_joints(sorted(self._with_held_out(found, findings.fitted), key=order_by_odds))
         resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
             findings,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from daq.contracts.machine import Machine
@@ -12,7 +14,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.search import FILE_IS_RIGHT, Fitted, search
+from model.discrepancy.inverse_dynamics.search import FILE_IS_RIGHT, Fitted, prefer_fewer_joints, search
 from model.discrepancy.inverse_dynamics.stated_numbers import take_back
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
@@ -60,6 +62,19 @@ def test_the_file_is_trusted_against_an_effect_but_not_against_any_evidence() ->
     assert candidate("wrong_resistance", flow, 40.0).log_odds < load.log_odds
     assert candidate("wrong_resistance", flow, 41.0 + FILE_IS_RIGHT).log_odds > load.log_odds
     assert candidate("gear_loss", flow, 30.0, told=15.0).log_odds > load.log_odds
+
+
+def test_a_joint_that_brings_little_is_not_named_with_the_others() -> None:
+    flow = sliding({"coulomb": 8.0}, TorqueOptions())
+    both, one, little = (
+        replace(candidate("gear_loss", flow, evidence), joints=joints)
+        for evidence, joints in ((100.0, (1, 2)), (95.0, (1,)), (60.0, (2,)))
+    )
+    other = candidate("backlash", flow, 97.0)
+    assert [f.joints for f in prefer_fewer_joints([both, other, one, little])] == [(1,), (1, 2), (1,), (2,)]
+    assert prefer_fewer_joints([replace(both, evidence=110.0), one])[0].joints == (1, 2)
+    assert prefer_fewer_joints([other, both, one])[0] is other
+    assert prefer_fewer_joints([]) == []
 
 
 def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> None:
