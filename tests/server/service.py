@@ -44,8 +44,7 @@ class Service:
 
     def status(self) -> dict[str, Any]:
         """Of the robot."""
-        found: dict[str, Any] = self.client.get("/robots/ma2000").json()
-        return found
+        return self._until("/robots/ma2000", lambda _: True)
 
     def until_arm(self, state: str) -> dict[str, Any]:
         """Asks until the arm's state is told: a stop is answered before everybody has heard of it. The status."""
