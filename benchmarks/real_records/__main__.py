@@ -50,12 +50,10 @@ def names(answer: dict[str, Any]) -> list[str]:
 
 
 def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    """Whether two answers name the same with the same margins, to a hundredth, or to a thousandth of the evidence: a
-    group's margin is the small difference of two. Sizes in units of the drive are left out."""
+    """Whether two answers name the same with the same margins. Sizes in units of the drive are left out."""
     steps = [[s for s in answer["steps"] if s["adopted"]] for answer in (one, other)]
     return names(one) == names(other) and all(
-        abs(a["margin"] - b["margin"]) <= max(0.01, 0.01 * abs(a["margin"]), 0.001 * abs(a["evidence"]))
-        for a, b in zip(*steps, strict=True)
+        abs(a["margin"] - b["margin"]) <= 0.01 * max(1.0, abs(a["margin"])) for a, b in zip(*steps, strict=True)
     )
 
 

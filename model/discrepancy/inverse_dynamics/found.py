@@ -66,7 +66,7 @@ class Refitter:
         return Standing(self.case, self.given, found.model, found.now, found.steps)
 
     def take(self, found: Found, chosen: Fitted) -> Found:
-        """With a candidate more; its step is not added."""
+        """Adds a candidate to the model and fits that; the step is the caller's to add."""
         values = chosen.fit.values
         friction = bool(chosen.stated) and all(p.effect is not None for p in chosen.stated)
         falls = friction and all(values[p.name] < p.value for p in chosen.stated)
@@ -82,8 +82,8 @@ class Refitter:
         )
 
     def remove(self, found: Found, step: Step) -> Found:
-        """Without the effect of a step, and with what it had named of the file's numbers as tolerances again; the step
-        stays in the list."""
+        """Takes the effect of a step out and fits the rest; numbers of the file that it had named are tolerances again.
+        The step stays in the list."""
         own = set(step.parameters)
         added = {name: p for name, p in found.added.items() if name not in own}
         model = self._without(found.model, step)

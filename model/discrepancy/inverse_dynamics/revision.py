@@ -33,8 +33,8 @@ def split_step(model: Model, step: Step, joint: int) -> tuple[Step, Step]:
 
 
 def describe_in_order(refitter: Refitter, found: Found) -> Found:
-    """With what every adopted step takes off, and where, with only those before it in place: a step that was looked
-    for again was compared with the later ones in place. Its evidence stays that."""
+    """Measures again what every adopted step takes off, and where, with only the steps before it in place. A step that
+    was looked for again was measured with the later ones in place; its evidence stays that."""
     stages = [found]
     for step in reversed(found.adopted):
         stages.append(refitter.remove(stages[-1], step))

@@ -53,8 +53,6 @@ WINDING_SHARES = (0.01, 0.1)
 are tried."""
 PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
-TILTS = ((0.05, 0.05), (0.2, 0.2), (0.2, -0.2))
-"""Tilts of the base that are tried, rad. On an axis across gravity both angles together do what neither does alone."""
 FASTEST_RIPPLE = 1000.0
 """Fastest ripple that is tried, in rad of phase per rad (m)."""
 LONGEST_SCAN = 400
@@ -216,8 +214,7 @@ def _play(place: Place) -> Iterator[Start]:
 
 
 def _tilt(_place: Place) -> Iterator[Start]:
-    for about_x, about_y in TILTS:
-        yield {"about_x": about_x, "about_y": about_y}
+    yield {"about_x": 0.05, "about_y": 0.05}
 
 
 def _scanned(low: float, high: float, step: float) -> Floats:

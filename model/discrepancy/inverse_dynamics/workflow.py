@@ -159,7 +159,7 @@ class TorqueWorkflow:
         return [_size_at_bound(f) for f in best.values()]
 
     def _adopt(self, found: Found, findings: Findings) -> Found:
-        """With the best candidate that holds, if there is one, and the steps that were refused before it."""
+        """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
         refused: list[Fitted] = []
         passed_over: list[Fitted] = []  # they explain noise, or other records speak against them: no rivals either
         standing, steps = self.refitter.standing(found), list(found.steps)
@@ -175,8 +175,8 @@ class TorqueWorkflow:
         return replace(found, steps=tuple(steps))
 
     def _adopt_pair(self, before: Found, after: Found, findings: Findings) -> Found:
-        """With two effects on a joint of which each takes too little of what is no noise, and both leave little more
-        than noise; else as it is after the step that adopted nothing.
+        """Adds two effects of a joint, each of which takes too little of what is no noise while both leave little more
+        than noise. Where there are none, returns what the step left that adopted nothing.
 
         Args:
             before, after: before that step, and with what it refused. findings: of that step.
@@ -216,8 +216,8 @@ class TorqueWorkflow:
         return {(s.effect, s.joints) for s in self.found.adopted} != set(before)
 
     def _look_again(self, found: Found, step: Step) -> Found:
-        """With what explains best what an effect explained: itself, or another one; nothing, where it has become
-        superfluous."""
+        """Replaces an effect by what explains best what it explained: itself, or another effect. Takes it out where
+        nothing needs it any more."""
         place = next(k for k, s in enumerate(found.steps) if s is step)
         others = (*found.steps[:place], *found.steps[place + 1 :])
         without = replace(self.refitter.remove(found, step), steps=others)
@@ -231,7 +231,7 @@ class TorqueWorkflow:
         return self._superfluous(without, found, step)
 
     def _look_again_on(self, found: Found, effect: str | None, joint: int) -> Found:
-        """With another effect on one of the joints of an effect, where that explains it better."""
+        """Replaces an effect on one of its joints by another effect, where that explains the joint better."""
         step = next((s for s in found.adopted if s.effect == effect and joint in s.joints and len(s.joints) > 1), None)
         if step is None:
             return found
@@ -253,7 +253,7 @@ class TorqueWorkflow:
                 self.found = self._superfluous(without, self.found, step)
 
     def _superfluous(self, without: Found, found: Found, step: Step) -> Found:
-        """Without an effect, whose step is told as superfluous."""
+        """Takes an effect out and tells its step as superfluous."""
         gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=SUPERFLUOUS)})
         return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
 
