@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.diagnosis import Diagnosis, Step
 from model.discrepancy.explanation.notes import on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.gravity_doubts import on_gravity_along
@@ -30,7 +30,7 @@ from model.machine_model.model import Model
 
 LOOKS = (1.0, 1 / 2, 1 / 3)
 """Cutoffs of the torques that are compared, as shares of the highest that accelerations bear, in turn until something
-is found. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a sensor's scale,
+is found that it can name. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a sensor's scale,
 show below a lower one as well; gears that give and delays show below the highest alone."""
 FRICTION = "friction"
 """The family of effects that only the highest cutoff tells apart."""
@@ -77,8 +77,9 @@ def diagnose_torques(
 
 
 def _first_finding(work: _Records, highest: float, progress: Progress) -> Diagnosis:
-    """The answer below the highest cutoff; where nothing is found there, below the first lower one that names an effect
-    which lower cutoffs show as well."""
+    """The answer below the highest cutoff. Where nothing is found there, that of the first lower one that names an
+    effect which lower cutoffs show as well; where groups are found, that of the first lower one that tells them
+    apart."""
     found: list[Diagnosis] = []
     for k, share in enumerate(LOOKS):
         if found and not work.bears(share * highest):
@@ -88,8 +89,12 @@ def _first_finding(work: _Records, highest: float, progress: Progress) -> Diagno
             progress(begin + done / len(LOOKS), text)
 
         found.append(work.below(share * highest, tell))
-        if _finds(found[0]) or _names_slow_effects(found[-1]):
-            return found[-1]
+        first, last = found[0], found[-1]
+        if first.verdict == "ambiguous" and not _jumps_anywhere(first):
+            if _tells_apart(last, first):
+                return last
+        elif _finds(first) or _names_slow_effects(last):
+            return last
     return found[0]
 
 
@@ -100,13 +105,37 @@ def _finds(answer: Diagnosis) -> bool:
 
 
 def _names_slow_effects(answer: Diagnosis) -> bool:
-    """Whether effects are named of which none jumps, as friction does where motion turns: that is smeared below a low
+    """Whether effects are named, all of which lower cutoffs show as well."""
+    named = answer.verdict in ("named", "ambiguous") and bool(_found_in_torques(answer))
+    return named and not _jumps_anywhere(answer)
+
+
+def _jumps_anywhere(answer: Diagnosis) -> bool:
+    """Whether any effect of an answer may jump, as friction does where motion turns: that is smeared below a low
     cutoff, and what is left of it looks like friction of another size, or like an amplifier."""
-    if answer.verdict not in ("named", "ambiguous"):
+    return any(_jumps(name) for step in _found_in_torques(answer) for name in _names_of(step))
+
+
+def _tells_apart(answer: Diagnosis, first: Diagnosis) -> bool:
+    """Whether an answer gives one name to every step of the first one, of those that the step left open: the noise of
+    slow torques is small, so that they tell a sensor from a spring where the same record's fast ones do not."""
+    last, before = _found_in_torques(answer), _found_in_torques(first)
+    if answer.verdict != "named" or len(last) != len(before):
         return False
-    adopted = [step for step in answer.steps if step.adopted and step.proof is None]
-    names = {name for step in adopted for name in (step.effect, *(member.effect for member in step.group))}
-    return bool(adopted) and not any(name is not None and _jumps(name) for name in names)
+    open_ = [(set(step.joints), _names_of(step)) for step in before]
+    return all(
+        any(set(step.joints) == joints and _names_of(step) <= names for joints, names in open_) for step in last
+    )
+
+
+def _found_in_torques(answer: Diagnosis) -> list[Step]:
+    """The adopted steps but for those that the controller's own numbers prove."""
+    return [step for step in answer.steps if step.adopted and step.proof is None]
+
+
+def _names_of(step: Step) -> set[str]:
+    """The name that a step gives, or those of its group."""
+    return {name for name in (step.effect, *(member.effect for member in step.group)) if name is not None}
 
 
 def _jumps(name: str) -> bool:
