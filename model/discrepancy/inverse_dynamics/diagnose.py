@@ -18,6 +18,7 @@ from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.gravity_doubts import on_gravity_along
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
+from model.discrepancy.inverse_dynamics.judging import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import DiagnosisOptions, check_options
@@ -32,10 +33,8 @@ LOOKS = (1.0, 1 / 2, 1 / 3)
 """Cutoffs of the torques that are compared, as shares of the highest that accelerations bear, in turn until something
 is found that it can name. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a sensor's scale,
 show below a lower one as well; gears that give and delays show below the highest alone."""
-FRICTION = "friction"
-"""The family of effects that only the highest cutoff tells apart."""
 JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss", "supply_limit"})
-"""Effects outside that family whose torque jumps as friction's does, where motion or drive turns, or breaks off where
+"""Effects that are no friction, and whose torque jumps as friction's does, where motion or drive turns, or breaks off where
 the drive is at its limit."""
 LEAST_OF_TORQUE = 1e-3
 """Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
@@ -123,9 +122,7 @@ def _tells_apart(answer: Diagnosis, first: Diagnosis) -> bool:
     if answer.verdict != "named" or len(last) != len(before):
         return False
     open_ = [(set(step.joints), _names_of(step)) for step in before]
-    return all(
-        any(set(step.joints) == joints and _names_of(step) <= names for joints, names in open_) for step in last
-    )
+    return all(any(set(step.joints) == joints and _names_of(step) <= names for joints, names in open_) for step in last)
 
 
 def _found_in_torques(answer: Diagnosis) -> list[Step]:

@@ -17,6 +17,7 @@ from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
+from model.effects.library import find_named_effect
 
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
@@ -32,6 +33,10 @@ NO_PART = 0.4
 """Least share of a residual far above noise that an effect must take: on sound rigs those that are not there take up to
 35 %, and friction of a real motor, beside something else, 46 %. Any law takes a little of another one, and the
 evidence then counts the rest as noise."""
+NEARLY_ALL = 0.9
+"""Share of an effect's evidence from priors, above which stated numbers imitate it."""
+FRICTION = "friction"
+"""The family of effects of which a file states the size roughly."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 LEAD = 4.0
@@ -64,7 +69,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     Args:
         refused: candidates of the same step that were not taken before it.
     """
-    if chosen.evidence <= 0:
+    if chosen.evidence <= 0 and not is_far_from_file(chosen):
         return None
     most = explains_most(standing, chosen)
     if chosen.evidence + chosen.told < needed_evidence(standing, chosen, explains_most=most):
@@ -82,14 +87,28 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
     """Evidence from which a candidate is named. explains_most: whether it takes most of what is left.
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
-    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
+    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough; and where all of
+    it does, that a number of the file would have to be off by more than it is taken to be.
     """
     options = standing.case.options
+    if is_far_from_file(chosen):
+        return FAR_OFF**2 - chosen.cost
     least = options.least_evidence
     if explains_most:
         least = min(least, SUSPECTED)
     least -= chosen.relief * max(least - SUSPECTED, 0.0)
     return least + options.echo * _collected(standing, chosen.joints)
+
+
+def is_far_from_file(chosen: Fitted) -> bool:
+    """Whether a candidate stands for numbers that would have to be `FAR_OFF` deviations from what the file states.
+
+    k ln n is what a parameter costs of which every sample tells a little more (Schwarz 1978). The size of an effect that
+    stated numbers can imitate is known as well as these, however long the record, so that it costs next to nothing.
+    Friction is left out: files state it roughly (`is_far`).
+    """
+    own = find_named_effect(chosen.effect).shared_name.family
+    return own != FRICTION and chosen.relief > NEARLY_ALL and chosen.evidence + chosen.cost >= FAR_OFF**2
 
 
 def needed_lead(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> float:

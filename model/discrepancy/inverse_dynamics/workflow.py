@@ -13,7 +13,7 @@ from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
+from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, is_far_from_file, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
@@ -144,7 +144,7 @@ class TorqueWorkflow:
     def _with_held_out(self, found: Found, candidates: Sequence[Fitted]) -> list[Fitted]:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
         held = self.case.held_out
-        asked = [c for c in candidates if held and c.evidence > 0]
+        asked = [c for c in candidates if held and (c.evidence > 0 or is_far_from_file(c))]
         told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
         others = [c for c in candidates if not any(c is one for one in asked)]
         return [
