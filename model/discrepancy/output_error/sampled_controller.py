@@ -17,7 +17,7 @@ from daq.contracts.machine import DcMotor, Machine, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.output_error.controller_law import ControllerLaw, Scale
-from model.inverse_dynamics.drive_limits import SEVERAL, at_shown_limit
+from model.inverse_dynamics.drive_limits import AT_LIMIT, SEVERAL
 
 LEAST_AGREEMENT = 0.95
 """Least share of samples whose drive must be the controller's, to rounding, for a record to prove anything: below it
@@ -33,6 +33,9 @@ ROUNDED_SHARE = 0.5
 LATER_STARTS = (1, 2, 3, 4, 5)
 """Samples from which what the integrators held is told, where the first does not tell it: a set point that was lost
 near one of them makes it wrong."""
+SHOWN_LIMIT = 3
+"""Samples at the largest size of a drive that show a limit. A drive in steps comes there without one, too; then a few
+samples count as hidden that are none."""
 REWEIGHTED = 20
 """Rounds of weights for a line of least absolute deviations."""
 
@@ -183,13 +186,15 @@ def _last_best(found: Sequence[_Found]) -> _Found:
 
 def _largest_output(machine: Machine, joint: int, recorded: Floats) -> float:
     """The largest drive that the controller gives: as stated, else the largest voltage of its joint's motor, or less
-    where the recorded drive (k,) shows a limit below that."""
+    where the recorded drive (k,) comes to the same largest size several times, as at a limit below that."""
     controller, drive = machine.controller, machine.joint(joint).drive
     stated = of_joint(controller.output_limit, joint) if isinstance(controller, SampledPid) else None
     if stated is not None:
         return stated.value
     most = abs(drive.dac_full_scale.value * drive.amplifier_gain.value) if isinstance(drive, DcMotor) else np.inf
-    return min(most, float(np.abs(recorded).max())) if at_shown_limit(recorded).any() else most
+    sizes = np.abs(recorded)
+    shown = int((sizes >= (1 - AT_LIMIT) * sizes.max()).sum()) >= SHOWN_LIMIT
+    return min(most, float(sizes.max())) if shown else most
 
 
 def _shown_step(drive: Floats) -> float:
