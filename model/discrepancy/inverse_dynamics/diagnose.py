@@ -18,7 +18,7 @@ from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.gravity_doubts import on_gravity_along
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
-from model.discrepancy.inverse_dynamics.judging import FRICTION
+from model.discrepancy.inverse_dynamics.left_over import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import DiagnosisOptions, check_options
@@ -31,11 +31,11 @@ from model.machine_model.model import Model
 
 LOOKS = (1.0, 1 / 2, 1 / 3)
 """Cutoffs of the torques that are compared, as shares of the highest that accelerations bear, in turn until something
-is found that it can name. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a sensor's scale,
-show below a lower one as well; gears that give and delays show below the highest alone."""
+is found that has one name. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a
+sensor's scale, show below a lower one as well; gears that give and delays show below the highest alone."""
 JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss", "supply_limit"})
-"""Effects that are no friction, and whose torque jumps as friction's does, where motion or drive turns, or breaks off where
-the drive is at its limit."""
+"""Effects that are no friction, and whose torque jumps as friction's does, where motion or drive turns, or breaks off
+where the drive is at its limit."""
 LEAST_OF_TORQUE = 1e-3
 """Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
 a sound rig with 20 bits, gears were said to lose 0.09 % of it."""

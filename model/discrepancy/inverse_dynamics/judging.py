@@ -10,7 +10,7 @@ import numpy as np
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
+from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
@@ -35,8 +35,6 @@ NO_PART = 0.4
 evidence then counts the rest as noise."""
 NEARLY_ALL = 0.9
 """Share of an effect's evidence from priors, above which stated numbers imitate it."""
-FRICTION = "friction"
-"""The family of effects of which a file states the size roughly."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 LEAD = 4.0
@@ -87,8 +85,8 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
     """Evidence from which a candidate is named. explains_most: whether it takes most of what is left.
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
-    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough; and where all of
-    it does, that a number of the file would have to be off by more than it is taken to be.
+    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough; and where all
+    of it does, that a number of the file would have to be off by more than it is taken to be.
     """
     options = standing.case.options
     if is_far_from_file(chosen):
@@ -103,8 +101,9 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
 def is_far_from_file(chosen: Fitted) -> bool:
     """Whether a candidate stands for numbers that would have to be `FAR_OFF` deviations from what the file states.
 
-    k ln n is what a parameter costs of which every sample tells a little more (Schwarz 1978). The size of an effect that
-    stated numbers can imitate is known as well as these, however long the record, so that it costs next to nothing.
+    k ln n is what a parameter costs of which every sample tells a little more (Schwarz 1978). The size of an effect
+    that stated numbers can imitate is known as well as these, however long the record, so that it costs next to
+    nothing.
     Friction is left out: files state it roughly (`is_far`).
     """
     own = find_named_effect(chosen.effect).shared_name.family

@@ -8,7 +8,7 @@ import numpy as np
 
 from model.discrepancy.diagnosis import RemainingShape, Step
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.localisation import bends_with_speed, remaining_shapes
+from model.discrepancy.inverse_dynamics.localisation import MOST_OF_IT, bends_with_speed, remaining_shapes
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.effects.library import find_named_effect
 
@@ -20,18 +20,26 @@ SLOW = 4.0
 """Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
 the low-pass, that of accelerations to 2.7."""
 VISCOUS = "viscous_friction"
+PART_OF_IT = 0.3
+"""Least share of what is left that friction which goes with the place explains, where another law was named."""
+FRICTION = "friction"
+SENSOR = "sensor"
+"""Families of effects that look like such friction."""
 
 
 def joints_left_over(standing: Standing) -> tuple[int, ...]:
-    """Joints whose residual is far above noise on fitted and on held-out records, and slower than noise is."""
+    """Joints whose residual is far above noise on fitted and on held-out records, and no noise: slower than that, or of
+    a shape."""
     case, now = standing.case, standing.now
     fitted = [np.sqrt(holdout.mean_squares(case.stretches, now.residual))]
     if case.held_out:
         held = holdout.held_out_squares(standing.model, now.values, case.held_out)
         fitted.append(np.sqrt(held))
     least = np.min(np.nan_to_num(fitted), axis=0) / case.noise
-    beyond = (least > FAR_ABOVE_NOISE) & (now.noise.memory > SLOW)
-    return tuple(j for j, left in zip(standing.model.machine.modelled_joints, beyond, strict=True) if left)
+    shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= MOST_OF_IT}
+    joints = standing.model.machine.modelled_joints
+    slow = (now.noise.memory > SLOW) | np.array([j in shaped for j in joints])
+    return tuple(j for j, left in zip(joints, (least > FAR_ABOVE_NOISE) & slow, strict=True) if left)
 
 
 def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
@@ -44,9 +52,17 @@ def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
     for index, step in enumerate(standing.steps):
         joints = left & set(step.joints) if step.adopted else ()
         lowers = bool(lowered & set(step.parameters))
-        if any(lowers or _bends(standing.steps, step, j, shapes) for j in joints):
+        if any(lowers or _bends(standing.steps, step, j, shapes) or _rubs_elsewhere(step, j, shapes) for j in joints):
             return index
     return None
+
+
+def _rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
+    """Whether a step names friction or a sensor where friction is left that goes with the place: a tight spot looks
+    like more friction everywhere, and like a bent sensor."""
+    if step.effect is None or find_named_effect(step.effect).shared_name.family not in (FRICTION, SENSOR):
+        return False
+    return any(s.joint == joint and s.against_motion and s.explained >= PART_OF_IT for s in shapes)
 
 
 def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
@@ -57,4 +73,4 @@ def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[Remai
 def _only_viscous(steps: Sequence[Step], joint: int) -> bool:
     """Whether viscous friction is the only friction that was named on a joint."""
     named = {s.effect for s in steps if s.adopted and joint in s.joints and s.effect is not None}
-    return {name for name in named if find_named_effect(name).shared_name.family == "friction"} == {VISCOUS}
+    return {name for name in named if find_named_effect(name).shared_name.family == FRICTION} == {VISCOUS}
