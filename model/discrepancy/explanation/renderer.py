@@ -187,6 +187,8 @@ def not_examined_words(joints: Sequence[int]) -> list[str]:
 def _summary_of(answer: Diagnosis) -> str:
     adopted = [s for s in answer.steps if s.adopted]
     match answer.verdict:
+        case "nothing-significant" if set(answer.not_examined) >= set(answer.model_before.machine.modelled_joints):
+            return "The traces say nothing of the model."
         case "nothing-significant":
             rejected = [s for s in answer.steps if not s.adopted]
             return _nothing(next(filter(was_taken_back, rejected), rejected[0] if rejected else None))

@@ -52,12 +52,12 @@ def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
     for index, step in enumerate(standing.steps):
         joints = left & set(step.joints) if step.adopted else ()
         lowers = bool(lowered & set(step.parameters))
-        if any(lowers or _bends(standing.steps, step, j, shapes) or _rubs_elsewhere(step, j, shapes) for j in joints):
+        if any(lowers or _bends(standing.steps, step, j, shapes) or rubs_elsewhere(step, j, shapes) for j in joints):
             return index
     return None
 
 
-def _rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
+def rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
     """Whether a step names friction or a sensor where friction is left that goes with the place: a tight spot looks
     like more friction everywhere, and like a bent sensor."""
     if step.effect is None or find_named_effect(step.effect).shared_name.family not in (FRICTION, SENSOR):

@@ -111,12 +111,12 @@ class ControllerLaw:
         """
         total, last, inner_total, inner_last, before = memory
         p, i, d = self.outer
-        total += error * self.period
+        total = total + error * self.period  # not in place: an array of the memory is read twice
         output = p * error + i * total + d * (error - last) / self.period
         if self.inner is None:
             return output, (total, error, inner_total, inner_last, position + 0.0 * before)
         p, i, d = self.inner
         inner = output - (position - before) / self.period
-        inner_total += inner * self.period
+        inner_total = inner_total + inner * self.period
         output = p * inner + i * inner_total + d * (inner - inner_last) / self.period
         return output, (total, error, inner_total, inner, position + 0.0 * before)

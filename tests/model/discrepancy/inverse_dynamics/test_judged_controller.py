@@ -17,6 +17,7 @@ from daq.contracts.trace import Trace, TraceRecord
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.controller_law import ControllerLaw, Scale
 from model.discrepancy.workflow import diagnose
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import base_model
@@ -57,10 +58,12 @@ def machine(law: str) -> Machine:
 
 @dataclass
 class Law:
-    """P, I and D of a position's error; in a cascade a speed's set point comes of them. factor: of the output."""
+    """P, I and D of a position's error; in a cascade a speed's set point comes of them. factor: of the output. limit:
+    of the force, N, at which the sums go on."""
 
     name: str
     factor: float
+    limit: float = np.inf
     total: float = 0.0
     speed_total: float = 0.0
     last_error: float | None = None
@@ -80,7 +83,8 @@ class Law:
             self.speed_total += short * PERIOD
             out = p * short + i * self.speed_total
         self.last_error, self.last_position = error, read
-        return float(RESOLUTION * np.round(self.factor * out / RESOLUTION))
+        out = float(np.clip(self.factor * out, -self.limit, self.limit))
+        return float(RESOLUTION * np.round(out / RESOLUTION))
 
 
 def asked(seed: int, count: int) -> Floats:
@@ -92,13 +96,15 @@ def asked(seed: int, count: int) -> Floats:
     return np.asarray((waves - waves[0]) * np.clip(time / 0.5, 0.0, 1.0))
 
 
-def recorded(law: str, seed: int = 1, factor: float = 1.0, lost: float = 0.0, begun: int = 0) -> Trace:
+def recorded(
+    law: str, seed: int = 1, factor: float = 1.0, lost: float = 0.0, begun: int = 0, limit: float = np.inf
+) -> Trace:
     """A record of 14 s. lost: share of the set points that do not arrive. begun: periods that the controller has
     worked before the record begins, so that its sums are not empty."""
     count = 1400
     sent = asked(seed, count + begun)
     rng = np.random.default_rng(seed + 50)
-    controller, q, v, used = Law(law, factor), 0.0, 0.0, 0.0
+    controller, q, v, used = Law(law, factor, limit), 0.0, 0.0, 0.0
     position, drive = np.empty(len(sent)), np.empty(len(sent))
     count_size = 0.8 / 2**18
     for k in range(len(sent)):
@@ -192,6 +198,41 @@ def test_a_diagnosis_in_torques_of_a_sound_controller_names_nothing() -> None:
     assert (found.method, found.verdict, found.steps) == ("inverse-dynamics", "nothing-significant", ())
     (note,) = (n for n in found.notes_data if n.kind == "not-looked-for")
     assert set(note.values["effects"]) == set(NOT_IN_TORQUES) - BOTH
+
+
+@pytest.mark.parametrize("share", [0.9, 0.6])
+@pytest.mark.parametrize("law", GAINS)
+def test_a_limit_that_the_file_does_not_state_loses_no_set_points(law: str, share: float) -> None:
+    """A drive in steps comes to its limit where the motion is fastest, step by step, as to the top of a motion."""
+    drive = recorded(law).drive
+    assert drive is not None
+    limit = RESOLUTION * float(np.round(share * np.abs(drive).max() / RESOLUTION))
+    limited = recorded(law, limit=limit)
+    assert limited.drive is not None
+    assert (np.abs(limited.drive) == limit).sum() > 2
+    assert judged(law, limit=limit).findings == ()
+
+
+def test_set_points_are_lost_beside_a_limit_that_the_file_does_not_state() -> None:
+    """Of a cascade they are not told: what its inner loop sums up at the limit follows from set points that the limit
+    hides."""
+    drive = recorded("pid", lost=0.4).drive
+    assert drive is not None
+    limit = RESOLUTION * float(np.round(0.8 * np.abs(drive).max() / RESOLUTION))
+    (found,) = judged("pid", lost=0.4, limit=limit).findings
+    assert (found.effect.value, found.value) == ("lost_set_points", pytest.approx(0.4, abs=0.06))
+
+
+@pytest.mark.parametrize("law", GAINS)
+def test_set_points_in_use_are_the_same_with_what_a_limit_hides_and_without(law: str) -> None:
+    """Where no drive is at a limit, nothing is hidden."""
+    trace, known = recorded(law, lost=0.3), machine(law)
+    assert trace.set_point is not None
+    assert trace.drive is not None
+    own = ControllerLaw(known.controller, 1, PERIOD, winds_up=False)
+    columns = (trace.set_point[:, 0], trace.position[:, 0], trace.drive[:, 0], np.zeros(len(trace), dtype=bool))
+    plain, hidden = (f(*columns, Scale(1.0, 0.0), RESOLUTION)[0] for f in (own.follow, own.follow_hidden))
+    assert np.mean(np.abs(plain - hidden) < 1e-9) > 0.97
 
 
 def stated(law: str, **controller: Any) -> Machine:

@@ -79,5 +79,29 @@ def test_a_slow_effect_is_named_below_the_first_cutoff_that_shows_it() -> None:
     assert looks == 2
 
 
+GROUP = answer("potentiometer_offset", group=("potentiometer_offset", "spring_torque"))
+
+
+def test_a_group_is_told_apart_below_the_first_cutoff_that_names_one_of_it() -> None:
+    again, one = answer("spring_torque", group=("spring_torque", "torque_ripple")), answer("spring_torque")
+    found, looks = first_finding(GROUP, again, one)
+    assert found is one
+    assert looks == len(LOOKS)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [answer(), answer("torque_ripple"), answer("spring_torque", "torque_ripple"), GROUP],
+    ids=["nothing", "another", "one-more", "again"],
+)
+def test_a_group_stays_one_where_lower_cutoffs_name_nothing_of_it(other: Diagnosis) -> None:
+    assert first_finding(GROUP, other, other)[0] is GROUP
+
+
+def test_a_group_with_an_effect_that_jumps_is_not_looked_at_below_a_lower_cutoff() -> None:
+    group = answer("spring_torque", group=("spring_torque", "coulomb_friction"))
+    assert first_finding(group) == (group, 1)
+
+
 def test_the_effects_that_jump_are_of_the_library() -> None:
     assert set(library()) >= JUMPING

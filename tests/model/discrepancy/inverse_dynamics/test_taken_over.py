@@ -13,12 +13,14 @@ from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis, RemainingShape
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.inverse_dynamics.left_over import rubs_elsewhere
 from model.discrepancy.inverse_dynamics.localisation import bends_with_speed
 from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_distance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.model.discrepancy.steps import step
 from tests.worlds.folder import write_world
 
 
@@ -67,8 +69,8 @@ def test_a_mass_far_beyond_what_is_stated_is_named_with_what_is_the_same_torque(
     """12 kg to 5 % on a horizontal axis, 18 true: a fit within priors finds it, ten deviations off."""
     training, held_out = (rigs.slide_trace(seed, {"mass": 18.0}) for seed in (1, 2))
     found = diagnose_torques(base_model(rigs.slide_machine()), [training], [held_out])
-    step = next(s for s in found.steps if s.adopted)
-    assert {c.effect for c in step.group} == {"link_mass", "payload"}, found.summary
+    named = next(s for s in found.steps if s.adopted)
+    assert {c.effect for c in named.group} == {"link_mass", "payload"}, found.summary
     assert found.rmse_holdout[0].after < 2 * rigs_noise(found)
 
 
@@ -101,6 +103,25 @@ def test_only_what_is_odd_in_speed_says_that_another_law_goes_with_it() -> None:
     assert not bends_with_speed([shape(drag)], 2)
     assert not bends_with_speed([shape(drag, explained=0.3)], 1)
     assert not bends_with_speed([shape(drag, against="position")], 1)
+
+
+@pytest.mark.parametrize(
+    ("effect", "explained", "contradicted"),
+    [
+        ("coulomb_friction", 0.9, True),
+        ("potentiometer_nonlinearity", 0.35, True),
+        ("coulomb_friction", 0.2, False),
+        ("payload", 0.9, False),
+    ],
+)
+def test_friction_that_goes_with_the_place_contradicts_friction_everywhere_and_a_bent_sensor(
+    effect: str, explained: float, contradicted: bool
+) -> None:
+    by_place = shape([0.1, 0.1, 0.9, 1.0, 0.1, 0.1], "position", explained)
+    against = by_place.model_copy(update={"against_motion": True})
+    assert rubs_elsewhere(step(effect), 1, [against]) is contradicted
+    assert not rubs_elsewhere(step(effect), 1, [by_place]), "a torque that goes with the place is no friction"
+    assert not rubs_elsewhere(step(effect), 2, [against])
 
 
 @pytest.mark.timeout(300)
