@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values
@@ -24,12 +25,20 @@ OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_in
 accelerations, or a gear that rattles, is fast."""
 WARMING = "resistance_rise"
 """The effect of a winding that warms with time, whatever its current."""
+BENT = "potentiometer_nonlinearity"
+"""The effect of a reading that bends over the sensor's range."""
+MOST_UNEVEN = 0.6
+"""Largest change of a bent sensor's scale over its range, as a share: a potentiometer that is loaded with twice its own
+resistance comes to 0.5. Rigs whose friction had a tight spot, and gears that gave, were told as sensors of which the
+reading went backwards."""
 SLOWER = 0.5
 """Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
 the fifth power of the cutoff, so 3 % of it is left there."""
 NO_NOISE = 5.0
 """Residual, in noise floors, that is not noise. Sound rigs leave up to 2.6, but for those whose current loop runs out
 of voltage: what is left there is no noise either (decision 0065)."""
+PLACES = 101
+"""Places of a sensor's range at which its scale is looked at."""
 HALF = 0.5
 """Share of its mean square that such an effect leaves at most."""
 AT_BOUND = 1.01
@@ -48,10 +57,10 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     """
     if found.effect == DELAY and _may_be_timing(found):
         return False
+    if any(_warms_at_once(p, found.fit.values[p.name]) for p in found.parameters) or _is_uneven(found):
+        return False
     plain = _takes_half_of_what_is_no_noise(found, before, case)
     values = found.fit.values
-    if any(_warms_at_once(p, values[p.name]) for p in found.parameters):
-        return False
     if not plain and any(_fades_unresolved(p, values[p.name]) for p in found.parameters):
         return False
     if sizes_at_bounds(found) or not is_far_everywhere(found.stated, found.fit.values):
@@ -82,6 +91,22 @@ def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> floa
 def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list[Floats]:
     slower = tuple(record.slower(SLOWER) for record in records)
     return TorqueBalance(fit.balance.model, slower).residual(fit.values)
+
+
+def _is_uneven(found: Fitted) -> bool:
+    """Whether a bent sensor's reading would be more uneven than any sensor's is, somewhere in its range."""
+    return found.effect == BENT and any(_steepest_bend(found, joint) > MOST_UNEVEN for joint in found.joints)
+
+
+def _steepest_bend(found: Fitted, joint: int) -> float:
+    """Largest change of a sensor's scale over its range, as a share."""
+    sensor = found.model.machine.joint(joint).sensor
+    if sensor is None:
+        return 0.0
+    place, numbers = np.linspace(0.0, 1.0, PLACES), found.model.with_values(found.fit.model_values).vector
+    waves = [(k * np.pi, numbers[at.slot(joint, column)]) for k, column in enumerate(at.BENDS, start=1)]
+    slope = sum(bend * rate * np.cos(rate * place) for rate, bend in waves)
+    return float(np.abs(slope).max()) / sensor.range.value
 
 
 def _may_be_timing(found: Fitted) -> bool:

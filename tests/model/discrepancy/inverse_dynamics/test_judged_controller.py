@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq.contracts.machine import Machine
+from daq.contracts.machine import Machine, SampledPid
 from daq.contracts.trace import Trace, TraceRecord
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
@@ -220,7 +220,8 @@ def test_set_points_are_lost_beside_a_limit_that_the_file_does_not_state() -> No
     assert drive is not None
     limit = RESOLUTION * float(np.round(0.8 * np.abs(drive).max() / RESOLUTION))
     (found,) = judged("pid", lost=0.4, limit=limit).findings
-    assert (found.effect.value, found.value) == ("lost_set_points", pytest.approx(0.4, abs=0.06))
+    assert found.effect.value == "lost_set_points"
+    assert found.value == pytest.approx(0.4, abs=0.06)
 
 
 @pytest.mark.parametrize("law", GAINS)
@@ -229,6 +230,7 @@ def test_set_points_in_use_are_the_same_with_what_a_limit_hides_and_without(law:
     trace, known = recorded(law, lost=0.3), machine(law)
     assert trace.set_point is not None
     assert trace.drive is not None
+    assert isinstance(known.controller, SampledPid)
     own = ControllerLaw(known.controller, 1, PERIOD, winds_up=False)
     columns = (trace.set_point[:, 0], trace.position[:, 0], trace.drive[:, 0], np.zeros(len(trace), dtype=bool))
     plain, hidden = (f(*columns, Scale(1.0, 0.0), RESOLUTION)[0] for f in (own.follow, own.follow_hidden))
