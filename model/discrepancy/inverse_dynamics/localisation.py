@@ -37,7 +37,7 @@ SHAPE_SIGNIFICANCE = 6.0
 """Least significance of a shape of the remaining torque, in standard deviations."""
 SHAPE_SHARE = 0.15
 """Least share of the remaining torque's variance that a shape must explain."""
-MOST_OF_IT = 0.5
+MOST_OF_IT = 0.4
 """Least share of the remaining torque's variance with which a shape says that a law is another one."""
 BEYOND_NOISE = 1.5
 """Least remaining torque that is given a shape, in noise floors."""

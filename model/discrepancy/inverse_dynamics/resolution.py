@@ -18,6 +18,7 @@ from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
 from model.inverse_dynamics.drive_timing import DELAY, MOST
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_inductance"})
@@ -95,16 +96,21 @@ def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list
 
 def _is_uneven(found: Fitted) -> bool:
     """Whether a bent sensor's reading would be more uneven than any sensor's is, somewhere in its range."""
-    return found.effect == BENT and any(_steepest_bend(found, joint) > MOST_UNEVEN for joint in found.joints)
+    return found.effect == BENT and any(steepest_bend(_as_fitted(found), joint) > MOST_UNEVEN for joint in found.joints)
 
 
-def _steepest_bend(found: Fitted, joint: int) -> float:
-    """Largest change of a sensor's scale over its range, as a share."""
-    sensor = found.model.machine.joint(joint).sensor
+def _as_fitted(found: Fitted) -> Model:
+    """The model with an effect, with the numbers of its fit."""
+    return found.model.with_values(found.fit.model_values)
+
+
+def steepest_bend(model: Model, joint: int) -> float:
+    """Largest change of the scale of a joint's bent sensor over its range, as a share; 0 without a sensor."""
+    sensor = model.machine.joint(joint).sensor
     if sensor is None:
         return 0.0
-    place, numbers = np.linspace(0.0, 1.0, PLACES), found.model.with_values(found.fit.model_values).vector
-    waves = [(k * np.pi, numbers[at.slot(joint, column)]) for k, column in enumerate(at.BENDS, start=1)]
+    place = np.linspace(0.0, 1.0, PLACES)
+    waves = [(k * np.pi, model.vector[at.slot(joint, column)]) for k, column in enumerate(at.BENDS, start=1)]
     slope = sum(bend * rate * np.cos(rate * place) for rate, bend in waves)
     return float(np.abs(slope).max()) / sensor.range.value
 

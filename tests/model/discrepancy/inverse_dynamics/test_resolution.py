@@ -15,7 +15,13 @@ from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.resolution import _ends_at_bound, is_far, is_far_everywhere
+from model.discrepancy.inverse_dynamics.resolution import (
+    MOST_UNEVEN,
+    _ends_at_bound,
+    is_far,
+    is_far_everywhere,
+    steepest_bend,
+)
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -175,6 +181,29 @@ def test_the_slowest_ripple_is_no_ripple() -> None:
     rate = model.parameter("joint1.torque_ripple.cycles")
     assert _ends_at_bound(rate, rate.low)
     assert not _ends_at_bound(rate, 2.0 * rate.low)
+
+
+def bent(**bends: float) -> float:
+    """How uneven the MA2000's first potentiometer is with these terms, as shares of its range."""
+    model = base_model(load_machine("ma2000"))
+    span = model.machine.joint(1).sensor
+    assert span is not None
+    terms = {name: share * span.range.value for name, share in bends.items()}
+    return steepest_bend(model.with_effect("potentiometer_nonlinearity", (1,), terms), 1)
+
+
+def test_a_potentiometer_under_load_is_not_too_uneven_to_be_one() -> None:
+    """Loaded with twice its own resistance, its reading of x is x/(1 + x(1 − x)/2): written out as sine terms here."""
+    x = np.linspace(0.0, 1.0, 2001)
+    off = x / (1 + 0.5 * x * (1 - x)) - x
+    terms = {f"bend_{k}": 2 * float(np.trapezoid(off * np.sin(k * np.pi * x), x)) for k in (1, 2, 3, 4)}
+    assert 0.3 < bent(**terms) < MOST_UNEVEN
+
+
+def test_a_reading_that_goes_backwards_is_no_sensor() -> None:
+    """As a tight spot of an axis was told."""
+    assert bent(bend_1=-0.08, bend_2=0.1, bend_3=-0.074, bend_4=0.023) > 1.0
+    assert bent(bend_1=0.0025) < 0.01
 
 
 def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> None:
