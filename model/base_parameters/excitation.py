@@ -93,7 +93,7 @@ def _recorded(deviation: float, value: float, natural: float, *, excited: bool) 
 def _columns(model: Model, record: RecordedMotion, standards: Sequence[Standard], grouping: Grouping) -> Floats:
     """Columns (m, n, r) of the base parameters along a record, low-passed as the torques are."""
     joints = np.ascontiguousarray(model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
-    links = link_motion(record, joints, model)
+    links = link_motion(record, joints)
     motion = Motion(links.position, links.speed, links.acceleration, links.contact)
     inertial = inertial_regressor(chain_of(model), motion)
     of_joints = joint_regressor(standards[inertial.shape[2] :], motion)

@@ -76,7 +76,7 @@ class TorqueBalance:
         bodies = vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
         sensors = joints[:, list(SENSOR_COLUMNS)].tobytes()
         friction = joints[:, list(FRICTION_COLUMNS)].tobytes()
-        motions = self._cached("motion", sensors, lambda i: link_motion(self.records[i], joints, self.model))
+        motions = self._cached("motion", sensors, lambda i: link_motion(self.records[i], joints))
         needed = self._cached("needed", sensors + bodies, lambda i: _needed(chain, motions[i]))
         levels = self._cached(
             "levels", sensors + bodies + friction, lambda i: _levels(self.model, chain, motions[i].position, joints)
