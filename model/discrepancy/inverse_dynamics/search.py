@@ -295,6 +295,20 @@ def prefer_fewer_joints(found: Sequence[Fitted]) -> list[Fitted]:
     return [*fewer[:1], *(f for f in found if not any(f is one for one in fewer[:1]))]
 
 
+def prefer_shorter_laws(found: Sequence[Fitted], before: BalanceFit, lead: float) -> list[Fitted]:
+    """Candidates, best first, of which the best gives way to a shorter law that it imitates on the same joints, where
+    it leads by less than `lead`: four waves of a bent sensor follow a wrong scale, and a little noise besides."""
+    if not found:
+        return []
+    best = found[0]
+    shorter = [
+        f
+        for f in found[1:]
+        if f.joints == best.joints and best.imitates(f, before) and best.log_odds - f.log_odds < lead
+    ]
+    return [*shorter[:1], *(f for f in found if not any(f is one for one in shorter[:1]))]
+
+
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
     return _fell(before, after, memory) + before.prior - after.prior - cost_of(before, memory, parameters, places)

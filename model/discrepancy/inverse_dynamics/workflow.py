@@ -23,6 +23,7 @@ from model.discrepancy.inverse_dynamics.search import (
     evidence,
     order_by_odds,
     prefer_fewer_joints,
+    prefer_shorter_laws,
     search,
 )
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
@@ -134,6 +135,7 @@ class TorqueWorkflow:
         case, also_from = replace(self.case, options=options), None if before is None else before.now.values
         findings = search(found.model, found.now, case, self._report, self.cancel, also_from)
         fitted = prefer_fewer_joints(sorted(self._with_held_out(found, findings.fitted), key=order_by_odds))
+        fitted = prefer_shorter_laws(fitted, found.now, options.least_margin)
         resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
             findings,

@@ -13,9 +13,16 @@ from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.revision import has_own_shape, split_step
-from model.discrepancy.inverse_dynamics.search import FILE_IS_RIGHT, Fitted, prefer_fewer_joints, search
+from model.discrepancy.inverse_dynamics.search import (
+    FILE_IS_RIGHT,
+    Fitted,
+    prefer_fewer_joints,
+    prefer_shorter_laws,
+    search,
+)
 from model.discrepancy.inverse_dynamics.stated_numbers import take_back
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
@@ -138,3 +145,22 @@ def weak_bench() -> Machine:
     motor = drive["joints"][0]["drive"]
     motor["torque_constant"]["deviation"] = motor["back_emf_constant"]["deviation"] = 0.001
     return Machine.model_validate(drive)
+
+
+class Imitating(Fitted):
+    """A candidate that follows the torque of every other one."""
+
+    def imitates(self, other: Fitted, before: BalanceFit) -> bool:
+        return True
+
+
+def test_a_longer_law_that_imitates_a_shorter_one_is_not_named_for_a_little_more_evidence() -> None:
+    flow = sliding({"coulomb": 8.0}, TorqueOptions())
+    scale = candidate("potentiometer_gain", flow, 95.0)
+    bent = Imitating("potentiometer_nonlinearity", (1,), flow.model, (), flow.first, 100.0)
+    weight = candidate("payload", flow, 99.0)
+    assert prefer_shorter_laws([bent, scale], flow.first, 12.0) == [scale, bent]
+    assert prefer_shorter_laws([bent, scale], flow.first, 4.0) == [bent, scale]
+    assert prefer_shorter_laws([weight, scale], flow.first, 12.0) == [weight, scale]
+    assert prefer_shorter_laws([bent, replace(scale, joints=(2,))], flow.first, 12.0)[0] is bent
+    assert prefer_shorter_laws([], flow.first, 12.0) == []
