@@ -113,7 +113,7 @@ def test_errors_of_a_position_sensor_bend_only_the_speeds_that_are_formed_of_it(
     inside = slice(record.edge, -record.edge)
     every = round(record.period / 0.004)
     found = np.column_stack([links.position, links.speed, links.acceleration])[inside]
-    # as far as noise allows: errors of the angle itself, and not those at the reading, which lies a few hundredths beside
+    # errors at the angle itself, and not at the reading, which lies a few hundredths beside it
     for column, tolerance in zip(range(3), (1e-4, 1e-4, 5e-3), strict=True):
         np.testing.assert_allclose(found[:, column], truth[::every, column][: len(record.time)][inside], atol=tolerance)
 

@@ -12,8 +12,8 @@ from model.discrepancy.diagnosis import Diagnosis, FoundValue
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.revision import has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
