@@ -12,6 +12,7 @@ import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
 from tests.worlds.bodies import Bodies, Link
+from tests.worlds.engine import step_within
 from tests.worlds.kinds import CURRENT, Kind
 from tests.worlds.loop import DAC_COUNTS
 from tests.worlds.parameters import BOARD, CASCADE, LOOP, Records, joints
@@ -43,8 +44,9 @@ def sound_rig(kind_name: str, kind: Kind, seed: int) -> Rig:
     supply = float(draw.choice([12.0, 24.0, 36.0, 48.0]))
     made = joints(kind.joints)
     loop = np.zeros(1, LOOP)
-    loop["controller"], loop["period"], loop["step"] = kind.controller, 1.0 / rate, STEP
-    loop["delay"] = STEP * round(draw.uniform(0.05, BOARD_PERIOD_DELAY) / rate / STEP)
+    step = step_within(1.0 / rate, STEP)
+    loop["controller"], loop["period"], loop["step"] = kind.controller, 1.0 / rate, step
+    loop["delay"] = step * round(draw.uniform(0.05, BOARD_PERIOD_DELAY) / rate / step)
     needed = []
     bits = int(draw.choice(kind.bits))
     for j in range(kind.joints):

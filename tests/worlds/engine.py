@@ -43,6 +43,8 @@ SWEEPS = 30
 """Sweeps of Gauss and Seidel over the joints' set-valued friction, at most."""
 AT_REST = 1e-9
 """rad/s below which a joint with set-valued friction rests."""
+WHOLE = 1e-6
+"""Share of a step within which a period is a whole number of steps."""
 BREAKING_SPEED = 2e-3
 """rad/s over which bristles lose what they hold at rest above sliding friction."""
 
@@ -65,6 +67,8 @@ def simulate(
     """The rig under its loop from rest at the first set point.
 
     With `noise` (k, n; rad) readings and drives are rounded, without it the loop is smooth.
+
+    Raises ValueError for a period that is no whole number of steps: more or less time would pass than is written down.
     """
     rotors = tuple(float(j["rotor"]) if not j["flexible"] else 0.0 for j in joints)
     model = mujoco.MjModel.from_xml_string(mjcf(bodies, rotors))
@@ -78,11 +82,20 @@ def simulate(
     weight = np.array(bodies.gravity)
     addresses = (model._address, data._address)
     views = (data.qpos, data.qvel, data.qacc, data.xaxis, data.xanchor, data.xipos, np.array(model.body_mass))
+    if step_within(*(float(loop[name][0]) for name in ("period", "step"))) != loop["step"][0]:
+        raise ValueError(f"a period of {loop['period'][0]} s is no whole number of steps of {loop['step'][0]} s")
     exact = noise is not None
     disturbed = np.zeros_like(set_points) if noise is None else noise
     _run(addresses, views, hinges, beyond, weight, joints, loop[0], set_points, disturbed, exact, out)
     time = np.arange(count) * float(loop["period"][0])
     return Motion(time, set_points, out[0], out[1], out[2], out[3])
+
+
+def step_within(period: float, step: float) -> float:
+    """The step, s, or the one near it of which a period, s, has a whole number: time that is simulated is time that is
+    written down."""
+    steps = max(1, round(period / step))
+    return step if abs(period / step - steps) < WHOLE else period / steps
 
 
 @compiled

@@ -32,14 +32,14 @@ from scipy.optimize import least_squares, lsq_linear
 
 from tests.worlds.bodies import Bodies, Link
 from tests.worlds.drawing import WORST, generator
-from tests.worlds.engine import Floats, simulate
+from tests.worlds.engine import Floats, simulate, step_within
 from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
 from tests.worlds.parameters import Records
 from tests.worlds.rig import Rig, Tolerance
 from tests.worlds.world import COLOURED_CORNER, TRAINING, wanted, without_settling
 
 STEP = 2e-4
-"""s of the simulations here."""
+"""s, about, of the simulations here."""
 DECIDES = 1e5
 """d′ by linear tolerances above which they are not refitted: no tolerance brings it below 5. It is large, since a joint
 that sticks is anything but linear: friction that the file may state has shown 4 399 by linear tolerances."""
@@ -339,7 +339,7 @@ def _noise(rig: Rig) -> Floats:
 
 def _loop(loop: Records) -> Records:
     coarse = loop.copy()
-    coarse["step"] = STEP
+    coarse["step"] = step_within(float(loop["period"][0]), STEP)
     return coarse
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.worlds.bodies import Bodies, Link, mjcf
 from tests.worlds.drawing import sound_rig
-from tests.worlds.engine import Motion, simulate
+from tests.worlds.engine import Motion, simulate, step_within
 from tests.worlds.kinds import KINDS
 from tests.worlds.parameters import BRISTLE, LOOP, PID, SWITCH, TANH, joints
 
@@ -29,6 +29,30 @@ def free_fall(bodies: Bodies, start: list[float], count: int = 400, rotors: floa
     free = joints(len(start))
     free["range"], free["count"], free["rotor"] = 2 * math.pi, 1e-4, rotors
     return simulate(bodies, free, loop(), np.tile(start, (count, 1)))
+
+
+def angle_after(seconds: float, rate: float) -> float:
+    """How far a rod has fallen under a controller without gains, of this rate in Hz."""
+    free = joints(1)
+    free["range"], free["count"], free["rotor"] = 2 * math.pi, 1e-6, 1e-9
+    samples = np.full((1 + round(seconds * rate), 1), 0.4 * math.pi)
+    motion = simulate(
+        Bodies((Link.rod(0.3, 0.8),), 0.0, HANGING), free, loop(step_within(1.0 / rate, 1e-4), 1.0 / rate), samples
+    )
+    assert motion.time[-1] == pytest.approx(seconds)
+    return float(motion.angle[-1, 0])
+
+
+@pytest.mark.parametrize("rate", [50.0, 300.0, 400.0, 700.0, 7000.0])
+def test_as_much_time_goes_by_as_is_written_down(rate: float) -> None:
+    """At 300 Hz a period went by in thirty-three steps of 0.1 ms, and was written down with 3.33 ms."""
+    assert angle_after(0.2, rate) == pytest.approx(angle_after(0.2, 250.0), abs=2e-4)
+    assert 1.0 / rate / step_within(1.0 / rate, 1e-4) == pytest.approx(round(1e4 / rate), abs=1e-6)
+
+
+def test_a_period_that_is_no_whole_number_of_steps_is_refused() -> None:
+    with pytest.raises(ValueError, match="no whole number of steps"):
+        simulate(Bodies((Link.rod(0.3, 0.8),), 0.0, HANGING), joints(1), loop(1e-4, 1 / 300), np.zeros((9, 1)))
 
 
 @pytest.mark.parametrize(
