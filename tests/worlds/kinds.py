@@ -252,10 +252,6 @@ REPORTED: dict[str, Kind] = {
         contacts=(SWITCH,),
         motions=("via points", "sines"),
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-cascade-rounded": replace(
         _AXIS,
         controller=CASCADE,
@@ -291,6 +287,55 @@ REPORTING: dict[str, Kind] = {
         rounding=0.002,
         contacts=(SWITCH,),
         motions=("via points", "random steps"),
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-coloured": replace(
+        _AXIS, rate=(400.0,), bits=(18,), coloured=0.5, noise=0.3, contacts=(SWITCH,), motions=("steps", "sines")
+    ),
+    "axis-current-steps": replace(
+        _AXIS,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(16,),
+        contacts=(SWITCH,),
+        motions=("random steps", "ramps"),
+        known_loop=False,
+    ),
+    "planar-board-sines": replace(
+        _PLANAR, controller=BOARD, rate=(50.0,), bits=(14,), contacts=(TANH,), motions=("sines", "via points")
+    ),
+    "arm-cascade-body": replace(
+        _ANTHROPOMORPHIC,
+        controller=CASCADE,
+        rate=(400.0,),
+        bits=(17,),
+        contacts=(SWITCH,),
+        body=True,
+        motions=("sines", "sweep"),
+    ),
+    "arm-current-table": replace(
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(250.0,),
+        bits=(18,),
+        contacts=(BRISTLE,),
+        horizontal=True,
+        motions=("via points", "steps"),
+        recorded=("drive",),
+        known_loop=False,
+    ),
+    "six-current-ramps": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        drive=CURRENT,
+        rate=(250.0,),
+        bits=(19,),
+        contacts=(TANH,),
+        motions=("ramps", "sines"),
+        known_loop=False,
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
