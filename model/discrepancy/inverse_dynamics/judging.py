@@ -89,12 +89,12 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
     of it does, that a number of the file would have to be off by more than it is taken to be.
     """
     options = standing.case.options
-    if is_far_from_file(chosen):
-        return FAR_OFF**2 - chosen.cost
     least = options.least_evidence
     if explains_most:
         least = min(least, SUSPECTED)
     least -= chosen.relief * max(least - SUSPECTED, 0.0)
+    if is_far_from_file(chosen):
+        least = min(least, FAR_OFF**2 - chosen.cost)
     return least + options.echo * _collected(standing, chosen.joints)
 
 
