@@ -5,7 +5,8 @@
     python -m benchmarks worlds_trial --folder FOLDER --sharpness --seconds 500
     python -m benchmarks worlds_trial --table docs/trial/worlds-1.csv
 
-The second is given again until there are enough arms: each goes on where the last one stopped. Seeds are drawn from the
+The second is given again until there are enough arms: each goes on where the last one stopped. Two of them run side by
+side where `--only` gives each its kinds. Seeds are drawn from the
 commit that registered the file, cases take turns, and the kind on which the least time was spent comes next. The third
 works out from the truth which effects a sound arm can imitate, and which those can that were named in their place.
 Every arm is a line of FOLDER/cases.csv; the last prints the table of such lines. docs/worlds.md has the rules.
@@ -17,7 +18,7 @@ import argparse
 import csv
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from hashlib import sha256
 from pathlib import Path
@@ -147,13 +148,19 @@ def numbers(folder: Path, kind: str) -> list[int]:
     return list(range(found))
 
 
-def run(registration: WorldsRegistration, commit: str, folder: Path, seconds: float) -> None:
-    """Runs arm after arm, the kind on which the least time was spent first, and begins none after `seconds`."""
+def run(
+    registration: WorldsRegistration, commit: str, folder: Path, seconds: float, only: Collection[str] = ()
+) -> None:
+    """Runs arm after arm, the kind on which the least time was spent first, and begins none after `seconds`.
+
+    `only` are the kinds of this process, where another one runs the rest beside it.
+    """
     end = monotonic() + seconds
-    done = {kind: len(numbers(folder, kind)) for kind in registration.kinds}
+    kinds = [kind for kind in registration.kinds if not only or kind in only]
+    done = {kind: len(numbers(folder, kind)) for kind in kinds}
     spent = {kind: sum((kept_in(folder, kind, n) or {})["spent"] for n in range(count)) for kind, count in done.items()}
     while monotonic() < end:
-        kind = min(registration.kinds, key=lambda kind: spent[kind])
+        kind = min(kinds, key=lambda kind: spent[kind])
         number = done[kind]
         case = registration.cases[number % len(registration.cases)]
         make_arm(
@@ -196,12 +203,15 @@ def row_of(folder: Path, kind: str, number: int) -> Row | None:
     )
 
 
-def add_sharpness(folder: Path, seconds: float) -> None:
-    """Adds d′ to hidden effects: against the arm without them, and of single ones against whatever else was named."""
+def add_sharpness(folder: Path, seconds: float, only: Collection[str] = ()) -> None:
+    """Adds d′ to hidden effects: against the arm without them, and of single ones against whatever else was named.
+
+    `only` are the kinds of this process, where another one works out the rest beside it.
+    """
     from tests.worlds.sharpness import detectability, sharpness
 
     end = monotonic() + seconds
-    for kind in KINDS:
+    for kind in [kind for kind in KINDS if not only or kind in only]:
         for row in filter(None, (row_of(folder, kind, number) for number in numbers(folder, kind))):
             if row.case == "sound" or (row.d_prime is not None and (row.resolved or row.case != "single")):
                 continue
@@ -315,6 +325,7 @@ def main() -> int:
     parser.add_argument("--registration", type=Path)
     parser.add_argument("--folder", type=Path, help="keeps the rigs and answers")
     parser.add_argument("--seconds", type=float, default=500.0, help="no arm is begun after this time")
+    parser.add_argument("--only", nargs="+", default=(), metavar="KIND", help="the kinds of this process, of several")
     parser.add_argument("--sharpness", action="store_true", help="add d′ against the sound arm and against wrong names")
     parser.add_argument("--table", type=Path, help="print the table of these lines, and run nothing")
     parser.add_argument("--hashes", action="store_true", help="print what a registration has to hold of the code")
@@ -332,13 +343,15 @@ def main() -> int:
     if asked.folder is None or (asked.registration is None) == (not asked.sharpness):
         parser.error("--folder with --registration or --sharpness; or --table; or --hashes")
     if asked.sharpness:
-        add_sharpness(asked.folder, asked.seconds)
+        add_sharpness(asked.folder, asked.seconds, asked.only)
     else:
         registration = WorldsRegistration.model_validate(
             parse_toml(read_text(asked.registration, str(asked.registration)), str(asked.registration))
         )
+        if unknown := set(asked.only) - set(registration.kinds):
+            parser.error(f"--only {', '.join(sorted(unknown))}: allowed is {', '.join(registration.kinds)}")
         registration.check_code(tree_hashes(DECIDES), library_versions(), str(asked.registration))
-        run(registration, registering_commit(asked.registration), asked.folder, asked.seconds)
+        run(registration, registering_commit(asked.registration), asked.folder, asked.seconds, asked.only)
     print("\n" + "\n".join(table(rows_of(asked.folder))))
     return 0
 

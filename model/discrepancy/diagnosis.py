@@ -376,6 +376,11 @@ class Diagnosis(FrozenRecord):
     not_examined: tuple[int, ...] = ()
     """Joints of which no fitted trace tells anything, since their drives stand at limits: the answer is not of them."""
 
+    @property
+    def examined_nothing(self) -> bool:
+        """Whether no joint could be examined, so that nothing follows from nothing having been found."""
+        return set(self.not_examined) >= set(self.model_before.machine.modelled_joints)
+
 
 def in_order(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
     """The fitted candidates and those that were only probed, each by what all traces say for them, the best first.

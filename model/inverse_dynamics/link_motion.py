@@ -48,24 +48,25 @@ def link_motion(record: RecordedMotion, joints: Floats) -> LinkMotion:
 
 
 def _read_back(reading: Floats, joint: Floats) -> tuple[Floats, Floats, Floats]:
-    """The angles (k,) of which a joint's sensor gives these readings (k,), rad, by Newton's steps; with the first (k,)
-    and second (k,) derivative of the sensor's error by the angle there.
+    """The angles (k,) of which a joint's sensor gives these readings (k,), rad or m, by Newton's steps; with the first
+    (k,) and second (k,) derivative of the sensor's error by the angle there.
 
     Args:
         joint: the numbers of the joint, as `model.layout` has them. Its sensor reads q + e(q).
     """
     angle = reading
     for _ in range(MOST_STEPS):
-        error, rate, curvature = _error(angle, joint)
+        error, rate, _ = _error(angle, joint)
         step = (angle + error - reading) / (1.0 + rate)
         angle = angle - step
         if np.abs(step).max(initial=0.0) < CLOSE:
             break
+    _, rate, curvature = _error(angle, joint)
     return angle, rate, curvature
 
 
 def _error(angle: Floats, joint: Floats) -> tuple[Floats, Floats, Floats]:
-    """The sensor's error (k,), rad, and its derivatives by the angle; a reading that would go backwards stands."""
+    """The sensor's error (k,), rad or m, and its derivatives by the angle; a reading that would go backwards stands."""
     gain, offset, *bends = joint[list(SENSOR_COLUMNS)]
     place = angle - joint[at.AT_ZERO]
     error, rate = gain * (place - 0.5 * joint[at.RANGE]) + offset, np.full_like(angle, gain)

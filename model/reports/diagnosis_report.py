@@ -76,7 +76,7 @@ def _facts(found: Diagnosis, files: Mapping[str, str]) -> tuple[tuple[str, str],
     machine = found.model_after.machine
     return (
         ("diagnosis of", machine.title),
-        ("verdict", VERDICTS[found.verdict]),
+        ("verdict", "no joint could be examined" if found.examined_nothing else VERDICTS[found.verdict]),
         ("method", method_words(found)),
         (
             "model before",
@@ -227,7 +227,7 @@ def _next(found: Diagnosis) -> Section:
 
 def _without_experiment(found: Diagnosis) -> str:
     """Why no experiment is asked for."""
-    if found.verdict == "nothing-significant":
+    if found.verdict == "nothing-significant" and not found.examined_nothing:
         return "Nothing is left to tell apart."
     if found.verdict == "named" or found.method == "output-error":
         return "No further experiment is asked for."

@@ -214,7 +214,8 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     said = headline(found)
     bench.operator.show(said)
     asked = found.next_experiment
-    behaves = {"behaves_like_the_machine_file": WITHIN_TOLERANCES} if found.verdict == "nothing-significant" else {}
+    sound = found.verdict == "nothing-significant" and not found.examined_nothing
+    behaves = {"behaves_like_the_machine_file": WITHIN_TOLERANCES} if sound else {}
     return {
         **behaves,
         "verdict": found.verdict.replace("-", " "),

@@ -25,6 +25,8 @@ def _finding_of(found: Diagnosis) -> str:
     if found.verdict == "suspected" and found.suspicion is not None:
         return f"perhaps {suspicion_words(found.suspicion)}"
     if found.verdict == "nothing-significant":
+        if found.examined_nothing:
+            return "the traces say nothing of the model"
         if any(map(was_taken_back, found.steps)):
             return "none of the known effects, and what is left has no shape of one"
         if any(s.effect is not None for s in found.steps):

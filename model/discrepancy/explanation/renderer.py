@@ -187,7 +187,7 @@ def not_examined_words(joints: Sequence[int]) -> list[str]:
 def _summary_of(answer: Diagnosis) -> str:
     adopted = [s for s in answer.steps if s.adopted]
     match answer.verdict:
-        case "nothing-significant" if set(answer.not_examined) >= set(answer.model_before.machine.modelled_joints):
+        case "nothing-significant" if answer.examined_nothing:
             return "The traces say nothing of the model."
         case "nothing-significant":
             rejected = [s for s in answer.steps if not s.adopted]

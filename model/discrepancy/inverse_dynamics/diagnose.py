@@ -121,8 +121,13 @@ def _tells_apart(answer: Diagnosis, first: Diagnosis) -> bool:
     last, before = _found_in_torques(answer), _found_in_torques(first)
     if answer.verdict != "named" or len(last) != len(before):
         return False
-    open_ = [(set(step.joints), _names_of(step)) for step in before]
-    return all(any(set(step.joints) == joints and _names_of(step) <= names for joints, names in open_) for step in last)
+
+    def is_of(one: Step, group: Step) -> bool:
+        return set(one.joints) == set(group.joints) and _names_of(one) <= _names_of(group)
+
+    return all(any(is_of(one, group) for group in before) for one in last) and all(
+        any(is_of(one, group) for one in last) for group in before
+    )
 
 
 def _found_in_torques(answer: Diagnosis) -> list[Step]:

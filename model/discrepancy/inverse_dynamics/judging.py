@@ -10,22 +10,20 @@ import numpy as np
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, FRICTION
+from model.discrepancy.inverse_dynamics.far_numbers import FAR_OFF, stands_for_far_number
+from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
-from model.effects.library import find_named_effect
 
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
 something else."""
 CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
-FAR_OFF = 4.0
-"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
@@ -33,8 +31,6 @@ NO_PART = 0.4
 """Least share of a residual far above noise that an effect must take: on sound rigs those that are not there take up to
 35 %, and friction of a real motor, beside something else, 46 %. Any law takes a little of another one, and the
 evidence then counts the rest as noise."""
-NEARLY_ALL = 0.9
-"""Share of an effect's evidence from priors, above which stated numbers imitate it."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 LEAD = 4.0
@@ -67,7 +63,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     Args:
         refused: candidates of the same step that were not taken before it.
     """
-    if chosen.evidence <= 0 and not is_far_from_file(chosen):
+    if chosen.evidence <= 0 and not stands_for_far_number(standing.now, chosen):
         return None
     most = explains_most(standing, chosen)
     if chosen.evidence + chosen.told < needed_evidence(standing, chosen, explains_most=most):
@@ -85,29 +81,17 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
     """Evidence from which a candidate is named. explains_most: whether it takes most of what is left.
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
-    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough; and where all
-    of it does, that a number of the file would have to be off by more than it is taken to be.
+    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough. An effect
+    without which a number would be far from its file needs a fall of as much as that number's distance costs.
     """
     options = standing.case.options
     least = options.least_evidence
     if explains_most:
         least = min(least, SUSPECTED)
     least -= chosen.relief * max(least - SUSPECTED, 0.0)
-    if is_far_from_file(chosen):
+    if stands_for_far_number(standing.now, chosen):
         least = min(least, FAR_OFF**2 - chosen.cost)
     return least + options.echo * _collected(standing, chosen.joints)
-
-
-def is_far_from_file(chosen: Fitted) -> bool:
-    """Whether a candidate stands for numbers that would have to be `FAR_OFF` deviations from what the file states.
-
-    k ln n is what a parameter costs of which every sample tells a little more (Schwarz 1978). The size of an effect
-    that stated numbers can imitate is known as well as these, however long the record, so that it costs next to
-    nothing.
-    Friction is left out: files state it roughly (`is_far`).
-    """
-    own = find_named_effect(chosen.effect).shared_name.family
-    return own != FRICTION and chosen.relief > NEARLY_ALL and chosen.evidence + chosen.cost >= FAR_OFF**2
 
 
 def needed_lead(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> float:
@@ -121,7 +105,7 @@ def needed_lead(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> float:
 def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
     """Evidence of the steps adopted so far on these joints, or on any for an effect of the whole machine."""
     near = (s for s in standing.steps if s.adopted and (not joints or not s.joints or set(s.joints) & set(joints)))
-    return sum(s.evidence + (s.evidence_held_out or 0.0) for s in near)
+    return sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
 
 
 def explains_most(standing: Standing, chosen: Fitted) -> bool:

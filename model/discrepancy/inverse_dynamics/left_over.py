@@ -8,7 +8,7 @@ import numpy as np
 
 from model.discrepancy.diagnosis import RemainingShape, Step
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.localisation import MOST_OF_IT, bends_with_speed, remaining_shapes
+from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, bends_with_speed, remaining_shapes
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.effects.library import find_named_effect
 
@@ -23,8 +23,9 @@ VISCOUS = "viscous_friction"
 PART_OF_IT = 0.3
 """Least share of what is left that friction which goes with the place explains, where another law was named."""
 FRICTION = "friction"
+"""The family of effects that rub."""
 SENSOR = "sensor"
-"""Families of effects that look like such friction."""
+"""The family of a position sensor's errors."""
 
 
 def joints_left_over(standing: Standing) -> tuple[int, ...]:
@@ -36,7 +37,7 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
         held = holdout.held_out_squares(standing.model, now.values, case.held_out)
         fitted.append(np.sqrt(held))
     least = np.min(np.nan_to_num(fitted), axis=0) / case.noise
-    shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= MOST_OF_IT}
+    shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= ANOTHER_LAW}
     joints = standing.model.machine.modelled_joints
     slow = (now.noise.memory > SLOW) | np.array([j in shaped for j in joints])
     return tuple(j for j, left in zip(joints, (least > FAR_ABOVE_NOISE) & slow, strict=True) if left)

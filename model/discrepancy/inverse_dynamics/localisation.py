@@ -37,7 +37,7 @@ SHAPE_SIGNIFICANCE = 6.0
 """Least significance of a shape of the remaining torque, in standard deviations."""
 SHAPE_SHARE = 0.15
 """Least share of the remaining torque's variance that a shape must explain."""
-MOST_OF_IT = 0.4
+ANOTHER_LAW = 0.4
 """Least share of the remaining torque's variance with which a shape says that a law is another one."""
 BEYOND_NOISE = 1.5
 """Least remaining torque that is given a shape, in noise floors."""
@@ -145,13 +145,13 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
 
 
 def bends_with_speed(shapes: Sequence[RemainingShape], joint: int) -> bool:
-    """Whether most of what is left on a joint is a torque against the motion that bends with speed.
+    """Whether much of what is left on a joint (`ANOTHER_LAW`) is a torque against the motion that bends with speed.
 
     Such a torque is odd in speed, as that of viscous friction; one that is even belongs to viscous friction of another
     coefficient in each direction.
     """
     for shape in shapes:
-        if shape.joint != joint or shape.against != "speed" or shape.explained < MOST_OF_IT:
+        if shape.joint != joint or shape.against != "speed" or shape.explained < ANOTHER_LAW:
             continue
         known = [(v, t) for v, t in zip(shape.centres, shape.torque, strict=True) if t is not None]
         speed, torque = np.array(known).T

@@ -11,9 +11,10 @@ from model.discrepancy.grounds import Note, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.far_numbers import brings_back, stands_for_far_number
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, is_far_from_file, judge
+from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
 from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
@@ -146,7 +147,7 @@ class TorqueWorkflow:
     def _with_held_out(self, found: Found, candidates: Sequence[Fitted]) -> list[Fitted]:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
         held = self.case.held_out
-        asked = [c for c in candidates if held and (c.evidence > 0 or is_far_from_file(c))]
+        asked = [c for c in candidates if held and (c.evidence > 0 or stands_for_far_number(found.now, c))]
         told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
         others = [c for c in candidates if not any(c is one for one in asked)]
         return [
@@ -163,14 +164,16 @@ class TorqueWorkflow:
     def _adopt(self, found: Found, findings: Findings) -> Found:
         """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
         refused: list[Fitted] = []
-        passed_over: list[Fitted] = []  # they explain noise, or other records speak against them: no rivals either
+        passed_over: list[Fitted] = []  # they lack evidence, or explain noise
         standing, steps = self.refitter.standing(found), list(found.steps)
         for chosen in findings.fitted[:CHANCES]:
             judgement = judge(standing, chosen, refused)
             if judgement is None:
                 passed_over.append(chosen)
                 continue
-            steps.append(record_step(standing, findings, judgement, [*refused, *passed_over]))
+            steps.append(
+                record_step(standing, findings, judgement, [*refused, *_no_rivals(found, chosen, passed_over)])
+            )
             if judgement.refusal is None:
                 return replace(self.refitter.take(found, chosen), steps=tuple(steps))
             refused.append(chosen)
@@ -228,7 +231,7 @@ class TorqueWorkflow:
         if _has_more(again, without):
             return replace(again, steps=(*others[:place], again.steps[-1], *others[place:]))
         mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
-        if all(f.evidence + f.told >= SUSPECTED for f in mine):
+        if all(f.evidence + f.told >= SUSPECTED or stands_for_far_number(without.now, f) for f in mine):
             return found
         return self._superfluous(without, found, step)
 
@@ -251,7 +254,8 @@ class TorqueWorkflow:
             if not step.adopted or step.effect is None:
                 continue
             now, without = self.found.now, self.refitter.remove(self.found, step)
-            if evidence(without.now, now, now.noise.memory, len(step.parameters), 1) < 0:
+            less = evidence(without.now, now, now.noise.memory, len(step.parameters), 1)
+            if less < 0 and not brings_back(without.now, now):
                 self.found = self._superfluous(without, self.found, step)
 
     def _superfluous(self, without: Found, found: Found, step: Step) -> Found:
@@ -272,6 +276,14 @@ class TorqueWorkflow:
                 steps[index] = withdrawn(step, wrong)
                 self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
             self.suspicion, self.tried, self.at_bounds = None, (), []  # they were of the model with these effects
+
+
+def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:
+    """Candidates that were passed over, without those that are more probable than one which is named for a number far
+    from its file, on less evidence than any other effect needs: it is not named alone beside them."""
+    if chosen.evidence + chosen.told >= SUSPECTED or not stands_for_far_number(found.now, chosen):
+        return list(passed_over)
+    return [f for f in passed_over if f.log_odds < chosen.log_odds]
 
 
 def _has_more(after: Found, before: Found) -> bool:

@@ -34,8 +34,8 @@ LATER_STARTS = (1, 2, 3, 4, 5)
 """Samples from which what the integrators held is told, where the first does not tell it: a set point that was lost
 near one of them makes it wrong."""
 SHOWN_LIMIT = 3
-"""Samples at the largest size of a drive that show a limit. A drive in steps comes there without one, too; then a few
-samples count as hidden that are none."""
+"""Samples at the largest size of a drive that show a limit. A drive in steps comes there without one, too; then samples
+count as hidden that are none, for as long as it stands there."""
 REWEIGHTED = 20
 """Rounds of weights for a line of least absolute deviations."""
 
@@ -193,7 +193,7 @@ def _largest_output(machine: Machine, joint: int, recorded: Floats) -> float:
         return stated.value
     most = abs(drive.dac_full_scale.value * drive.amplifier_gain.value) if isinstance(drive, DcMotor) else np.inf
     sizes = np.abs(recorded)
-    shown = int((sizes >= (1 - AT_LIMIT) * sizes.max()).sum()) >= SHOWN_LIMIT
+    shown = sizes.any() and int((sizes >= (1 - AT_LIMIT) * sizes.max()).sum()) >= SHOWN_LIMIT
     return min(most, float(sizes.max())) if shown else most
 
 

@@ -29,6 +29,7 @@ def test_a_joint_of_which_no_record_tells_anything_is_named_by_the_whole_run() -
     assert not any(s.adopted for s in found.steps)
     assert "joint 1" in headline(found)
     assert "not examined" in headline(found)
+    assert "explains" not in headline(found)
     assert "not examined" in found.summary
     assert found.summary.endswith("The traces say nothing of the model."), "and not that the model explains them"
     whole = diagnose_torques(model, [at_limit(slide_trace(1, {"coulomb": 8.0}, 8.0), 0.05)], (), options)

@@ -1,6 +1,7 @@
 /** What the page calls phases of motion, and the tone of each verdict. */
 
 import type { DiagnosisData, PhaseCell } from '../api/types';
+import type { Tone } from '../jobs/jobs';
 
 export type Phase = PhaseCell['phase'];
 export type Verdict = DiagnosisData['verdict'];
@@ -24,13 +25,19 @@ export const PHASE_MEANINGS: Record<Phase, string> = {
   hold: 'at rest',
 };
 
-export const TONES: Record<Verdict, 'good' | 'warn' | 'bad' | 'quiet'> = {
+const TONES: Record<Verdict, Tone> = {
   'nothing-significant': 'good',
   named: 'good',
   ambiguous: 'warn',
   suspected: 'warn',
   'unknown-effect': 'bad',
 };
+
+/** The tone of a verdict; nothing found is no good news of joints that could not be examined. */
+export function toneOfVerdict(found: Pick<DiagnosisData, 'verdict' | 'not_examined'>): Tone {
+  const nothing = found.verdict === 'nothing-significant';
+  return nothing && (found.not_examined ?? []).length > 0 ? 'warn' : TONES[found.verdict];
+}
 
 /** `a`, `a and b`, `a, b and c`. */
 export function listed(names: readonly string[], last = 'and'): string {

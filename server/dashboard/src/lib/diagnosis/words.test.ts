@@ -1,0 +1,17 @@
+import { describe, expect, it } from 'vitest';
+import { toneOfVerdict } from './words';
+
+describe('the tone of a verdict', () => {
+  it('is good where nothing was found on joints that could be examined', () => {
+    expect(toneOfVerdict({ verdict: 'nothing-significant', not_examined: [] })).toBe('good');
+  });
+
+  it('is a warning where nothing was found since joints could not be examined', () => {
+    expect(toneOfVerdict({ verdict: 'nothing-significant', not_examined: [2] })).toBe('warn');
+  });
+
+  it('is that of what was found, whatever could not be examined beside it', () => {
+    expect(toneOfVerdict({ verdict: 'named', not_examined: [2] })).toBe('good');
+    expect(toneOfVerdict({ verdict: 'unknown-effect', not_examined: [] })).toBe('bad');
+  });
+});
