@@ -34,6 +34,8 @@ OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
     "load_dependent_friction": dict.fromkeys((1, 2), ("gravity_torque_friction", ())),
     # it is larger one way and smaller the other than what the file states: a coefficient and a difference
     "viscous_friction": dict.fromkeys((1, 2), ("direction_dependent_viscous_friction", ("viscous_friction",))),
+    # a loss that differs by direction is in part a change of the torque constant: the loss is its name (decision 0062)
+    "gear_loss": dict.fromkeys((1, 2), ("gear_loss", ("direction_dependent_gear_loss",))),
     "dead_zone": {JUMP: ("amplifier_threshold", ())},
     "resistance_drift": {2: ("resistance_rise", ())},
     "spring_torque": {ONE_SIDED: ("one_sided_spring", ())},
@@ -137,7 +139,7 @@ def find_drawn_law(known_as: str) -> tuple[str, int]:
     """The name by which an effect of the library is drawn, and the first law that the library calls so."""
     for name, others in OTHER_NAMES.items():
         for law, (other, _) in others.items():
-            if other == known_as:
+            if other == known_as != name:
                 return name, law
     return NAMED_BY_LAW.get(known_as, (known_as, 0))
 

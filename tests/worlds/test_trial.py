@@ -45,6 +45,12 @@ def test_the_kind_on_which_the_least_time_was_spent_comes_next(made: list[Any], 
     assert min(seeds) >= trial.FIRST_DRAWN
 
 
+def test_a_process_runs_the_kinds_that_it_was_given(made: list[Any], tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        trial.run(REGISTRATION, "a commit", tmp_path, 60.0, ("planar-pid",))
+    assert {kind for kind, _, _ in made} == {"planar-pid"}
+
+
 def test_a_trial_goes_on_where_it_stopped_and_its_lines_are_read_again(made: list[Any], tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         trial.run(REGISTRATION, "a commit", tmp_path, 60.0)

@@ -6,6 +6,7 @@ import ast
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -20,7 +21,7 @@ from model.simulation.chain_of_model import chain_of
 from tests.worlds.bodies import mjcf
 from tests.worlds.drawing import sound_rig
 from tests.worlds.folder import write_world
-from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, tilted
+from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, known, tilted
 from tests.worlds.kinds import KINDS, REPORTED, REPORTING, TUNING
 from tests.worlds.lab import machine_text
 from tests.worlds.world import hidden_rig, make_world
@@ -158,8 +159,8 @@ def answered(verdict: str, *steps: tuple[str, list[int], list[str]]) -> dict[str
     return {"verdict": verdict, "steps": made}
 
 
-def truth(case: str, *hidden: tuple[str, int], sharp: dict[str, float] | None = None) -> dict[str, object]:
-    made = [{"name": n, "joint": j} for n, j in hidden]
+def truth(case: str, *hidden: tuple[str, int], sharp: dict[str, float] | None = None) -> dict[str, Any]:
+    made: list[dict[str, Any]] = [{"name": n, "joint": j} for n, j in hidden]
     rivals = [{"name": n, "d_prime": d} for n, d in (sharp or {}).items()]
     return {"case": case, "hidden": made, **({"sharpness": rivals} if sharp else {})}
 
@@ -172,6 +173,14 @@ def test_a_name_is_strict_only_without_another() -> None:
     assert score(told, both).answered
     assert score(told, answered("named", ("coulomb_friction", [1], []))).joints is False
     assert not score(told, None).strict
+
+
+def test_a_gear_loss_of_one_direction_may_be_told_with_its_difference() -> None:
+    lost = truth("single", ("gear_loss", 2))
+    lost["hidden"][0] |= {"known_as": "gear_loss", "beside": list(known("gear_loss", 2)[1])}
+    by_direction = ("direction_dependent_gear_loss", [2], [])
+    assert score(lost, answered("named", ("gear_loss", [2], []), by_direction)).strict
+    assert not score(lost, answered("named", by_direction)).strict
 
 
 def test_a_group_is_right_where_the_record_cannot_tell_its_members_apart() -> None:

@@ -16,6 +16,8 @@ FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
 2.6, where friction turns (docs/worlds.md)."""
+SHAPED_ABOVE_NOISE = 4.0
+"""The same where a shape explains much of it (`ANOTHER_LAW`): the shape says as well that something is missing."""
 SLOW = 4.0
 """Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
 the low-pass, that of accelerations to 2.7."""
@@ -29,8 +31,8 @@ SENSOR = "sensor"
 
 
 def joints_left_over(standing: Standing) -> tuple[int, ...]:
-    """Joints whose residual is far above noise on fitted and on held-out records, and no noise: slower than that, or of
-    a shape."""
+    """Joints whose residual is above noise on fitted and on held-out records, and is no noise: far above and slower, or
+    of a shape."""
     case, now = standing.case, standing.now
     fitted = [np.sqrt(holdout.mean_squares(case.stretches, now.residual))]
     if case.held_out:
@@ -39,8 +41,9 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     least = np.min(np.nan_to_num(fitted), axis=0) / case.noise
     shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= ANOTHER_LAW}
     joints = standing.model.machine.modelled_joints
-    slow = (now.noise.memory > SLOW) | np.array([j in shaped for j in joints])
-    return tuple(j for j, left in zip(joints, (least > FAR_ABOVE_NOISE) & slow, strict=True) if left)
+    slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > SLOW)
+    shapes = (least > SHAPED_ABOVE_NOISE) & np.array([j in shaped for j in joints])
+    return tuple(j for j, left in zip(joints, slow | shapes, strict=True) if left)
 
 
 def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:

@@ -12,6 +12,9 @@ from model.arrays import Floats
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.machine_model.model import Model
 
+LEAST_OF_WAVE = 0.8
+"""Least share of a ripple's wave within the travel of a joint: a slower one is a spring."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -50,10 +53,10 @@ class Place:
 
     @property
     def slowest_ripple(self) -> float:
-        """Slowest rate, in rad of phase per rad (m), of a ripple: one wave lies within the positions at which the joint
-        moves."""
+        """Slowest rate, in rad of phase per rad (m), of a ripple: most of a wave (`LEAST_OF_WAVE`) lies within the
+        positions at which the joint moves."""
         every = np.concatenate([r.position[r.rows, self.column][r.moving[:, self.column]] for r in self.records])
-        return 2 * np.pi / max(float(np.ptp(every)) if every.size else 0.0, 1e-9)
+        return LEAST_OF_WAVE * 2 * np.pi / max(float(np.ptp(every)) if every.size else 0.0, 1e-9)
 
     @property
     def current(self) -> float:

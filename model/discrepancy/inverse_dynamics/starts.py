@@ -13,7 +13,7 @@ from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.inverse_dynamics.place import Place
+from model.discrepancy.inverse_dynamics.place import LEAST_OF_WAVE, Place
 from model.discrepancy.inverse_dynamics.trial import Start
 from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED
@@ -162,7 +162,7 @@ def _ripple(place: Place) -> Iterator[Start]:
     column, records = place.column, place.records
     if place.slowest_ripple > FASTEST_RIPPLE:
         return
-    travel = 2 * np.pi / place.slowest_ripple
+    travel = LEAST_OF_WAVE * 2 * np.pi / place.slowest_ripple
     slow = float(np.quantile(place.speeds, 0.25))
     highest = 2 * np.pi * records[0].cutoff / max(slow, 1e-9)
     grid = _scanned(max(place.slowest_ripple, 0.5), min(highest, FASTEST_RIPPLE), 0.7 * np.pi / travel)

@@ -78,6 +78,8 @@ def test_nothing_is_named_on_a_sound_rig(rig: str) -> None:
         pytest.param({"viscous": 20.0}, "viscous_friction", "coefficient", 20.0, marks=pytest.mark.slow),
         pytest.param({"spring": 100.0}, "spring_torque", "stiffness", 100.0, marks=pytest.mark.slow),
         pytest.param({"ripple": 3.0, "cycles": 80.0}, "torque_ripple", "cycles", 80.0, marks=pytest.mark.slow),
+        # nine tenths of a wave lie within the travel of 0.44 m
+        ({"ripple": 6.0, "cycles": 12.9}, "torque_ripple", "cycles", 12.9),
     ],
 )
 def test_a_sliding_servo_axis(hidden: dict[str, float], effect: str, parameter: str, value: float) -> None:
