@@ -42,6 +42,14 @@ def _positive(quantity: Quantity) -> Quantity:
     return quantity
 
 
+def _not_zero(quantity: Quantity) -> Quantity:
+    if quantity.value == 0.0:
+        raise ValueError(f"value {quantity.value} {quantity.unit} must not be 0")
+    return quantity
+
+
+Ratio = Annotated[Plain, AfterValidator(_not_zero)]
+"""Of a gear; below 0 where motor and joint turn opposite ways."""
 Product = Annotated[Quantity, in_unit("kg·m²")]
 """Of inertia, of either sign."""
 Size = Annotated[Quantity, AfterValidator(_positive)]
@@ -109,7 +117,7 @@ class DcMotor(FrozenRecord):
     """Voltage for a speed of the motor."""
     rotor_inertia: Inertia
     """On the motor's side."""
-    gear_ratio: Plain
+    gear_ratio: Ratio
     """Motor turns per joint turn."""
     amplifier_gain: Plain
     """Volts at the motor for a volt of the board's output."""
@@ -140,7 +148,7 @@ class CurrentDrive(FrozenRecord):
     kind: Literal["current"]
     torque_constant: Annotated[Quantity, in_unit("N·m/A", above=0.0)]
     """Torque of the motor for an ampere."""
-    gear_ratio: Plain
+    gear_ratio: Ratio
     """Motor turns per joint turn."""
     rotor_inertia: Inertia | None = None
     """On the motor's side."""
@@ -166,7 +174,7 @@ class Sensor(FrozenRecord):
 
     bits: Annotated[int, Field(ge=1, le=32)]
     """Its range has 2^bits counts."""
-    range: JointValue
+    range: Annotated[JointValue, AfterValidator(_positive)]
     """Of the joint, over all counts."""
     at_zero: JointValue
     """Position of the joint at count 0; a deviation turns the link against what the sensor shows."""

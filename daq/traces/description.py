@@ -9,16 +9,16 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationError
 
-from daq.contracts.documents import parse_toml, shown
+from daq.contracts.documents import parse_toml
 from daq.contracts.errors import DaqError, SpecError, TraceError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine, shipped_machines
+from daq.contracts.refused import refused_words
 from daq.contracts.trace import Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
 from daq.traces.recording import software
-from firmware_protocol.invalid import first_invalid
 
 DriveUnit = Literal["V", "A", "N·m", "N"]
 
@@ -55,8 +55,7 @@ class Description(FrozenRecord):
         try:
             description = cls.model_validate(parse_toml(data.decode("utf-8"), str(path)))
         except ValidationError as error:
-            first = first_invalid(error)
-            raise TraceError(f"{path}: {first.where()}: {first.message} (got {shown(first.value)})") from error
+            raise TraceError(f"{path}: {refused_words(error, cls, 'the file')}") from error
         except UnicodeDecodeError as error:
             raise TraceError(f"{path}: is not text in UTF-8") from error
         except SpecError as error:

@@ -8,9 +8,15 @@ import numpy as np
 
 from model.arrays import Floats, Mask
 
-LINE = 0.5
+LINE = 0.05
 """Share of a joint's motion, by the variance of its speed, from which a single frequency is the motion's own. A sine
-has all of it in one, a triangle four fifths."""
+has all of it in one, the least of five sines 9 %."""
+PROMINENT = 30.0
+"""Power of such a frequency over the median of its surroundings: motion of no frequency of its own has three times as
+much in three bins as in one."""
+AROUND = (-8, -7, -6, -5, -4, 4, 5, 6, 7, 8)
+"""Bins of a frequency's surroundings, from its own. A sine that does not fit a record has a 300th of its power
+there."""
 PERIODS = 4
 """Least number of periods in a record: what a short motion repeats less often is no frequency."""
 
@@ -30,5 +36,7 @@ def own_frequencies(frequencies: Floats, speeds: Sequence[Floats], period: float
         total = power.sum(axis=0)
         bins = np.round(frequencies * len(speed) * period).astype(np.int64)
         line = sum(power[np.clip(bins + shift, 0, len(power) - 1)] for shift in (-1, 0, 1))
-        own |= ((line > LINE * total) & (total > 0)).any(axis=1) & (bins >= PERIODS)
+        around = np.median([power[np.clip(np.abs(bins + shift), 0, len(power) - 1)] for shift in AROUND], axis=0)
+        is_line = (line > LINE * total) & (line > PROMINENT * around) & (total > 0)
+        own |= is_line.any(axis=1) & (bins >= PERIODS)
     return own

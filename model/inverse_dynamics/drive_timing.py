@@ -39,6 +39,12 @@ def timing_unknowns(model: Model) -> tuple[Unknown, ...]:
     )
 
 
+def expected_timing(model: Model) -> dict[str, float]:
+    """What is expected of the lateness of every joint's drive, by name: no file states it, so that it is no error of a
+    model as it was given."""
+    return {unknown.name: unknown.expected for unknown in timing_unknowns(model)}
+
+
 def samples_late(model: Model, values: Mapping[str, float]) -> Floats:
     """Lateness (n,) of the joints' drives in samples, as `values` have it by name; 0 where they do not name it, and on
     a joint whose delay the model has as an effect."""

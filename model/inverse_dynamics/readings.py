@@ -119,11 +119,18 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
         raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
     if len(trace) < FEWEST:
         raise TraceError(f"{trace.called}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
+    units = [unit for j in machine.modelled_joints for unit in machine.joint(j).drive_units]
+    if trace.record.drive_unit not in (None, *units):
+        allowed = " or ".join(dict.fromkeys(units))
+        raise TraceError(
+            f"{trace.called}: the drive is in {trace.record.drive_unit}, that of {machine.name} in {allowed}"
+        )
     columns = [trace.column(j) for j in machine.modelled_joints]
     steps = np.diff(trace.time)
     period = float(np.median(steps))
     if steps.max() > LONGEST_GAP[0] * period + LONGEST_GAP[1]:
-        raise TraceError(f"{trace.called}: a gap of {steps.max():.3g} s; use a piece without any")
+        place = f"a gap of {steps.max():.3g} s behind {trace.time[int(steps.argmax())]:.3f} s"
+        raise TraceError(f"{trace.called}: {place}; use a piece without any")
     time = np.arange(trace.time[0], trace.time[-1], period)
 
     def resample(signal: Floats) -> Floats:
@@ -156,7 +163,11 @@ def choose_cutoff(traces: Sequence[Trace], machine: Machine) -> float:
         if moving.any() and (noise[moving] < NOISE_SHARE * whole[moving]).all():
             found = cutoff
     if found is None:
-        raise SpecError("no joint accelerates beyond the noise of its readings: there is nothing to explain")
+        called = " and ".join(t.called for t in traces)
+        raise SpecError(
+            f"{called}: no joint accelerates beyond the noise of its readings: there is nothing to explain; times are "
+            "in s, positions in rad or m"
+        )
     return found
 
 

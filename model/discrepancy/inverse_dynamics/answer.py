@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -21,7 +22,7 @@ from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.verdict import verdict
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
-from model.inverse_dynamics.drive_timing import MOST, samples_late
+from model.inverse_dynamics.drive_timing import MOST, expected_timing, samples_late
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
@@ -107,7 +108,9 @@ def _errors(standing: Standing, records: tuple[RecordedMotion, ...]) -> tuple[Si
     if not records:
         return ()
     untold = np.all([r.not_known for r in records], axis=0)
-    before = np.where(untold, np.nan, holdout.held_out_squares(standing.given, {}, records))
+    before = np.where(
+        untold, np.nan, holdout.held_out_squares(standing.given, expected_timing(standing.given), records)
+    )
     after = holdout.held_out_squares(standing.model, standing.now.values, records)
     return signal_errors(standing.model, before, after, standing.case.noise)
 
@@ -135,7 +138,7 @@ def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
     return (
         *on_stated_numbers((u.as_stated for u in outcome.unknowns if u.name not in outcome.added), values),
         *on_named_numbers((p for name, p in outcome.stated.items() if name in outcome.added), values),
-        _torque_left(outcome),
+        *_torque_left(outcome),
         *_assumptions(cutoff, outcome.controller.not_looked_for),
         *_at_limits(standing),
         *_timing(standing),
@@ -143,16 +146,20 @@ def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
     )
 
 
-def _torque_left(outcome: Outcome) -> Note:
+def _torque_left(outcome: Outcome) -> tuple[Note, ...]:
     """Residual as a share of the recorded torque, by the model as given, with its numbers fitted, and after: the figure
-    that the literature usually gives."""
+    that the literature usually gives. None where nothing is driven; a warning where the model as given leaves more
+    than there is."""
     standing = outcome.standing
     held = standing.case.held_out
     records = held or standing.case.records
-    given = holdout.relative_torque_error(standing.given, {}, records)
+    given = holdout.relative_torque_error(standing.given, expected_timing(standing.given), records)
     before = holdout.relative_torque_error(standing.given, outcome.first.values, records)
     after = holdout.relative_torque_error(standing.model, standing.now.values, records)
-    return Note(kind="torque-left", values={"held_out": bool(held), "given": given, "before": before, "after": after})
+    if not math.isfinite(given):
+        return ()
+    values = {"held_out": bool(held), "given": given, "before": before, "after": after}
+    return (Note(kind="torque-left", values=values, warning=given > 1.0),)
 
 
 def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note, ...]:

@@ -66,13 +66,13 @@ def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
 
 def _without_effect(standing: Standing, chosen: Fitted) -> BalanceFit:
     """The model that lacks an effect, or has its numbers as the file states them, with all others as they are with
-    it."""
+    it, but for how late the drives act: no file states that."""
     case, model, now = standing.case, standing.model, standing.now
     stated = {p.name: p.value for p in chosen.stated}
     known = {name: v for name, v in chosen.fit.model_values.items() if name in model.by_name} | stated
     balance = TorqueBalance(model.with_values(known), case.records)
     begin = {**now.values, **chosen.fit.values, **stated}
-    return fit(balance, now.unknowns, begin, case.data, now.noise.memory, rounds=0)
+    return fit(balance, [u for u in now.unknowns if u.nuisance], begin, case.data, now.noise.memory)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:

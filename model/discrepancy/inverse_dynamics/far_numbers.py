@@ -22,13 +22,9 @@ def far_numbers(now: BalanceFit) -> frozenset[str]:
     return frozenset(u.name for u in stated if abs(prior_distance(u, now.values[u.name])[0]) >= FAR_OFF)
 
 
-def brings_back(before: BalanceFit, after: BalanceFit) -> bool:
-    """Whether a number that was far from its file is not any more, or has become what is named."""
-    return bool(far_numbers(before) - far_numbers(after))
-
-
 def stands_for_far_number(before: BalanceFit, chosen: Fitted) -> bool:
-    """Whether a candidate is all but a number of the file that would be `FAR_OFF` deviations off without it.
+    """Whether stated numbers imitate a candidate, and one of them is `FAR_OFF` deviations off without it and not with
+    it, or is what it names.
 
     k ln n is what a parameter costs of which every sample tells a little more (Schwarz 1978). The size of an effect
     that stated numbers can imitate is known as well as these are stated, however long the record is.
@@ -37,4 +33,4 @@ def stands_for_far_number(before: BalanceFit, chosen: Fitted) -> bool:
         before: the fit without the candidate.
     """
     fell = chosen.evidence + chosen.cost
-    return chosen.relief > NEARLY_ALL and fell >= FAR_OFF**2 and brings_back(before, chosen.fit)
+    return chosen.relief > NEARLY_ALL and fell >= FAR_OFF**2 and bool(far_numbers(before) - far_numbers(chosen.fit))

@@ -101,10 +101,12 @@ def _fold(count: int, fold: int) -> NDArray[np.bool_]:
 
 
 def relative_torque_error(model: Model, values: Mapping[str, float], records: tuple[RecordedMotion, ...]) -> float:
-    """√(Σ residual² / Σ torque²) of a fitted model over all joints and compared samples, joints at rest included."""
+    """√(Σ residual² / Σ torque²) of a fitted model over all joints and compared samples, joints at rest included; NaN
+    where nothing is driven."""
     left = sum(float((r**2).sum()) for r in _residuals(model, values, records))
     driven = TorqueBalance(model, records).supplied_by_drive()
-    return float(np.sqrt(left / sum(float((r**2).sum()) for r in driven)))
+    whole = sum(float((r**2).sum()) for r in driven)
+    return float(np.sqrt(left / whole)) if whole > 0.0 else math.nan
 
 
 def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:

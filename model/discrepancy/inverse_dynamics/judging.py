@@ -18,6 +18,7 @@ from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
+from model.inverse_dynamics.drive_timing import expected_timing
 
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
@@ -82,7 +83,7 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
     least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough. An effect
-    without which a number would be far from its file needs a fall of as much as that number's distance costs.
+    without which a number would be far from its file needs a fall of −2 log posterior of 16, the square of `FAR_OFF`.
     """
     options = standing.case.options
     least = options.least_evidence
@@ -171,7 +172,7 @@ def _grown_held_out(standing: Standing, chosen: Fitted) -> float:
     held = standing.case.held_out
     if not held:
         return 0.0
-    given = holdout.held_out_squares(standing.given, {}, held)
+    given = holdout.held_out_squares(standing.given, expected_timing(standing.given), held)
     after = holdout.held_out_squares(chosen.model, chosen.fit.values, held)
     own = [j in chosen.joints or not chosen.joints for j in standing.model.machine.modelled_joints]
     growth = after[own] / np.maximum(given[own], 1e-300) - 1.0

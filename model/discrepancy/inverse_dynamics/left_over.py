@@ -9,6 +9,7 @@ import numpy as np
 from model.discrepancy.diagnosis import RemainingShape, Step
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, bends_with_speed, remaining_shapes
+from model.discrepancy.inverse_dynamics.resolution import ends_at_bound
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.effects.library import find_named_effect
 
@@ -16,7 +17,7 @@ FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
 2.6, where friction turns (docs/worlds.md)."""
-SHAPED_ABOVE_NOISE = 4.0
+SHAPED_ABOVE_NOISE = 3.0
 """The same where a shape explains much of it (`ANOTHER_LAW`): the shape says as well that something is missing."""
 SLOW = 4.0
 """Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
@@ -38,7 +39,7 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     if case.held_out:
         held = holdout.held_out_squares(standing.model, now.values, case.held_out)
         fitted.append(np.sqrt(held))
-    least = np.min(np.nan_to_num(fitted), axis=0) / case.noise
+    least = np.fmin.reduce(fitted) / case.noise  # a record in which a joint rests says nothing of it
     shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= ANOTHER_LAW}
     joints = standing.model.machine.modelled_joints
     slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > SLOW)
@@ -47,7 +48,8 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
 
 
 def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
-    """Index of the first step that the residual contradicts; None where it contradicts none.
+    """Index of the first step that the residual contradicts, or whose size has ended where no machine is; None where
+    there is none.
 
     Args:
         lowered: names of numbers that the file states and that steps have lowered.
@@ -56,9 +58,17 @@ def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
     for index, step in enumerate(standing.steps):
         joints = left & set(step.joints) if step.adopted else ()
         lowers = bool(lowered & set(step.parameters))
+        if step.adopted and _ended(standing, step):
+            return index
         if any(lowers or _bends(standing.steps, step, j, shapes) or rubs_elsewhere(step, j, shapes) for j in joints):
             return index
     return None
+
+
+def _ended(standing: Standing, step: Step) -> bool:
+    """Whether a size of a step is at the end of what it may be, now that all others are fitted with it."""
+    known, values = standing.model.by_name, standing.now.values
+    return any(ends_at_bound(known[name], values[name]) for name in step.parameters if name in known)
 
 
 def rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from model import layout as at
 from model.arrays import Floats
+from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -26,6 +27,8 @@ OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_in
 accelerations, or a gear that rattles, is fast."""
 WARMING = "resistance_rise"
 """The effect of a winding that warms with time, whatever its current."""
+REPEATING = "periodic_disturbance"
+"""The effect of a torque that repeats in time."""
 BENT = "potentiometer_nonlinearity"
 """The effect of a reading that bends over the sensor's range."""
 MOST_UNEVEN = 0.6
@@ -56,9 +59,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     Args:
         before: the fit without the effect.
     """
-    if found.effect == DELAY and _may_be_timing(found):
-        return False
-    if any(_warms_at_once(p, found.fit.values[p.name]) for p in found.parameters) or _is_uneven(found):
+    if _is_of_no_machine(found) or _repeats_with_motion(found, case):
         return False
     plain = _takes_half_of_what_is_no_noise(found, before, case)
     values = found.fit.values
@@ -69,6 +70,15 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     if found.effect not in OF_CHANGES or plain:
         return True
     return slower_evidence(found, before, case) >= case.options.least_evidence
+
+
+def _is_of_no_machine(found: Fitted) -> bool:
+    """Whether an effect as it was fitted is how drives are formed, or what no machine does in the recorded motion."""
+    if found.effect == DELAY and _may_be_timing(found):
+        return True
+    values = found.fit.values
+    ends = (_warms_at_once(p, values[p.name]) or _fades_beyond(p, values[p.name]) for p in found.parameters)
+    return any(ends) or _is_uneven(found)
 
 
 def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
@@ -131,6 +141,22 @@ def _fades_unresolved(p: Parameter, value: float) -> bool:
     return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
 
 
+def _fades_beyond(p: Parameter, value: float) -> bool:
+    """Whether friction fades at the highest speed that is looked at: no record shows that it does, and Coulomb friction
+    is the simpler law."""
+    return p.effect == "stribeck_friction" and p.null is None and AT_BOUND * value >= p.high
+
+
+def _repeats_with_motion(found: Fitted, case: TorqueCase) -> bool:
+    """Whether a disturbance repeats as often as the motion itself: then it goes with the motion, as every torque that
+    is a little wrong does."""
+    if found.effect != REPEATING:
+        return False
+    rates = [found.fit.values[p.name] for p in found.parameters if p.part == "frequency"]
+    speeds = [record.speed for record in case.records]
+    return bool(own_frequencies(np.array(rates), speeds, case.records[0].period).any())
+
+
 def _warms_at_once(p: Parameter, value: float) -> bool:
     """Whether a winding is as warm as it gets within the shortest time that is looked at: no copper is, and what is
     more at once than before is friction or a lost part of the drive."""
@@ -139,10 +165,10 @@ def _warms_at_once(p: Parameter, value: float) -> bool:
 
 def sizes_at_bounds(found: Fitted) -> list[Parameter]:
     """Sizes of an effect that ended at the end of what they may be."""
-    return [p for p in found.parameters if _ends_at_bound(p, found.fit.values[p.name])]
+    return [p for p in found.parameters if ends_at_bound(p, found.fit.values[p.name])]
 
 
-def _ends_at_bound(p: Parameter, value: float) -> bool:
+def ends_at_bound(p: Parameter, value: float) -> bool:
     """Whether a size, or the rate of a tone, ended at the end of what it may be, where a fit would go on: no machine
     has it, and what it takes is something else. The slowest ripple is a spring."""
     is_shape = p.effect is not None and p.null is None and p.rate_of is None

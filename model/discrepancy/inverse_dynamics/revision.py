@@ -34,10 +34,12 @@ def split_step(model: Model, step: Step, joint: int) -> tuple[Step, Step]:
 
 def describe_in_order(refitter: Refitter, found: Found) -> Found:
     """Measures again what every adopted step takes off, and where, with only the steps before it in place. A step that
-    was looked for again was measured with the later ones in place; its evidence stays that."""
-    stages = [found]
+    was looked for again was measured with the later ones in place; its evidence stays that. Numbers of the file that
+    a step names are as the file states them before it: within their tolerances they would take most of it off."""
+    stages, held = [found], dict[str, float]()
     for step in reversed(found.adopted):
-        stages.append(refitter.remove(stages[-1], step))
+        held |= {name: found.stated[name].value for name in step.parameters if name in found.stated}
+        stages.append(refitter.remove(stages[-1], step, held))
     told = [
         _with_errors(refitter, step, before, after)
         for step, (after, before) in zip(reversed(found.adopted), pairwise(stages), strict=True)

@@ -29,6 +29,9 @@ EITHER_WAY = (
 """Effects that act one way by their sign: they have no slope from one sign to the other, and are begun with both."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
 """Quantiles of a joint's speed in magnitude: speeds at which Stribeck friction may have faded."""
+NEARLY_FASTEST = 0.95
+"""Quantile of a joint's speed in magnitude by which Stribeck friction has to have faded to 37 % (1/e): what fades at
+higher speeds than were recorded is Coulomb friction."""
 DRIVE_QUANTILES = (0.2, 0.5, 0.8)
 """Quantiles of the drive in magnitude that are tried as dead zones."""
 THRESHOLD_SHARES = tuple(float(share) for share in np.geomspace(0.02, 0.6, 16))
@@ -76,13 +79,14 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
     """The parameter, with bounds narrowed to what the record allows.
 
     A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
-    ever acts would explain any motion, with bodies without mass. Friction must not change within the speeds at which
-    its direction is not resolved. A spring on one side must begin to pull within the recorded positions. A ripple
-    repeats itself within them: less than one wave is a spring, or a shifted sensor.
+    ever acts would explain any motion, with bodies without mass. Friction must not fade within the speeds at which its
+    direction is not resolved, nor beyond those that were recorded. A spring on one side must begin to pull within the
+    recorded positions. A ripple repeats itself within them: less than most of a wave is a spring, or a shifted sensor.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
-        return replace(p, low=min(p.high, max(p.low, slowest)))
+        fastest = max(slowest, float(np.quantile(place.speeds, NEARLY_FASTEST)))
+        return replace(p, low=min(p.high, max(p.low, slowest)), high=min(p.high, fastest))
     if p.effect == "one_sided_spring" and p.null is None:
         low, high = np.quantile(place.positions, TAUT_WITHIN)
         return replace(p, low=float(low), high=float(high))

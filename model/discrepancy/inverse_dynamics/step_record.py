@@ -11,6 +11,7 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step
 from model.discrepancy.grounds import Reason
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.comparison import compare
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.judging import (
     SUSPECTED,
@@ -107,11 +108,14 @@ def _candidate(case: TorqueCase, c: Fitted) -> Candidate:
 
 def _rivals(standing: Standing, found: Findings, chosen: Fitted, refused: Sequence[Fitted]) -> list[Fitted]:
     """Other effects that may explain the same torques: those that stand, and where changes of a torque are followed,
-    those of which the records do not tell."""
+    those of which the records do not tell. None is one that has only noise to explain, where the candidate stands for a
+    number that is far from its file."""
     rivals = [c for c in found.fitted if not any(c is one for one in refused)]
     if chosen.effect in OF_CHANGES:
         rivals += [c for c in found.unresolved if c.effect in OF_CHANGES and c.joints == chosen.joints]
-    return [c for c in rivals if c.rivals(chosen) and not c.imitates(chosen, standing.now)]
+    others = [c for c in rivals if c.rivals(chosen) and not c.imitates(chosen, standing.now)]
+    options = standing.case.options
+    return [c for c in others if not _cannot_be_told(options, chosen, c) or compare(standing, c) is not None]
 
 
 def _group(case: TorqueCase, chosen: Fitted, rivals: Sequence[Fitted]) -> tuple[Candidate, ...]:

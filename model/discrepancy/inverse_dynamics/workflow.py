@@ -11,7 +11,7 @@ from model.discrepancy.grounds import Note, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.far_numbers import brings_back, stands_for_far_number
+from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
@@ -57,6 +57,8 @@ class TorqueWorkflow:
     notes: list[Note] = field(default_factory=list)
     at_bounds: list[Note] = field(default_factory=list)
     """Effects that would have been named, had their sizes not ended where no machine is."""
+    ended: list[Fitted] = field(default_factory=list)
+    """Candidates of a step whose sizes ended there only when the whole model was fitted with them."""
     suspicion: Suspicion | None = None
 
     def __post_init__(self) -> None:
@@ -108,7 +110,7 @@ class TorqueWorkflow:
                 break
             before = self.found
             self._report(0.1, "what is missing")
-            findings = self._search(before)
+            findings, self.ended = self._search(before), []
             self.found = self._adopt(before, findings)
             if not _has_more(self.found, before):
                 self.found = self._adopt_pair(before, self.found, findings)
@@ -157,7 +159,7 @@ class TorqueWorkflow:
 
     def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
         """What would have been enough evidence to be named, had its size not ended where no machine is."""
-        enough = [f for f in found.unresolved if f.evidence >= self.case.options.least_evidence]
+        enough = [f for f in (*self.ended, *found.unresolved) if f.evidence >= self.case.options.least_evidence]
         best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
         return [_size_at_bound(f) for f in best.values()]
 
@@ -166,16 +168,24 @@ class TorqueWorkflow:
         refused: list[Fitted] = []
         passed_over: list[Fitted] = []  # they lack evidence, or explain noise
         standing, steps = self.refitter.standing(found), list(found.steps)
-        for chosen in findings.fitted[:CHANCES]:
+        for chosen in findings.fitted:
+            if len(refused) == CHANCES:
+                break
             judgement = judge(standing, chosen, refused)
             if judgement is None:
                 passed_over.append(chosen)
                 continue
-            steps.append(
-                record_step(standing, findings, judgement, [*refused, *_no_rivals(found, chosen, passed_over)])
-            )
+            taken = None
             if judgement.refusal is None:
-                return replace(self.refitter.take(found, chosen), steps=tuple(steps))
+                taken = self.refitter.take(found, chosen)
+                fitted = replace(chosen, fit=taken.now)
+                if sizes_at_bounds(fitted):
+                    self.ended.append(fitted)
+                    continue
+            rivals = [*refused, *_no_rivals(found, chosen, passed_over)]
+            steps.append(record_step(standing, findings, judgement, rivals))
+            if taken is not None:
+                return replace(taken, steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
 
@@ -231,7 +241,7 @@ class TorqueWorkflow:
         if _has_more(again, without):
             return replace(again, steps=(*others[:place], again.steps[-1], *others[place:]))
         mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
-        if all(f.evidence + f.told >= SUSPECTED or stands_for_far_number(without.now, f) for f in mine):
+        if all(f.evidence + f.told >= SUSPECTED for f in mine):
             return found
         return self._superfluous(without, found, step)
 
@@ -255,7 +265,7 @@ class TorqueWorkflow:
                 continue
             now, without = self.found.now, self.refitter.remove(self.found, step)
             less = evidence(without.now, now, now.noise.memory, len(step.parameters), 1)
-            if less < 0 and not brings_back(without.now, now):
+            if less < 0:
                 self.found = self._superfluous(without, self.found, step)
 
     def _superfluous(self, without: Found, found: Found, step: Step) -> Found:
@@ -279,8 +289,9 @@ class TorqueWorkflow:
 
 
 def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:
-    """Candidates that were passed over, without those that are more probable than one which is named for a number far
-    from its file, on less evidence than any other effect needs: it is not named alone beside them."""
+    """Those of the candidates that were passed over which are no rivals of the one that is chosen: all of them, but
+    where it is named on less evidence than other effects need, for a number far from its file. Then what is more
+    probable than it is its rival."""
     if chosen.evidence + chosen.told >= SUSPECTED or not stands_for_far_number(found.now, chosen):
         return list(passed_over)
     return [f for f in passed_over if f.log_odds < chosen.log_odds]

@@ -53,7 +53,7 @@ def swinging(seed: int, *, torque: bool = True, law: Law | None = None) -> Trace
         software="test",
         source="imported",
         period=0.004,
-        drive_unit="N·m",
+        drive_unit="V",
     )
     return Trace(
         record,

@@ -155,7 +155,7 @@ def test_without_held_out_traces_an_effect_must_hold_on_quarters_of_the_record()
 
 def test_an_effect_that_explains_too_little_of_records_not_fitted_to_is_refused() -> None:
     """Where nearly all of the mean square must go, noise alone is too much."""
-    nearly_all = TorqueOptions(least_share=0.9999)
+    nearly_all = TorqueOptions(least_share=0.99999)
     found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})], (), nearly_all)
     assert found.steps[0].effect == "coulomb_friction"
     assert not any(step.adopted for step in found.steps)

@@ -64,7 +64,7 @@ def test_a_small_part_of_what_something_else_makes_is_no_effect() -> None:
     assert "any law takes a part" in refusal_words(found.steps[0].refusal)
 
 
-@pytest.mark.parametrize(("coulomb", "suspected"), [(0.006, False), (0.014, True)])
+@pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])
 def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
     """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
     found = slide(*traces(coulomb=coulomb), TorqueOptions(effects=FRICTION, least_evidence=1e6))

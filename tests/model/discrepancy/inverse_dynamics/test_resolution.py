@@ -17,7 +17,7 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.resolution import (
     MOST_UNEVEN,
-    _ends_at_bound,
+    ends_at_bound,
     is_far,
     is_far_everywhere,
     steepest_bend,
@@ -172,15 +172,15 @@ def sized(low: float, high: float, null: float | None = 0.0, effect: str = "coul
 )
 def test_a_size_at_the_end_of_what_it_may_be_is_not_resolved(p: Parameter, value: float, at_end: bool) -> None:
     """An end at which the effect does nothing, none at infinity, and numbers that only shape an effect do not count."""
-    assert _ends_at_bound(p, value) is at_end
+    assert ends_at_bound(p, value) is at_end
 
 
 def test_the_slowest_ripple_is_no_ripple() -> None:
     """The rate of a tone only shapes it, yet at its bound a fit would go on: half a wave a turn is a spring."""
     model = base_model(rigs.slide_machine()).with_effect("torque_ripple", (1,))
     rate = model.parameter("joint1.torque_ripple.cycles")
-    assert _ends_at_bound(rate, rate.low)
-    assert not _ends_at_bound(rate, 2.0 * rate.low)
+    assert ends_at_bound(rate, rate.low)
+    assert not ends_at_bound(rate, 2.0 * rate.low)
 
 
 def bent(**bends: float) -> float:
