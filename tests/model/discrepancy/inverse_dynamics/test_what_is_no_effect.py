@@ -27,7 +27,7 @@ def of_slide(*traces: Trace, options: TorqueOptions | None = None) -> Diagnosis:
 
 
 def test_records_that_begin_and_end_in_motion_leave_noise() -> None:
-    """A low-pass lacks samples beyond the ends; with one period of the cutoff left out, 1.6 times the noise was left."""
+    """A low-pass lacks samples beyond the ends; one period of the cutoff there left 1.6 times noise."""
     (error,) = of_slide(*(rigs.slide_trace(seed, {}) for seed in (1, 2))).rmse_fit
     assert error.after < 1.25 * error.floor
 
