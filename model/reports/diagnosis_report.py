@@ -50,7 +50,9 @@ def diagnosis_report(
     """
     files = files or {}
     of = compared(found)
-    sections = [] if found.gap is None else [gap_section(found.gap)]
+    doubts = [words for words, note in zip(found.notes, found.notes_data, strict=False) if note.warning]
+    sections = [Section("Warnings", tuple(Text(words, "warning") for words in doubts))] if doubts else []
+    sections += [] if found.gap is None else [gap_section(found.gap)]
     stated = stated_numbers(found)
     for number in range(1, len(found.steps) + 1):
         sections += step_sections(number, found.steps, of, stated)
@@ -66,8 +68,8 @@ def diagnosis_report(
     if found.acquired:
         sections.append(_acquired(found.acquired))
     sections.append(_next(found))
-    if found.notes:
-        sections.append(Section("What to know about this answer", (Points(found.notes),)))
+    if others := [words for words in found.notes if words not in doubts]:
+        sections.append(Section("What to know about this answer", (Points(tuple(others)),)))
     title = capitalised(headline(found))
     return Report(title, found.summary, _facts(found, files), tuple(sections), f"Error and residual: {of.residual}.")
 
