@@ -39,6 +39,8 @@ ALIKE = 0.97
 JOINT_GAIN = 12.0
 """Fall of the squares above which a joint is taken into an effect that acts on several."""
 
+STRAINED = 50.0
+"""Cost of the tolerances, as χ², above which what is missing has driven them far off: one number by 7 deviations."""
 RESOLVED_ODDS = 2
 """Decimals of evidence by which candidates are ordered."""
 FILE_IS_RIGHT = 2 * float(np.log(100.0))
@@ -227,7 +229,8 @@ def _fit_effect(
 
     A fit that ends above the one without the effect has lost its way: what the tolerances had taken over of the effect
     was there twice where it began. It is begun again from no effect at all, which is where that other fit stands, or
-    from an effect that has taken back what the tolerances took.
+    from an effect that has taken back what the tolerances took. Where tolerances are far off without it, it is begun
+    from what the file states as well.
     """
     effect, joints = probes[0].trial.effect, _joints(probes)
     lacking = tuple(j for p in probes if not p.trial.stated for j in p.trial.joints)
@@ -245,6 +248,10 @@ def _fit_effect(
         begin = {**now.values, **start, **null, **take_back(effect, own, now)}
         again = fit(balance, unknowns, begin, now.data, now.noise.memory)
         fitted = min(fitted, again, key=lambda f: f.criterion)
+    if now.prior > STRAINED:
+        expected = {u.name: u.expected for u in unknowns if u.deviation is not None}
+        second = fit(balance, unknowns, {**now.values, **start, **expected}, now.data, now.noise.memory)
+        fitted = min(fitted, second, key=lambda f: f.criterion)
     if also_from is not None:
         others = {name: value for name, value in also_from.items() if name not in free}
         second = fit(balance, unknowns, {**now.values, **start, **others}, now.data, now.noise.memory)

@@ -133,6 +133,14 @@ def test_quadratic_drag_is_no_viscous_friction(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
+def test_friction_that_has_driven_tolerances_far_off_is_fitted_from_the_files_numbers(tmp_path: Path) -> None:
+    """Ninefold friction: from where it has driven the others, its own fit finds no way back."""
+    found = of_world(tmp_path, "arm-steps", 41820768092437, "single")
+    assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("coulomb_friction", (3,))], found.summary
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
 def test_quadratic_drag_is_not_more_viscous_friction_with_no_coulomb_friction(tmp_path: Path) -> None:
     """Both together left six times the noise, in a shape that explains most of it."""
     found = of_world(tmp_path, "arm-sweep", 260802698626061, "open")
