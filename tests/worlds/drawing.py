@@ -23,6 +23,9 @@ STEP = 1e-4
 """s. Halving it moves no reading of the tests' arm by a tenth of a 16-bit count."""
 ACCELERATION = 12.0
 """rad/s² that every motor can give its joint beside the weight."""
+HEADROOM = 4.0
+"""Volts of a current loop's amplifier over those that its largest torque takes at rest: a loop that runs out of them
+gives less than is recorded, and no file of these worlds says so."""
 WORST = 2.2
 """Deviations beyond so many of their size are not drawn."""
 BOARD_PERIOD_DELAY = 0.3
@@ -134,7 +137,7 @@ def _drive(
     stall = strongest * float(draw.uniform(2.5, 4.0))
     resistance = gear * magnet * supply / stall
     joint["gear"], joint["torque_constant"], joint["back_emf"] = gear, magnet, magnet
-    joint["resistance"], joint["supply"] = resistance, supply
+    joint["resistance"], joint["supply"] = resistance, supply * (HEADROOM if kind.drive == CURRENT else 1.0)
     joint["inductance"] = 1e-4 * resistance
     joint["rotor"] = inertia * float(draw.uniform(0.3, 1.2))
     if kind.drive == CURRENT:

@@ -120,12 +120,18 @@ def _across(axis: Floats, j: int, gravity: Floats) -> float:
 
 
 @compiled
+def _within_volts(command: float, speed: float, p: Any) -> float:
+    """What of a current loop's command (N·m of the motor) its volts allow; the back-EMF helps them where it brakes."""
+    back = p.back_emf * p.gear * speed
+    share = p.nominal_constant / p.resistance
+    return min(max(command, share * (-p.supply - back)), share * (p.supply - back))
+
+
+@compiled
 def _motor_torque(volts: float, current: float, speed: float, rise: float, p: Any, step: float) -> Any:
     """Current (A) after a step and the torque (N·m) at the joint; `volts` is the command of a current loop in N·m."""
     if p.current_rate > 0.0:
-        wished = volts / p.nominal_constant
-        room = (p.supply - p.back_emf * p.gear * abs(speed)) / p.resistance
-        wished = min(max(wished, -room), room)
+        wished = _within_volts(volts, speed, p) / p.nominal_constant
         current = wished + (current - wished) * math.exp(-p.current_rate * step)
     else:
         resistance = p.resistance * (1.0 + rise)

@@ -307,6 +307,15 @@ REPORTING: dict[str, Kind] = {
     "planar-board-sines": replace(
         _PLANAR, controller=BOARD, rate=(50.0,), bits=(14,), contacts=(TANH,), motions=("sines", "via points")
     ),
+    "planar-cascade-ramps": replace(
+        _PLANAR,
+        controller=CASCADE,
+        rate=(200.0,),
+        bits=(15,),
+        coloured=0.3,
+        contacts=(TANH,),
+        motions=("ramps", "steps"),
+    ),
     "arm-cascade-body": replace(
         _ANTHROPOMORPHIC,
         controller=CASCADE,

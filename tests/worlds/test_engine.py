@@ -11,7 +11,7 @@ import pytest
 
 from tests.worlds.bodies import Bodies, Link, mjcf
 from tests.worlds.drawing import sound_rig
-from tests.worlds.engine import Motion, simulate, step_within
+from tests.worlds.engine import Motion, _motor_torque, simulate, step_within
 from tests.worlds.kinds import KINDS
 from tests.worlds.parameters import BRISTLE, LOOP, PID, SWITCH, TANH, joints
 
@@ -99,6 +99,19 @@ def test_a_constant_voltage_gives_the_speed_and_time_of_a_motor() -> None:
     time = motion.time - 0.005
     expected = np.where(time > 0, 20.0 * (1 - np.exp(-rate * time)), 0.0)
     assert motion.velocity[2:, 0] == pytest.approx(expected[2:], rel=1e-3)
+
+
+@pytest.mark.parametrize(("speed", "torque"), [(0.0, 3.0), (3.0, 2.625), (-3.0, 3.0), (20.0, 0.5), (30.0, -0.75)])
+def test_a_current_loop_runs_out_of_volts_where_the_motor_drives_and_not_where_it_brakes(
+    speed: float, torque: float
+) -> None:
+    """3 N·m are asked for: 6 A of 12 V over 2 Ω at rest. A motor that turns faster than its supply can drive it gives
+    current back."""
+    (motor,) = joints(1)
+    motor["torque_constant"] = motor["back_emf"] = motor["nominal_constant"] = 0.5
+    motor["resistance"], motor["supply"], motor["gear"], motor["current_rate"] = 2.0, 12.0, 1.0, 1e3
+    _, given = _motor_torque(3.0, 0.0, speed, 0.0, motor, 1.0)
+    assert given == pytest.approx(torque)
 
 
 @pytest.mark.parametrize("contact", [TANH, BRISTLE, SWITCH])
