@@ -209,6 +209,7 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     """Writes the report. If the traces can be simulated, it compares the models before and after on every trace."""
     from daq.contracts.machine import NoController
     from model.comparison.compare import compare
+    from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
     from model.reports.diagnosis_report import LABELS, diagnosis_report
     from model.reports.page import write_report
 
@@ -217,4 +218,5 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     if simulated and all(t.set_point is not None for t in (*traces, *held)):
         models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
         comparison = compare(models, [*traces, *held], [t.record.trace_id for t in held])
-    return write_report(diagnosis_report(found, comparison, files_of([*traces, *held])), path)
+    efforts = recorded_and_predicted(found, [*traces, *held], [t.record.trace_id for t in held])
+    return write_report(diagnosis_report(found, comparison, files_of([*traces, *held]), efforts), path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from model.simulation.simulate import simulate
 
 @dataclass(frozen=True)
 class TraceSignals:
-    """One trace beside its simulations.
+    """One trace beside its simulations, or recorded efforts beside predictions of them.
 
     time (m,) s; measured, set_point (or None) and each of `simulated` (m, n) in `units`, one column per joint.
     """
@@ -33,12 +34,19 @@ class TraceSignals:
     measured: Floats
     simulated: tuple[Floats, ...]
     set_point: Floats | None
-    signal: Signal = "position"
+    signal: Signal | Literal["effort"] = "position"
 
     @property
     def quantity(self) -> str:
         """What is measured, in a word."""
+        if self.signal == "effort":
+            return "force" if set(self.units) == {"N"} else "torque"
         return "position" if self.signal == "position" else "speed"
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """What the record and the models are to it: efforts are recorded, and predicted from a motion."""
+        return ("recorded", "predicted") if self.signal == "effort" else ("measured", "simulated")
 
 
 @dataclass(frozen=True)

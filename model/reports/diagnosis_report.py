@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from daq.contracts.machine import NoController
-from model.comparison.compare import Comparison
+from model.comparison.compare import Comparison, TraceSignals
 from model.discrepancy.diagnosis import (
     Acquired,
     Diagnosis,
@@ -39,7 +39,10 @@ LABELS = ("before", "after")
 
 
 def diagnosis_report(
-    found: Diagnosis, comparison: Comparison | None = None, files: Mapping[str, str] | None = None
+    found: Diagnosis,
+    comparison: Comparison | None = None,
+    files: Mapping[str, str] | None = None,
+    efforts: Sequence[TraceSignals] = (),
 ) -> Report:
     """The page of a diagnosis.
 
@@ -47,6 +50,7 @@ def diagnosis_report(
         comparison: of the models before and after (labelled `LABELS`), on the traces fitted to and held out; overlays
             are left out without it.
         files: names of the traces' files, by number, where they are known.
+        efforts: recorded beside predicted torques (forces) of a diagnosis in torques, of the models `LABELS`.
     """
     files = files or {}
     of = compared(found)
@@ -60,9 +64,11 @@ def diagnosis_report(
         sections += _nothing_added(found, of)
     if moved := most_moved(found):
         sections.append(_moved(moved))
+    if efforts:
+        sections.append(_efforts(efforts, files))
     if comparison is not None:
         sections.append(_overlays(comparison, found, files))
-    elif of.overlays:
+    elif of.overlays and not efforts:
         sections.append(Section("Overlays", (Text(of.overlays, "quiet"),)))
     sections.append(_remaining(found, of))
     if found.acquired:
@@ -118,6 +124,17 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
             words = () if needed is None else (Text(best_tried(found.candidates, needed)),)
             sections.append(Section("What was tried", (*words, picture)))
     return sections
+
+
+def _efforts(efforts: Sequence[TraceSignals], files: Mapping[str, str]) -> Section:
+    quantity = efforts[0].quantity
+    motion = motion_section(efforts, LABELS, closer=True, files=files)
+    text = (
+        f"The {quantity} of the drive as it was recorded, by the gain of the machine file, and as the models ask for "
+        "it along the recorded motion, all low-passed alike. A joint at rest is held by friction, which takes "
+        f"whatever {quantity} that needs: nothing is predicted of it."
+    )
+    return Section(f"Recorded and predicted {quantity}", (Text(text), *motion.blocks))
 
 
 def _overlays(comparison: Comparison, found: Diagnosis, files: Mapping[str, str]) -> Section:

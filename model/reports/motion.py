@@ -21,7 +21,7 @@ from model.reports.figures import (
     panels,
     thinned,
 )
-from model.reports.motion_closer import closer_picture
+from model.reports.motion_closer import closer_picture, what_is_shown
 from model.reports.page import Cell, Picture, Section, Table, cells, trace_names
 from model.units import shown_unit, with_unit
 
@@ -81,14 +81,14 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
         for empty in axes[-2:, len(one.joints) - (bands - 1) * ABREAST :].flat:
             empty.set_visible(False)
 
+    shown, left = what_is_shown(one)
     role = "" if one.held_out is None else f" ({ROLES[one.held_out]})"
     most = with_unit(f"{widest * factor:.2g}", unit)
     cut = f" For a moment it is {most}, beyond the picture." if alike and reach < widest else ""
     return Picture(
         drawn(draw, 3.4 * bands),
-        f"{one.trace}{role}. Above: measured, set point and simulated. Below: measured − simulated; where there are "
-        "more samples than a page resolves, the line is their mean, and the shade goes from the least to the "
-        f"largest.{cut}",
+        f"{one.trace}{role}. Above: {shown}. Below: {left}; where there are more samples than a page resolves, the "
+        f"line is their mean, and the shade goes from the least to the largest.{cut}",
     )
 
 
@@ -122,7 +122,7 @@ def _joint(
         above.plot(time, own, color=shade, lw=1.4, ls=style, label=label)
         band(below, one.time, (one.measured - simulated)[:, column] * factor, shade)
     time, measured = thinned(one.time, one.measured[:, column] * factor)
-    above.plot(time, measured, color=INK, lw=0.6, label="measured")  # thin and on top: neither hides the other
+    above.plot(time, measured, color=INK, lw=0.6, label=one.words[0])  # thin and on top: neither hides the other
     below.set_xlabel("time / s")
     for axes in (above, below):
         axes.margins(x=0.01)

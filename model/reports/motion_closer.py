@@ -30,6 +30,14 @@ def stretch_of_most(residual: Floats, period: float) -> tuple[slice, int]:
     return slice(int(begin), int(begin) + size), int(column)
 
 
+def what_is_shown(one: TraceSignals) -> tuple[str, str]:
+    """The curves of a trace, and what is left of them, in words."""
+    measured, simulated = one.words
+    between = " and " if one.set_point is None else ", set point and "
+    quantity = f" {one.quantity}" if one.signal == "effort" else ""
+    return f"{measured}{between}{simulated}{quantity}", f"{measured} − {simulated}"
+
+
 def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
     """Position and residual of one joint in that stretch; None where the first simulation does not stay finite."""
     left = one.measured - one.simulated[0]
@@ -50,7 +58,7 @@ def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
             colour = MODEL_COLOURS[place % len(MODEL_COLOURS)]
             above.plot(time, simulated[window, column] * factor, color=colour, lw=1.3, label=label)
             below.plot(time, (one.measured - simulated)[window, column] * factor, color=colour, lw=0.8)
-        above.plot(time, one.measured[window, column] * factor, color=INK, lw=0.7, label="measured")
+        above.plot(time, one.measured[window, column] * factor, color=INK, lw=0.7, label=one.words[0])
         for axes, what in ((above, one.quantity), (below, "residual")):
             axes.set_ylabel(f"{what} / {unit}")
             axes.set_xlabel("time / s")
@@ -58,8 +66,9 @@ def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
         above.set_title(f"joint {one.joints[column]}")
         figure.legend(*above.get_legend_handles_labels(), loc="outside upper right", ncols=len(labels) + 2)
 
+    shown, gap = what_is_shown(one)
     return Picture(
         drawn(draw, 2.2),
         f'{one.trace}, joint {one.joints[column]}, {time[0]:.1f} to {time[-1]:.1f} s: where "{labels[0]}" is '
-        "furthest off. Left: measured, set point and simulated. Right: measured − simulated.",
+        f"furthest off. Left: {shown}. Right: {gap}.",
     )

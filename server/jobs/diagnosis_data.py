@@ -26,21 +26,28 @@ if TYPE_CHECKING:
 
     from daq.contracts.service.jobs import ParameterWords
     from daq.contracts.trace import Trace
-    from model.comparison.compare import Comparison
+    from model.comparison.compare import Comparison, TraceSignals
     from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
     from model.machine_model.model import Model
 
 
-def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: Where | None = None) -> DiagnosisData:
+def diagnosis_data(
+    found: Diagnosis,
+    comparison: Comparison | None,
+    given: Where | None = None,
+    efforts: Sequence[TraceSignals] = (),
+) -> DiagnosisData:
     """Returns the answer with the data of its plots. `comparison`: of the models before and after, if they can be
-    simulated. `given`: where the given model disagrees with the traces, likewise."""
+    simulated. `given`: where the given model disagrees with the traces, likewise. `efforts`: recorded beside predicted
+    ones, of a diagnosis in torques."""
     return DiagnosisData(
         **{
             **dict(found),
             "steps": tuple(_step(found, step) for step in found.steps),
             "candidates": tuple(map(_tried, found.candidates)),
             "models": () if comparison is None else comparison.models,
-            "signals": () if comparison is None else overlays(comparison),
+            "signals": () if comparison is None else overlays(comparison.signals),
+            "efforts": overlays(efforts),
             "differences": differences((found.model_before, found.model_after)),
             "given": None if given is None else GivenWhere(where=given, **_beside_map(found, given)),
             "words": _words(found),

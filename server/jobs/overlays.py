@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from daq.contracts.trace import Floats
-    from model.comparison.compare import Comparison, TraceSignals
+    from model.comparison.compare import TraceSignals
     from model.validation.variation import TimeDomain
 
 MOST_POINTS, LEAST_POINTS = 1600, 200
@@ -27,10 +27,10 @@ VARIATION_POINTS = 800
 """Number of points of a parameter's variation with time, which is smooth."""
 
 
-def overlays(found: Comparison) -> tuple[Overlay, ...]:
-    """Returns every trace of a comparison beside its simulations."""
-    points = int(np.clip(ALL_POINTS // max(1, len(found.signals)), LEAST_POINTS, MOST_POINTS))
-    return tuple(overlay(one, points) for one in found.signals)
+def overlays(signals: Sequence[TraceSignals]) -> tuple[Overlay, ...]:
+    """Returns every trace beside its simulations."""
+    points = int(np.clip(ALL_POINTS // max(1, len(signals)), LEAST_POINTS, MOST_POINTS))
+    return tuple(overlay(one, points) for one in signals)
 
 
 def overlay(one: TraceSignals, points: int) -> Overlay:

@@ -98,12 +98,14 @@ class GivenWhere(FrozenRecord):
 class DiagnosisData(Diagnosis):
     """A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
     these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
-    where the given model disagreed with the traces before anything was fitted."""
+    where the given model disagreed with the traces before anything was fitted. `efforts` are the traces' torques
+    (forces) beside those that both models predict from the motion, of a diagnosis in torques."""
 
     steps: tuple[DiagnosisStep, ...]
     candidates: tuple[TriedEffect, ...] = ()
     models: tuple[ModelAgreement, ...] = ()
     signals: tuple[Overlay, ...] = ()
+    efforts: tuple[Overlay, ...] = ()
     differences: tuple[ParameterDifference, ...] = ()
     given: GivenWhere | None = None
     words: Words = Field(default_factory=dict)

@@ -127,7 +127,7 @@ class _Worker:
         data = FitData(
             **dict(found),
             models=comparison.models,
-            signals=overlays(comparison),
+            signals=overlays(comparison.signals),
             undetermined=undetermined_in_words(found.identifiability, words_by_name(found.model.parameters)),
         )
         result = FitJobResult(id=self._job, data=data)
@@ -191,7 +191,7 @@ class _Worker:
         differing = differences(models)
         data = ComparisonData(
             models=comparison.models,
-            signals=overlays(comparison),
+            signals=overlays(comparison.signals),
             differences=differing,
             words=words_by_name(parameter for model in models for parameter in model.parameters),
         )
@@ -202,6 +202,7 @@ class _Worker:
         """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
         from model.discrepancy.explanation.headline import headline
+        from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
         from server.jobs.diagnosis_data import diagnosis_data, where_given
@@ -229,8 +230,9 @@ class _Worker:
         changed = found.model_after.identity != found.model_before.identity
         if changed:
             self._keep_model(found.model_after)
-        result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given))
-        report = diagnosis_report(found, comparison)
+        efforts = recorded_and_predicted(found, [*traces, *held], request.held_out)
+        result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given, efforts))
+        report = diagnosis_report(found, comparison, efforts=efforts)
         return self._done(result, report, headline(found), found.model_after if changed else None)
 
     def batch(self, request: BatchRequest) -> Ended:

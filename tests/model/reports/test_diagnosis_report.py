@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from daq.contracts.machine import NoController
 from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import Acquired, Diagnosis, Inseparable, PlacedEffect
-from model.discrepancy.grounds import ControllerProof
+from model.discrepancy.grounds import ControllerProof, Note
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
 from model.reports.diagnosis_words import TORQUES, compared, gap
-from model.reports.page import Picture, Report, Table, Text, html
+from model.reports.page import Picture, Points, Report, Table, Text, html
 from tests.model.discrepancy.answers import EFFECT, an_answer
 
 
@@ -364,3 +365,25 @@ def test_a_torque_that_was_left_comes_back_in_its_size(answer: tuple[Diagnosis, 
     back, forth = (against[2, "direction"].torque[k] for k in (0, 2))
     assert back == pytest.approx(8.0, rel=0.3)
     assert forth == pytest.approx(-8.0, rel=0.3)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_warnings_come_first_and_are_not_told_again(answer: tuple[Diagnosis, Comparison]) -> None:
+    found = answer[0]
+    notes = (Note(kind="cutoff", values={"cutoff": 12.0}), Note(kind="resting-left-out", warning=True))
+    doubted = found.model_copy(update={"notes_data": notes, "notes": ("Below 12 Hz.", "Rest is left out.")})
+    sections = {s.title: s.blocks for s in diagnosis_report(doubted).sections}
+    assert next(iter(sections)) == "Warnings"
+    assert sections["Warnings"] == (Text("Rest is left out.", "warning"),)
+    assert sections["What to know about this answer"] == (Points(("Below 12 Hz.",)),)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_efforts_are_recorded_and_predicted(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, comparison = answer
+    efforts = [replace(s, signal="effort", units=("N·m",) * len(s.units), set_point=None) for s in comparison.signals]
+    report = diagnosis_report(found, efforts=efforts)
+    (section,) = (s for s in report.sections if s.title == "Recorded and predicted torque")
+    captions = [block.caption for block in section.blocks if isinstance(block, Picture)]
+    assert any("Above: recorded and predicted torque. Below: recorded − predicted" in caption for caption in captions)
+    assert not any("set point" in caption or "simulated" in caption for caption in captions)

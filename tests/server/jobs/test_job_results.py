@@ -100,7 +100,7 @@ def test_why_a_clear_dependence_is_no_finding_is_told_with_what_came_nearest() -
 def test_the_headline_of_a_comparison_tells_the_errors() -> None:
     _, comparison = an_answer(4.0)
     assert headlines.of_comparison(comparison).startswith("error before ")
-    assert len(overlays(comparison)) == 2
+    assert len(overlays(comparison.signals)) == 2
 
 
 @pytest.fixture(scope="module")

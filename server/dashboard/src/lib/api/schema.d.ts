@@ -2374,7 +2374,8 @@ export interface components {
          * DiagnosisData
          * @description A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
          *     these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
-         *     where the given model disagreed with the traces before anything was fitted.
+         *     where the given model disagreed with the traces before anything was fitted. `efforts` are the traces' torques
+         *     (forces) beside those that both models predict from the motion, of a diagnosis in torques.
          */
         DiagnosisData: {
             /**
@@ -2481,6 +2482,11 @@ export interface components {
              * @default []
              */
             signals?: components["schemas"]["Overlay"][];
+            /**
+             * Efforts
+             * @default []
+             */
+            efforts?: components["schemas"]["Overlay"][];
             /**
              * Differences
              * @default []
