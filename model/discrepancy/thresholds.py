@@ -11,6 +11,9 @@ that is a little wrong adds up. With less, what noise has moved looks like a tor
 FEEDBACK_SHARE_FOR_ERRORS = 0.5
 """The same where errors are reported and judged, held-out ones above all: nearer to what the model alone would do."""
 
+FAR_OFF = 4.0
+"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
+
 
 @dataclass(frozen=True)
 class Thresholds:

@@ -288,10 +288,6 @@ REPORTED: dict[str, Kind] = {
         contacts=(SWITCH,),
         motions=("via points", "random steps"),
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-coloured": replace(
         _AXIS, rate=(400.0,), bits=(18,), coloured=0.5, noise=0.3, contacts=(SWITCH,), motions=("steps", "sines")
     ),
@@ -345,6 +341,28 @@ REPORTING: dict[str, Kind] = {
         contacts=(TANH,),
         motions=("ramps", "sines"),
         known_loop=False,
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-volts-random": replace(
+        _AXIS, rate=(300.0,), bits=(17,), contacts=(TANH,), motions=("random steps", "via points")
+    ),
+    "planar-current-via": replace(
+        _PLANAR, drive=CURRENT, rate=(400.0,), bits=(18,), contacts=(SWITCH,), motions=("via points",), known_loop=False
+    ),
+    "planar-rounded-sweep": replace(
+        _PLANAR, rate=(250.0,), bits=(16,), rounding=0.003, limit=0.7, contacts=(BRISTLE,), motions=("sweep", "sines")
+    ),
+    "arm-volts-ramps": replace(
+        _ANTHROPOMORPHIC, rate=(200.0,), bits=(16,), contacts=(TANH, SWITCH), body=True, motions=("ramps", "sines")
+    ),
+    "arm-cascade-steps": replace(
+        _ANTHROPOMORPHIC, controller=CASCADE, rate=(250.0,), bits=(17,), contacts=(BRISTLE,), motions=("steps",)
+    ),
+    "six-volts-via": replace(
+        _ANTHROPOMORPHIC, joints=6, rate=(500.0,), bits=(19,), contacts=(BRISTLE,), motions=("via points", "ramps")
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""

@@ -38,6 +38,7 @@ def test_friction_that_a_file_may_be_wrong_about_is_not_seen(sound: Rig, ratio: 
     assert (sharpness(rig, ())[0].d_prime > 20.0) == is_seen
 
 
+@pytest.mark.slow
 def test_a_shifted_centre_and_a_heavier_link_are_one_to_an_axis(sound: Rig) -> None:
     rig = hide(sound, "centre_of_mass", 1, 0, {"shift": 0.2 * sound.bodies.links[0].a})
     none, _, mass, friction = sharpness(rig, ("link_mass", "viscous_friction"))

@@ -7,10 +7,8 @@ from typing import Any, Protocol
 
 from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Note
+from model.discrepancy.thresholds import FAR_OFF
 from model.machine_model.parameter import Parameter
-
-FAR = 4.0
-"""Distance of an estimate from the stated value, in stated deviations, beyond which there is a warning."""
 
 
 class _Expected(Protocol):
@@ -68,12 +66,12 @@ def on_stated_numbers(numbers: Iterable[_Expected], values: Mapping[str, float])
             "deviations": abs(values[n.name] - n.expected) / n.deviation,
         }
         for n in numbers
-        if n.deviation is not None and abs(values[n.name] - n.expected) > FAR * n.deviation
+        if n.deviation is not None and abs(values[n.name] - n.expected) > FAR_OFF * n.deviation
     ]
     if not moved:
         return ()
     moved.sort(key=lambda one: one["deviations"], reverse=True)
-    return (Note(kind="stated-numbers-moved", values={"limit": FAR, "numbers": moved}, warning=True),)
+    return (Note(kind="stated-numbers-moved", values={"limit": FAR_OFF, "numbers": moved}, warning=True),)
 
 
 def on_named_numbers(stated: Iterable[Parameter], values: Mapping[str, float]) -> tuple[Note, ...]:
@@ -94,4 +92,4 @@ def on_named_numbers(stated: Iterable[Parameter], values: Mapping[str, float]) -
     ]
     if not numbers:
         return ()
-    return (Note(kind="stated-numbers-moved", values={"limit": FAR, "numbers": numbers, "named": True}),)
+    return (Note(kind="stated-numbers-moved", values={"limit": FAR_OFF, "numbers": numbers, "named": True}),)

@@ -36,12 +36,13 @@ from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
 from model.discrepancy.numbers import from_to, plain
 from model.effects.names import capitalised, effect_on, joints_in_words, placed
+from model.units import shown_unit, with_unit
 
 NOTICEABLE = 0.98
 """Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
 ALL = 0.95
 """Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
-NO_NOISE = 1e6
+NOISE_UNKNOWN = 1e6
 """Ratio of a residual to its noise, above which that noise is none: the machine file takes positions for exact, as one
 made of a URDF does, and what rounding leaves is no measure."""
 NO_NOISE_STATED = "and the machine file states no noise of the sensors to compare it with"
@@ -228,8 +229,18 @@ def shape_words(shape: RemainingShape) -> str:
     what = "friction" if shape.against_motion else "a torque"
     return (
         f"{what} at joint {shape.joint} of {plain(min(torques))} to {plain(max(torques))} {shape.torque_unit} that "
-        f"goes with {shape.against}"
+        f"goes with {shape.against}{_place_of_most(shape)}"
     )
+
+
+def _place_of_most(shape: RemainingShape) -> str:
+    """Where a torque that goes with the position is largest."""
+    if shape.against != "position":
+        return ""
+    both = zip(shape.torque, shape.centres, strict=True)
+    known = [(abs(torque), place) for torque, place in both if torque is not None]
+    factor, unit = shown_unit(shape.unit)
+    return f", most at {with_unit(plain(max(known)[1] * factor), unit)}"
 
 
 def what_is_left(remaining: Sequence[RemainingShape]) -> str:
@@ -338,7 +349,7 @@ def _place(where: Where) -> str:
             f"{worst.ratio:.2f} times its noise {phase}"
         )
     if worst.whole_record or worst.floor is None:
-        times = f"{plain(worst.ratio)} times its noise" if worst.ratio < NO_NOISE else NO_NOISE_STATED
+        times = f"{plain(worst.ratio)} times its noise" if worst.ratio < NOISE_UNKNOWN else NO_NOISE_STATED
         seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times}"
         largest = where.largest
         if largest is None or largest.rms is None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
+from model.discrepancy.thresholds import FAR_OFF
 
-FAR_OFF = 4.0
-"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
 NEARLY_ALL = 0.9
 """Share of an effect's evidence from priors, above which stated numbers imitate it."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.far_numbers import FAR_OFF, stands_for_far_number
+from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
@@ -18,6 +18,7 @@ from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
+from model.discrepancy.thresholds import FAR_OFF
 from model.inverse_dynamics.drive_timing import expected_timing
 
 BESIDE_REFUSED = 0.5
@@ -67,7 +68,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     if chosen.evidence <= 0 and not stands_for_far_number(standing.now, chosen):
         return None
     most = explains_most(standing, chosen)
-    if chosen.evidence + chosen.told < needed_evidence(standing, chosen, explains_most=most):
+    if chosen.evidence + chosen.told < needed_evidence(standing, chosen, takes_most=most):
         return None
     if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
         return None
@@ -75,11 +76,11 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     if comparison is None:
         return None
     noises = _noises_left(standing, comparison)
-    return Judgement(comparison, noises, _refusal(standing, comparison, noises, explains_most=most))
+    return Judgement(comparison, noises, _refusal(standing, comparison, noises, takes_most=most))
 
 
-def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) -> float:
-    """Evidence from which a candidate is named. explains_most: whether it takes most of what is left.
+def needed_evidence(standing: Standing, chosen: Fitted, *, takes_most: bool) -> float:
+    """Evidence from which a candidate is named. takes_most: whether it takes most of what is left.
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
     least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough. An effect
@@ -87,7 +88,7 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, explains_most: bool) 
     """
     options = standing.case.options
     least = options.least_evidence
-    if explains_most:
+    if takes_most:
         least = min(least, SUSPECTED)
     least -= chosen.relief * max(least - SUSPECTED, 0.0)
     if stands_for_far_number(standing.now, chosen):
@@ -129,7 +130,7 @@ def explains_most(standing: Standing, chosen: Fitted) -> bool:
     )
 
 
-def _refusal(standing: Standing, comparison: Comparison, noises: float, *, explains_most: bool) -> Refusal | None:
+def _refusal(standing: Standing, comparison: Comparison, noises: float, *, takes_most: bool) -> Refusal | None:
     """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
     for another machine than the file describes. An effect that is there brings stated numbers back; one that explains
     most of what is left is there, whatever it does to them."""
@@ -140,7 +141,7 @@ def _refusal(standing: Standing, comparison: Comparison, noises: float, *, expla
         return Refusal(kind="leaves-more-than-noise", numbers={"share": comparison.removed, "noises": noises})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})
-    if tolerances(standing.model)[1] != "stated" or explains_most:
+    if tolerances(standing.model)[1] != "stated" or takes_most:
         return None
     farthest = _farthest_newly_off(standing, chosen)
     return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None

@@ -19,7 +19,7 @@ friction at a place, for one, depends on neither position nor direction alone. S
 2.6, where friction turns (docs/worlds.md)."""
 SHAPED_ABOVE_NOISE = 3.0
 """The same where a shape explains much of it (`ANOTHER_LAW`): the shape says as well that something is missing."""
-SLOW = 4.0
+LONG_MEMORY = 4.0
 """Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
 the low-pass, that of accelerations to 2.7."""
 VISCOUS = "viscous_friction"
@@ -42,7 +42,7 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     least = np.fmin.reduce(fitted) / case.noise  # a record in which a joint rests says nothing of it
     shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= ANOTHER_LAW}
     joints = standing.model.machine.modelled_joints
-    slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > SLOW)
+    slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > LONG_MEMORY)
     shapes = (least > SHAPED_ABOVE_NOISE) & np.array([j in shaped for j in joints])
     return tuple(j for j, left in zip(joints, slow | shapes, strict=True) if left)
 

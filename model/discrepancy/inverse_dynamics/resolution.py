@@ -16,6 +16,7 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.holdout import mean_squares
 from model.discrepancy.inverse_dynamics.likelihood import minus_twice_log_likelihood, noise_model
 from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
+from model.discrepancy.thresholds import FAR_OFF
 from model.inverse_dynamics.drive_timing import DELAY, MOST
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
@@ -49,8 +50,6 @@ AT_BOUND = 1.01
 """Ratio to its lower bound below which a speed is the bound's."""
 AT_END = 1e-6
 """Share of a bound within which a size is at it."""
-FAR = 4.0
-"""Distance from what the file states, in stated deviations, beyond which a number is not a tolerance any more."""
 
 
 def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
@@ -194,5 +193,5 @@ def is_far(p: Parameter, value: float) -> bool:
     """
     deviation = p.deviation or 0.0
     if p.effect is None or p.low < 0.0 or p.value <= 0.0:
-        return abs(value - p.value) > FAR * deviation
-    return value <= 0.0 or abs(math.log(value / p.value)) > FAR * deviation / p.value
+        return abs(value - p.value) > FAR_OFF * deviation
+    return value <= 0.0 or abs(math.log(value / p.value)) > FAR_OFF * deviation / p.value

@@ -32,7 +32,7 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
         if chosen.evidence <= 0:
             continue
         total = chosen.evidence + chosen.told
-        needed = needed_evidence(standing, chosen, explains_most=explains_most(standing, chosen))
+        needed = needed_evidence(standing, chosen, takes_most=explains_most(standing, chosen))
         if not SUSPECTED <= total < needed:
             continue
         comparison = compare(standing, chosen)

@@ -21,6 +21,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, SignalError, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.sampled_controller import controller_numbers
+from model.discrepancy.thresholds import FAR_OFF
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
 from model.machine_model.nominal import gain_error
@@ -31,8 +32,6 @@ LEAST_SHARE = 1e-3
 """Share of wrong samples below which they may be due to the start of the record."""
 LEAST_GAIN_DEVIATION = 0.01
 """Least relative deviation of a gain that is reported: rounding may explain a smaller one."""
-FAR_OFF = 4.0
-"""Stated deviations of a gain within which it is as the file says."""
 LEAST_POWER = 4.0
 """Least power of a sample that is used for a gain, DAC counts: rounding dominates below it."""
 LEAST_SAMPLES = 20

@@ -128,6 +128,7 @@ def result_of(service: Service, request: dict[str, Any]) -> tuple[dict[str, Any]
     return job, result.data
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks_for(
     sound_service: Service, ramps: tuple[str, str]
@@ -155,6 +156,7 @@ def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks
     assert {cell.joint for cell in found.given.where.cells} == {1, 2, 3}
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_fit_validation_and_lineage(sound_service: Service, ramps: tuple[str, str]) -> None:
     request = {"kind": "fit", "traces": [ramps[0]], "held_out": [ramps[1]], "parameters": ["joint2.motor.*"]}

@@ -365,6 +365,16 @@ def test_what_is_left_is_called_a_shape_only_where_it_is_one() -> None:
     )
 
 
+def test_friction_at_a_place_is_told_with_the_place() -> None:
+    tight = remaining("position", 0.8, 0.01, 0.12, None, -0.06, -0.05).model_copy(
+        update={"unit": "rad", "against_motion": True}
+    )
+    assert what_is_left([tight]) == (
+        "no clear shape: the best, friction at joint 3 of −0.06 to 0.12 N·m that goes with position, most at 57.3°, "
+        "explains 80 % of what is left, but rests on 4 of the 5 bins that a shape needs"
+    )
+
+
 def test_joints_on_which_more_than_noise_is_left_are_named_where_the_map_names_none(arm: Model) -> None:
     assert answer(arm).summary.startswith("Joint 2, after reversals: 2.1 ADC counts rms. No known effect explains it; ")
     assert answer(arm, unexplained_joints=(2, 3)).summary.startswith(

@@ -182,6 +182,7 @@ def test_the_refusal_of_an_effect_that_contradicts_the_file_says_by_how_much() -
     assert "stated deviations from what its file says" in words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("resistance", "constant"), [(2.4, 0.05), (2.3, 0.0465)])
 def test_a_motors_stated_resistance_and_torque_constant_are_tolerances(resistance: float, constant: float) -> None:
     """Both scale every torque. Without them the rotor's inertia, stated to 5 %, would have to be 20 % off and more. Its

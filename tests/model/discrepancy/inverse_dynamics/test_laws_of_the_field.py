@@ -23,7 +23,10 @@ from tests.worlds.folder import write_world
             marks=pytest.mark.slow,
         ),
         pytest.param("planar-cascade", 709, None, "one_sided_spring", (2,), "stiffness", 0.7155),
-        pytest.param("axis-cascade", 904, None, "direction_dependent_friction", (1,), "difference", 0.115),
+        pytest.param(
+            *("axis-cascade", 904, None, "direction_dependent_friction", (1,), "difference", 0.115),
+            marks=pytest.mark.slow,
+        ),
         pytest.param(*("planar-pid", 711, None, "amplifier_threshold", (2,), "width", 2.0008), marks=pytest.mark.slow),
     ],
 )
@@ -58,6 +61,7 @@ def test_a_payload_that_was_fitted_as_a_mass_is_named(tmp_path: Path) -> None:
     assert found.steps[0].parameters["load.payload.mass"].value == pytest.approx(0.1112, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_drives_at_a_limit_that_no_file_states_are_no_gear_loss(tmp_path: Path) -> None:
     """A sound arm of the fourth registered trial, which was called gear loss: at their limits its drives gave less than

@@ -78,7 +78,10 @@ def test_friction_far_beyond_what_the_file_states_is_named() -> None:
     assert found.model_after.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(60.0, rel=0.02)
 
 
-@pytest.mark.parametrize(("share", "true"), [(0.1, 3.0), (0.3, 3.0), (0.3, 0.0)])
+@pytest.mark.parametrize(
+    ("share", "true"),
+    [pytest.param(0.1, 3.0, marks=pytest.mark.slow), (0.3, 3.0), pytest.param(0.3, 0.0, marks=pytest.mark.slow)],
+)
 def test_friction_far_below_what_the_file_states_is_named(share: float, true: float) -> None:
     """In plain distances no friction at all is 3.3 deviations from what is stated to 30 %."""
     machine = stating_friction(coulomb=rigs.quantity(30.0, "N", low=0.0, deviation=30.0 * share))

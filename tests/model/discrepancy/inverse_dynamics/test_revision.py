@@ -43,6 +43,7 @@ def slide(effects: tuple[str, ...], **hidden: float) -> Diagnosis:
     return diagnose_torques(base_model(rigs.slide_machine()), [training], [held_out], options)
 
 
+@pytest.mark.slow
 def test_effects_of_which_each_takes_a_third_are_named_together() -> None:
     hidden = {"coulomb": 6.0, "hum": 8.5, "spring": 120.0}
     alone = slide(("coulomb_friction",), **hidden)

@@ -65,6 +65,7 @@ def test_the_slope_of_a_distance_is_its_derivative(value: float) -> None:
     assert prior_distance(u, value)[1] == pytest.approx((ahead - behind) / (2 * step), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_mass_far_beyond_what_is_stated_is_named_with_what_is_the_same_torque() -> None:
     """12 kg to 5 % on a horizontal axis, 18 true: a fit within priors finds it, ten deviations off."""
     training, held_out = (rigs.slide_trace(seed, {"mass": 18.0}) for seed in (1, 2))

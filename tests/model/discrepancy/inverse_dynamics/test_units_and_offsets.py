@@ -36,6 +36,7 @@ def test_a_fit_of_torques_is_the_same_in_every_unit_of_the_drive() -> None:
     assert sizes[1:] == [pytest.approx(sizes[0], rel=1e-4)] * 2
 
 
+@pytest.mark.slow
 def test_friction_is_named_beside_a_constant_force_which_is_told_as_a_group() -> None:
     """The force correlates over any distance: taken for noise, it would leave next to no independent samples."""
     fitted, held = (pushed(rigs.slide_trace(seed, RUBBING, duration=10.0), 4.0) for seed in (1, 2))

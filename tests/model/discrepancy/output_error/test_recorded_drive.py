@@ -42,6 +42,7 @@ def test_a_sound_arm_is_explained_to_the_noise_of_its_readings(sound: outside_ar
     assert _fit_tolerances(given).misfit == pytest.approx(1.0, abs=0.08)
 
 
+@pytest.mark.slow
 def test_sudden_friction_with_the_true_numbers_leaves_the_noise_of_readings() -> None:
     """The arm's friction is there at once: its model's must not need a distance to build up."""
     arm = outside_arm.drawn(106)
