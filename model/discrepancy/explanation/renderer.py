@@ -240,7 +240,7 @@ def _place_of_most(shape: RemainingShape) -> str:
     both = zip(shape.torque, shape.centres, strict=True)
     known = [(abs(torque), place) for torque, place in both if torque is not None]
     factor, unit = shown_unit(shape.unit)
-    return f", most at {with_unit(plain(max(known)[1] * factor), unit)}"
+    return f", most at {with_unit(plain(max(known)[1] * factor, 3), unit)}"
 
 
 def what_is_left(remaining: Sequence[RemainingShape]) -> str:
