@@ -78,10 +78,12 @@ def diagnose_torques(
 def _first_finding(work: _Records, highest: float, progress: Progress) -> Diagnosis:
     """The answer below the highest cutoff. Where nothing is found there, that of the first lower one that names an
     effect which lower cutoffs show as well; where groups are found, that of the first lower one that tells them
-    apart."""
+    apart. Lower cutoffs are not looked at where drives stand at limits that no file states: what is lacking there is
+    smeared over more of the record, and looks like a spring or a slow ripple.
+    """
     found: list[Diagnosis] = []
     for k, share in enumerate(LOOKS):
-        if found and not work.bears(share * highest):
+        if found and (_at_limits(found[0]) or not work.bears(share * highest)):
             break
 
         def tell(done: float, text: str, begin: float = k / len(LOOKS)) -> None:
@@ -95,6 +97,11 @@ def _first_finding(work: _Records, highest: float, progress: Progress) -> Diagno
         elif _finds(first) or _names_slow_effects(last):
             return last
     return found[0]
+
+
+def _at_limits(answer: Diagnosis) -> bool:
+    """Whether drives stand at limits that no file states."""
+    return any(note.kind == "drive-at-limit" for note in answer.notes_data)
 
 
 def _finds(answer: Diagnosis) -> bool:

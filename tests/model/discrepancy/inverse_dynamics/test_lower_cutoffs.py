@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, Diagnosis
+from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics import diagnose
 from model.discrepancy.inverse_dynamics.diagnose import JUMPING, LOOKS
 from model.effects.library import library
@@ -96,6 +97,13 @@ def test_a_group_is_told_apart_below_the_first_cutoff_that_names_one_of_it() -> 
 )
 def test_a_group_stays_one_where_lower_cutoffs_name_nothing_of_it(other: Diagnosis) -> None:
     assert first_finding(GROUP, other, other)[0] is GROUP
+
+
+def test_lower_cutoffs_are_not_looked_at_where_a_drive_stands_at_a_limit_that_no_file_states() -> None:
+    at_limit = Note(kind="drive-at-limit", values={"shares": [[1, 0.02]], "unknown_joints": []})
+    for first in (answer(), GROUP):
+        limited = first.model_copy(update={"notes_data": (at_limit,)})
+        assert first_finding(limited, answer("spring_torque")) == (limited, 1)
 
 
 def test_a_group_with_an_effect_that_jumps_is_not_looked_at_below_a_lower_cutoff() -> None:
