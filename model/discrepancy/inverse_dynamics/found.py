@@ -21,6 +21,10 @@ from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import load_posterior
 
 
+NOTHING: Mapping[str, float] = MappingProxyType({})
+"""No number is held."""
+
+
 @dataclass(frozen=True)
 class Found:
     """A model with the effects found so far, and its fit.
@@ -82,13 +86,13 @@ class Refitter:
             lowered=found.lowered | {p.name for p in chosen.stated if falls},
         )
 
-    def remove(self, found: Found, step: Step, held: Mapping[str, float] | None = None) -> Found:
+    def remove(self, found: Found, step: Step, held: Mapping[str, float] = NOTHING) -> Found:
         """Takes the effect of a step out and fits the rest; numbers of the file that it had named are tolerances again,
         but for those that are `held` at a value. The step stays in the list."""
         own = set(step.parameters)
         added = {name: p for name, p in found.added.items() if name not in own}
         model = self._without(found.model, step)
-        now = self._fit(model, found.now.values, added, held or {})
+        now = self._fit(model, found.now.values, added, held)
         return replace(
             found,
             model=model.with_values(now.model_values),
@@ -112,7 +116,7 @@ class Refitter:
         model: Model,
         begin: Mapping[str, float],
         added: Mapping[str, Parameter],
-        held: Mapping[str, float] = MappingProxyType({}),
+        held: Mapping[str, float] = NOTHING,
     ) -> BalanceFit:
         """The model fitted, with the parameters that the diagnosis has `added` without priors, and without those that
         are `held`."""
