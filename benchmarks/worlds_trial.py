@@ -342,6 +342,8 @@ def main() -> int:
         return 0
     if asked.folder is None or (asked.registration is None) == (not asked.sharpness):
         parser.error("--folder with --registration or --sharpness; or --table; or --hashes")
+    if unknown := set(asked.only) - set(KINDS):
+        parser.error(f"--only {', '.join(sorted(unknown))}: there is no such kind; `python -m tests.worlds --list` has all")
     if asked.sharpness:
         add_sharpness(asked.folder, asked.seconds, asked.only)
     else:

@@ -20,7 +20,6 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import load_posterior
 
-
 NOTHING: Mapping[str, float] = MappingProxyType({})
 """No number is held."""
 
