@@ -343,7 +343,7 @@ def main() -> int:
     if asked.folder is None or (asked.registration is None) == (not asked.sharpness):
         parser.error("--folder with --registration or --sharpness; or --table; or --hashes")
     if unknown := set(asked.only) - set(KINDS):
-        parser.error(f"--only {', '.join(sorted(unknown))}: there is no such kind; `python -m tests.worlds --list` has all")
+        parser.error(f"--only {', '.join(sorted(unknown))}: no such kind; see `python -m tests.worlds --list`")
     if asked.sharpness:
         add_sharpness(asked.folder, asked.seconds, asked.only)
     else:
