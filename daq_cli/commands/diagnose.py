@@ -217,6 +217,6 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     comparison = None
     if simulated and all(t.set_point is not None for t in (*traces, *held)):
         models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
-        comparison = compare(models, [*traces, *held], [t.record.trace_id for t in held])
-    efforts = recorded_and_predicted(found, [*traces, *held], [t.record.trace_id for t in held])
+        comparison = compare(models, [*traces, *held], found.holdout)
+    efforts = recorded_and_predicted(found, [*traces, *held], found.holdout)
     return write_report(diagnosis_report(found, comparison, files_of([*traces, *held]), efforts), path)

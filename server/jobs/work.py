@@ -224,13 +224,13 @@ class _Worker:
         controlled = not isinstance(begin.machine.controller, NoController)
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
-            comparison = self._compared(models, [*traces, *held], request.held_out, DIAGNOSIS_SHARE, MAP_SHARE)
+            comparison = self._compared(models, [*traces, *held], found.holdout, DIAGNOSIS_SHARE, MAP_SHARE)
             self.mailbox.tell(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
             given = where_given(begin, traces)
         changed = found.model_after.identity != found.model_before.identity
         if changed:
             self._keep_model(found.model_after)
-        efforts = recorded_and_predicted(found, [*traces, *held], request.held_out)
+        efforts = recorded_and_predicted(found, [*traces, *held], found.holdout)
         result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given, efforts))
         report = diagnosis_report(found, comparison, efforts=efforts)
         return self._done(result, report, headline(found), found.model_after if changed else None)

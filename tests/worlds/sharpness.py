@@ -3,9 +3,10 @@
 A rival is the sound arm with another effect, in its plainest law. Its sizes and everything that the file states with a
 deviation are refitted by least squares to the readings of the true arm, in the worlds' own simulation without noise or
 rounding. χ² is what remains, over the variance of the noise, and what the numbers of the file cost: each is stated with
-a deviation, as a share of the arm's own number, and costs the square of how many of these it is off, which are never
-more than a rig is drawn with; what those of the true arm are off is subtracted. d′ of a rival is √(χ² of the rival −
-χ² of the effect's own plainest law), and that of `none` is √χ² of the sound arm. Below 5 record and file do not tell.
+a deviation, as a share of the arm's own number, and costs the square of how many of these it is off; what those of the
+true arm are off is subtracted. No file says that a number is never further off than rigs are drawn with, so that the
+judge does not know it either (docs/decisions/0072). d′ of a rival is √(χ² of the rival − χ² of the effect's own
+plainest law), and that of `none` is √χ² of the sound arm. Below 5 record and file do not tell.
 The file counts as it is: friction of twice what is stated to 30 % is what a sound arm with an unlucky file has,
 whatever the true friction would have been without the effect.
 
@@ -31,7 +32,7 @@ import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from tests.worlds.bodies import Bodies, Link
-from tests.worlds.drawing import WORST, generator
+from tests.worlds.drawing import generator
 from tests.worlds.engine import Floats, simulate, step_within
 from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
 from tests.worlds.parameters import Records
@@ -51,6 +52,11 @@ DERIVATIVES = 2
 """Times that a refit forms its derivatives anew, where those it has lead no further."""
 FARTHEST = 3.0
 """Deviations at which a refit begins at the most."""
+TELLS = 5.0
+"""d′ from which record and file tell. One number that is off by as many deviations costs as much, so that none is moved
+further."""
+LEAST_FACTOR = 0.1
+"""Least ratio of what a file states and what an arm has."""
 DIFFERENCE = 0.05
 """Step of differences in a refit, deviations."""
 LEAST_FALL = 1e-3
@@ -122,7 +128,8 @@ class _Comparison:
         self.sigma = _noise(rig)
         self.shares = np.array([t.share for t in rig.tolerances])
         self.factors = np.array([t.factor for t in rig.tolerances])
-        factors = (self.factors / (1.0 + off * self.shares) for off in (WORST, -WORST))
+        stated = (1.0 + TELLS * self.shares, np.maximum(1.0 - TELLS * self.shares, LEAST_FACTOR))
+        factors = (self.factors / ratio for ratio in stated)
         self.least, self.most = ((factor - 1.0) / self.shares for factor in factors)
         self.own_cost = _square(self._off(np.zeros(self.shares.size)))
         self.true = self._readings(rig.bodies, rig.joints, rig.loop)

@@ -77,6 +77,12 @@ def _larger_noise(v: Values) -> str:
     )
 
 
+def _names_excluded(_: Values) -> str:
+    return (
+        "a group has fewer names than the fitted traces leave: the held-out ones, fitted to in turn, exclude the others"
+    )
+
+
 def _no_experiment_left(v: Values) -> str:
     return (
         f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
@@ -145,6 +151,13 @@ def _times(value: float, stated: float) -> str:
     return ", next to nothing" if value < 0.005 * stated else f", {value / stated:.2g} times as much"
 
 
+def _suspicion_dropped(v: Values) -> str:
+    return (
+        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f} in the fitted traces, and next to "
+        "none in the held-out ones when they are fitted to in turn: it is not suspected"
+    )
+
+
 def _taken_out_again(v: Values) -> str:
     return f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: the others explain it"
 
@@ -177,6 +190,21 @@ def _torque_left(v: Values) -> str:
     return f"torque left unexplained on {records}: {shares}{doubt if v.get('given', 0.0) > 1.0 else ''}"
 
 
+def _traces_contradict(v: Values) -> str:
+    effects = " and ".join(effect_on(one["effect"], one["joints"]) for one in v["effects"])
+    return (
+        f"{effects} would explain the traces that were given to be fitted to, but not those held out, which are fitted "
+        "to here: what is missing is something else, which the library has no law for"
+    )
+
+
+def _traces_exchanged(_: Values) -> str:
+    return (
+        "the traces that were given to be fitted to show nothing that can be named; this was found in those held out, "
+        "which are fitted to here, and it is checked on the others, which are held out here in turn"
+    )
+
+
 def _unfinished_record(v: Values) -> str:
     called = v.get("file") or f"trace {v['trace']}"
     return f"{called} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are were used"
@@ -194,6 +222,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "gravity-magnitude": _gravity_magnitude,
     "gravity-reversed": _gravity_reversed,
     "larger-noise": _larger_noise,
+    "names-excluded": _names_excluded,
     "no-experiment-left": _no_experiment_left,
     "not-looked-for": _not_looked_for,
     "not-separable": _not_separable,
@@ -203,9 +232,12 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "resting-left-out": _resting_left_out,
     "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
+    "suspicion-dropped": _suspicion_dropped,
     "taken-out-again": _taken_out_again,
     "tolerances-fitted-first": _tolerances_fitted_first,
     "tolerance-source": _tolerance_source,
     "torque-left": _torque_left,
+    "traces-contradict": _traces_contradict,
+    "traces-exchanged": _traces_exchanged,
     "unfinished-record": _unfinished_record,
 }

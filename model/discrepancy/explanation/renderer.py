@@ -150,6 +150,8 @@ def refusal_words(refusal: Refusal) -> str:
             )
         case "falls-too-little":
             words = f"on records not fitted to, the mean square falls by only {n['share']:.1%}"
+        case "found-one-way":
+            words = "the held-out traces do not show it when they are fitted to in turn"
         case "leaves-more-than-noise":
             words = (
                 f"it takes {n['share']:.0%} of the mean square on records not fitted to, and leaves "

@@ -1,46 +1,21 @@
-"""Diagnosis by inverse dynamics: the missing effects that recorded drive and motion show, below several cutoffs."""
+"""Diagnosis by inverse dynamics: the missing effects that recorded drive and motion show."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
-from model.arrays import Floats
-from model.discrepancy.diagnosis import Diagnosis, Step
-from model.discrepancy.explanation.notes import on_unfinished
+from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.renderer import with_sentences
-from model.discrepancy.gravity_doubts import on_gravity_along
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
-from model.discrepancy.inverse_dynamics.left_over import FRICTION
+from model.discrepancy.inverse_dynamics.both_ways import diagnose_both_ways
+from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
+from model.discrepancy.inverse_dynamics.looks import Records
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.effects.library import find_named_effect
-from model.inverse_dynamics.readings import choose_cutoff, torque_noise
-from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
-from model.inverse_dynamics.repeats import repeated_noise
-from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Model
-
-LOOKS = (1.0, 1 / 2, 1 / 3)
-"""Cutoffs of the torques that are compared, as shares of the highest that accelerations bear, in turn until something
-is found that has one name. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a
-sensor's scale, show below a lower one as well; gears that give and delays show below the highest alone."""
-JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss", "supply_limit"})
-"""Effects that are no friction, and whose torque jumps as friction's does, where motion or drive turns, or breaks off
-where the drive is at its limit."""
-LEAST_OF_TORQUE = 1e-3
-"""Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
-a sound rig with 20 bits, gears were said to lose 0.09 % of it."""
-LONG = 20.0
-"""Least duration of a record for a lower cutoff, in periods of that cutoff."""
 
 
 def diagnose_torques(
@@ -54,7 +29,8 @@ def diagnose_torques(
     """Name the effects that recorded drive and motion show and the model lacks, add them, and show what that removes.
 
     No controller and no simulation is needed. Where nothing is held out, an effect must hold on quarters of the traces
-    that are predicted from the others.
+    that are predicted from the others. Otherwise the same is looked for in those held out, with the others held out in
+    turn (`both_ways`).
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give an answer. CancelledError: when asked to end.
@@ -65,135 +41,8 @@ def diagnose_torques(
     chosen = torque_options(options)
     check_options(chosen, model)
     controller = judge_controller(model, traces)
-    _refuse_unseen(chosen, controller.settled)
-    work = _Records(model, tuple(traces), tuple(held_out), chosen, controller, cancel or Never())
-    if chosen.cutoff is not None:
-        answer = work.below(chosen.cutoff, progress)
-    else:
-        answer = _first_finding(work, choose_cutoff(traces, model.machine), progress)
-    robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
-    return with_sentences(answer.model_copy(update={"seconds": time.perf_counter() - begun, "robot_seconds": robot}))
-
-
-def _first_finding(work: _Records, highest: float, progress: Progress) -> Diagnosis:
-    """The answer below the highest cutoff. Where nothing is found there, that of the first lower one that names an
-    effect which lower cutoffs show as well; where groups are found, that of the first lower one that tells them
-    apart. Lower cutoffs are not looked at where drives stand at limits that no file states: what is lacking there is
-    smeared over more of the record, and looks like a spring or a slow ripple.
-    """
-    found: list[Diagnosis] = []
-    for k, share in enumerate(LOOKS):
-        if found and (_at_limits(found[0]) or not work.bears(share * highest)):
-            break
-
-        def tell(done: float, text: str, begin: float = k / len(LOOKS)) -> None:
-            progress(begin + done / len(LOOKS), text)
-
-        found.append(work.below(share * highest, tell))
-        first, last = found[0], found[-1]
-        if first.verdict == "ambiguous" and not _jumps_anywhere(first):
-            if _tells_apart(last, first):
-                return last
-        elif _finds(first) or _names_slow_effects(last):
-            return last
-    return found[0]
-
-
-def _at_limits(answer: Diagnosis) -> bool:
-    """Whether drives stand at limits that no file states."""
-    return any(note.kind == "drive-at-limit" for note in answer.notes_data)
-
-
-def _finds(answer: Diagnosis) -> bool:
-    """Whether anything is found in torques, beside what the controller's own numbers prove."""
-    proved_alone = all(step.proof is not None for step in answer.steps if step.adopted)
-    return answer.verdict == "unknown-effect" or not proved_alone
-
-
-def _names_slow_effects(answer: Diagnosis) -> bool:
-    """Whether effects are named, all of which lower cutoffs show as well."""
-    named = answer.verdict in ("named", "ambiguous") and bool(_found_in_torques(answer))
-    return named and not _jumps_anywhere(answer)
-
-
-def _jumps_anywhere(answer: Diagnosis) -> bool:
-    """Whether any effect of an answer may jump, as friction does where motion turns: that is smeared below a low
-    cutoff, and what is left of it looks like friction of another size, or like an amplifier."""
-    return any(_jumps(name) for step in _found_in_torques(answer) for name in _names_of(step))
-
-
-def _tells_apart(answer: Diagnosis, first: Diagnosis) -> bool:
-    """Whether an answer gives one name to every step of the first one, of those that the step left open: the noise of
-    slow torques is small, so that they tell a sensor from a spring where the same record's fast ones do not."""
-    last, before = _found_in_torques(answer), _found_in_torques(first)
-    if answer.verdict != "named" or len(last) != len(before):
-        return False
-
-    def is_of(one: Step, group: Step) -> bool:
-        return set(one.joints) == set(group.joints) and _names_of(one) <= _names_of(group)
-
-    return all(any(is_of(one, group) for group in before) for one in last) and all(
-        any(is_of(one, group) for one in last) for group in before
-    )
-
-
-def _found_in_torques(answer: Diagnosis) -> list[Step]:
-    """The adopted steps but for those that the controller's own numbers prove."""
-    return [step for step in answer.steps if step.adopted and step.proof is None]
-
-
-def _names_of(step: Step) -> set[str]:
-    """The name that a step gives, or those of its group."""
-    return {name for name in (step.effect, *(member.effect for member in step.group)) if name is not None}
-
-
-def _jumps(name: str) -> bool:
-    return name in JUMPING or find_named_effect(name).shared_name.family == FRICTION
-
-
-@dataclass(frozen=True)
-class _Records:
-    """What a diagnosis is of."""
-
-    model: Model
-    traces: tuple[Trace, ...]
-    held_out: tuple[Trace, ...]
-    options: TorqueOptions
-    controller: JudgedController
-    cancel: Cancel
-
-    def bears(self, cutoff: float) -> bool:
-        """Whether every record lasts long enough for a cutoff (Hz)."""
-        return all(t.time[-1] - t.time[0] >= max(SHORTEST, LONG / cutoff) for t in (*self.traces, *self.held_out))
-
-    def below(self, cutoff: float, progress: Progress) -> Diagnosis:
-        """The answer of torques below a cutoff (Hz), without its sentences and the times that it took."""
-        model = self.model
-        progress(0.0, f"low-passing the records at {cutoff:g} Hz")
-        records = recorded_motions(self.traces, model.machine, cutoff)
-        balance = TorqueBalance(model, records)
-        noise = np.maximum(torque_noise(model, self.traces, cutoff), repeated_noise(records, balance.residual({})))
-        case = TorqueCase(
-            records,
-            recorded_motions(self.held_out, model.machine, cutoff),
-            np.maximum(noise, LEAST_OF_TORQUE * _root_mean_squares(balance.supplied_by_drive())),
-            self.options,
-        )
-        steps = TorqueWorkflow(model, case, self.controller, progress, self.cancel)
-        steps.run()
-        steps.notes += on_gravity_along(model, records)
-        steps.notes += on_unfinished((*self.traces, *self.held_out))
-        fitted, held = ([t.record.trace_id for t in some] for some in (self.traces, self.held_out))
-        return steps.answer(fitted, held, cutoff)
-
-
-def _root_mean_squares(torques: Sequence[Floats]) -> Floats:
-    """(n,) of torques (m, n), one array a record."""
-    return np.asarray(np.sqrt(np.mean(np.concatenate(torques) ** 2, axis=0)))
-
-
-def _refuse_unseen(options: TorqueOptions, settled: Sequence[str]) -> None:
-    """Raises SpecError for a named effect that torques do not show: not finding it would say nothing."""
-    for name in options.effects or ():
-        if name in NOT_IN_TORQUES and name not in settled:
-            raise SpecError(f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out")
+    records = Records(model, tuple(traces), tuple(held_out), chosen, controller, cancel or Never())
+    if records.unseen is not None:
+        raise SpecError(records.unseen)
+    found = diagnose_both_ways(records, progress)
+    return with_sentences(found.model_copy(update={"seconds": time.perf_counter() - begun}))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Suspicion
-from model.discrepancy.grounds import Note, Refusal
+from model.discrepancy.grounds import Note, Refusal, RefusalKind
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
@@ -38,8 +38,10 @@ REVISIONS = 2
 """Times that all effects are looked for once more, at most: again where the first time has changed one."""
 STRUCTURE = "leaves-more-than-noise"
 """Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
-SUPERFLUOUS = "superfluous"
+SUPERFLUOUS: RefusalKind = "superfluous"
 """Kind of refusal of an effect that nothing needs any more."""
+ONE_WAY: RefusalKind = "found-one-way"
+"""Kind of refusal of an effect that the held-out records do not show when they are fitted to in turn."""
 BEGUN_WITH = 2
 """Refused effects with which a pair is begun, at most."""
 
@@ -103,6 +105,13 @@ class TorqueWorkflow:
             notes=(*self.notes, *self.at_bounds),
         )
         return answer_of(outcome, traces, held_out, cutoff)
+
+    def withdraw_unconfirmed(self, effects: Collection[tuple[str | None, tuple[int, ...]]]) -> None:
+        """Takes effects on joints back which the held-out records do not show when they are fitted to in turn."""
+        for step in [s for s in self.found.adopted if (s.effect, s.joints) in effects]:
+            self.found = self._refuse(self.refitter.remove(self.found, step), self.found, step, ONE_WAY)
+        self.found = describe_in_order(self.refitter, self.found)
+        self.suspicion, self.tried, self.at_bounds = None, (), []  # they were of the model with these effects
 
     def _take_steps(self) -> None:
         for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn
@@ -243,7 +252,7 @@ class TorqueWorkflow:
         mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
         if all(f.evidence + f.told >= SUSPECTED for f in mine):
             return found
-        return self._superfluous(without, found, step)
+        return self._refuse(without, found, step, SUPERFLUOUS)
 
     def _look_again_on(self, found: Found, effect: str | None, joint: int) -> Found:
         """Replaces an effect on one of its joints by another effect, where that explains the joint better."""
@@ -266,11 +275,11 @@ class TorqueWorkflow:
             now, without = self.found.now, self.refitter.remove(self.found, step)
             less = evidence(without.now, now, now.noise.memory, len(step.parameters), 1)
             if less < 0:
-                self.found = self._superfluous(without, self.found, step)
+                self.found = self._refuse(without, self.found, step, SUPERFLUOUS)
 
-    def _superfluous(self, without: Found, found: Found, step: Step) -> Found:
-        """Takes an effect out and tells its step as superfluous."""
-        gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=SUPERFLUOUS)})
+    def _refuse(self, without: Found, found: Found, step: Step, kind: RefusalKind) -> Found:
+        """Takes an effect out and tells why its step does not hold."""
+        gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=kind)})
         return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
 
     def _withdraw_wrong_laws(self) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, Diagnosis
 from model.discrepancy.grounds import Note
-from model.discrepancy.inverse_dynamics import diagnose
-from model.discrepancy.inverse_dynamics.diagnose import JUMPING, LOOKS
+from model.discrepancy.inverse_dynamics import looks
+from model.discrepancy.inverse_dynamics.looks import JUMPING, LOOKS
 from model.effects.library import library
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
@@ -45,16 +46,16 @@ class Below:
     def bears(self, cutoff: float) -> bool:
         return cutoff > 0.0
 
-    def below(self, cutoff: float, progress: Any) -> Diagnosis:
+    def below(self, cutoff: float, progress: Any) -> Any:
         progress(1.0, "done")
         self.looked.append(cutoff)
-        return self.answers[len(self.looked) - 1]
+        return SimpleNamespace(answer=self.answers[len(self.looked) - 1])
 
 
 def first_finding(*answers: Diagnosis) -> tuple[Diagnosis, int]:
     """The answer that is given, and how many cutoffs were looked at."""
     work: Any = Below(list(answers))
-    return diagnose._first_finding(work, 12.0, lambda *_: None), len(work.looked)
+    return looks._first_below(work, 12.0, lambda *_: None).answer, len(work.looked)
 
 
 @pytest.mark.parametrize("effect", [*sorted(JUMPING), "coulomb_friction", "stribeck_friction"])

@@ -1,0 +1,205 @@
+"""The answer of torques below several cutoffs, each of which shows what the others do not."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from daq.contracts.progress import Cancel, Progress, part_of
+from daq.contracts.trace import Trace
+from model.arrays import Floats
+from model.discrepancy.diagnosis import Diagnosis, Step
+from model.discrepancy.explanation.notes import on_unfinished
+from model.discrepancy.gravity_doubts import on_gravity_along
+from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
+from model.discrepancy.inverse_dynamics.left_over import FRICTION
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.effects.library import find_named_effect
+from model.inverse_dynamics.readings import choose_cutoff, torque_noise
+from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
+from model.inverse_dynamics.repeats import repeated_noise
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
+from model.machine_model.model import Model
+
+LOOKS = (1.0, 1 / 2, 1 / 3)
+"""Cutoffs of the torques that are compared, as shares of the highest that accelerations bear, in turn until something
+is found that has one name. The noise's variance grows with the fifth power of the cutoff, and slow effects, such as a
+sensor's scale, show below a lower one as well; gears that give and delays show below the highest alone."""
+JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss", "supply_limit"})
+"""Effects that are no friction, and whose torque jumps as friction's does, where motion or drive turns, or breaks off
+where the drive is at its limit."""
+LEAST_OF_TORQUE = 1e-3
+"""Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
+a sound rig with 20 bits, gears were said to lose 0.09 % of it."""
+LONG = 20.0
+"""Least duration of a record for a lower cutoff, in periods of that cutoff."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What torques below one cutoff showed. answer: without its sentences and the time that it took."""
+
+    workflow: TorqueWorkflow
+    records: Records
+    cutoff: float
+
+    @cached_property
+    def answer(self) -> Diagnosis:
+        """What is said of it, as far as it has come."""
+        traces, held = self.records.traces, self.records.held_out
+        fitted, checked = ([t.record.trace_id for t in some] for some in (traces, held))
+        robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
+        return self.workflow.answer(fitted, checked, self.cutoff).model_copy(update={"robot_seconds": robot})
+
+    def without(self, steps: Collection[Step]) -> Diagnosis:
+        """What is said without some of the steps, which are withdrawn because other records do not show them."""
+        self.workflow.withdraw_unconfirmed({(step.effect, step.joints) for step in steps})
+        return replace(self).answer
+
+
+def first_finding(records: Records, progress: Progress) -> Look:
+    """What is seen below the cutoff that was asked for, or else below those that accelerations bear.
+
+    Raises SpecError where nothing moves beyond the noise of its readings.
+    """
+    if records.options.cutoff is not None:
+        return records.below(records.options.cutoff, progress)
+    return _first_below(records, choose_cutoff(records.traces, records.model.machine), progress)
+
+
+def _first_below(records: Records, highest: float, progress: Progress) -> Look:
+    """What is seen below the highest cutoff (Hz). Where nothing is found there, what the first lower one shows that
+    names an effect which lower cutoffs show as well; where groups are found, what the first lower one shows that tells
+    them apart. Lower cutoffs are not looked at where drives stand at limits that no file states: what is lacking there
+    is smeared over more of the record, and looks like a spring or a slow ripple.
+    """
+    found: list[Look] = []
+    for k, share in enumerate(LOOKS):
+        if found and (_at_limits(found[0].answer) or not records.bears(share * highest)):
+            break
+        found.append(records.below(share * highest, part_of(progress, k / len(LOOKS), (k + 1) / len(LOOKS))))
+        first, last = found[0].answer, found[-1].answer
+        if first.verdict == "ambiguous" and not _jumps_anywhere(first):
+            if _tells_apart(last, first):
+                return found[-1]
+        elif _finds(first) or _names_slow_effects(last):
+            return found[-1]
+    return found[0]
+
+
+def _at_limits(answer: Diagnosis) -> bool:
+    """Whether drives stand at limits that no file states."""
+    return any(note.kind == "drive-at-limit" for note in answer.notes_data)
+
+
+def _finds(answer: Diagnosis) -> bool:
+    """Whether anything is found in torques, beside what the controller's own numbers prove."""
+    proved_alone = all(step.proof is not None for step in answer.steps if step.adopted)
+    return answer.verdict == "unknown-effect" or not proved_alone
+
+
+def _names_slow_effects(answer: Diagnosis) -> bool:
+    """Whether effects are named, all of which lower cutoffs show as well."""
+    named = answer.verdict in ("named", "ambiguous") and bool(found_in_torques(answer))
+    return named and not _jumps_anywhere(answer)
+
+
+def _jumps_anywhere(answer: Diagnosis) -> bool:
+    """Whether any effect of an answer may jump, as friction does where motion turns: that is smeared below a low
+    cutoff, and what is left of it looks like friction of another size, or like an amplifier."""
+    return any(_jumps(name) for step in found_in_torques(answer) for name in names_of(step))
+
+
+def _tells_apart(answer: Diagnosis, first: Diagnosis) -> bool:
+    """Whether an answer gives one name to every step of the first one, of those that the step left open: the noise of
+    slow torques is small, so that they tell a sensor from a spring where the same record's fast ones do not."""
+    last, before = found_in_torques(answer), found_in_torques(first)
+    if answer.verdict != "named" or len(last) != len(before):
+        return False
+
+    def is_of(one: Step, group: Step) -> bool:
+        return set(one.joints) == set(group.joints) and names_of(one) <= names_of(group)
+
+    return all(any(is_of(one, group) for group in before) for one in last) and all(
+        any(is_of(one, group) for one in last) for group in before
+    )
+
+
+def found_in_torques(answer: Diagnosis) -> list[Step]:
+    """The adopted steps but for those that the controller's own numbers prove."""
+    return [step for step in answer.steps if step.adopted and step.proof is None]
+
+
+def names_of(step: Step) -> set[str]:
+    """The name that a step gives, or those of its group."""
+    return {name for name in (step.effect, *(member.effect for member in step.group)) if name is not None}
+
+
+def _jumps(name: str) -> bool:
+    return name in JUMPING or find_named_effect(name).shared_name.family == FRICTION
+
+
+@dataclass(frozen=True)
+class Records:
+    """What a diagnosis is of: traces to fit to, and others that are held out."""
+
+    model: Model
+    traces: tuple[Trace, ...]
+    held_out: tuple[Trace, ...]
+    options: TorqueOptions
+    controller: JudgedController
+    cancel: Cancel
+
+    def bears(self, cutoff: float) -> bool:
+        """Whether every record lasts long enough for a cutoff (Hz)."""
+        return all(t.time[-1] - t.time[0] >= max(SHORTEST, LONG / cutoff) for t in (*self.traces, *self.held_out))
+
+    @property
+    def unseen(self) -> str | None:
+        """What is wrong with asking for an effect that torques do not show: not finding it would say nothing. None
+        where nothing is."""
+        for name in self.options.effects or ():
+            if name in NOT_IN_TORQUES and name not in self.controller.settled:
+                return f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out"
+        return None
+
+    def exchanged(self) -> Records | None:
+        """The same with fitted and held-out traces exchanged; None where those held out are too short to be fitted to,
+        or where nothing moves in them."""
+        try:
+            cutoff = self.options.cutoff or choose_cutoff(self.held_out, self.model.machine)
+        except SpecError:
+            return None
+        controller = judge_controller(self.model, self.held_out)
+        other = replace(self, traces=self.held_out, held_out=self.traces, controller=controller)
+        return other if other.bears(cutoff) else None
+
+    def below(self, cutoff: float, progress: Progress) -> Look:
+        """What torques below a cutoff (Hz) show."""
+        model = self.model
+        progress(0.0, f"low-passing the records at {cutoff:g} Hz")
+        records = recorded_motions(self.traces, model.machine, cutoff)
+        balance = TorqueBalance(model, records)
+        noise = np.maximum(torque_noise(model, self.traces, cutoff), repeated_noise(records, balance.residual({})))
+        case = TorqueCase(
+            records,
+            recorded_motions(self.held_out, model.machine, cutoff),
+            np.maximum(noise, LEAST_OF_TORQUE * _root_mean_squares(balance.supplied_by_drive())),
+            self.options,
+        )
+        steps = TorqueWorkflow(model, case, self.controller, progress, self.cancel)
+        steps.run()
+        steps.notes += on_gravity_along(model, records)
+        steps.notes += on_unfinished((*self.traces, *self.held_out))
+        return Look(steps, self, cutoff)
+
+
+def _root_mean_squares(torques: Sequence[Floats]) -> Floats:
+    """(n,) of torques (m, n), one array a record."""
+    return np.asarray(np.sqrt(np.mean(np.concatenate(torques) ** 2, axis=0)))

@@ -1,0 +1,139 @@
+"""Held-out traces are fitted to in turn: they may show what the others do not, and confirm or exclude what these do."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from daq.contracts.machine import load_machine
+from daq.traces.csv_table import import_csv
+from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Suspicion, Verdict
+from model.discrepancy.inverse_dynamics import both_ways
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.machine_model.model import base_model
+from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
+from tests.model.discrepancy.steps import step
+from tests.worlds.folder import write_world
+
+MODEL = base_model(slide_machine())
+LITTLE, PLENTY = 0.3 * both_ways.PLAIN, 3.0 * both_ways.PLAIN
+
+
+def answer(*steps: Step, verdict: Verdict | None = None) -> Diagnosis:
+    """An answer that has adopted these steps."""
+    said: Verdict = "ambiguous" if any(s.group for s in steps) else "named" if steps else "nothing-significant"
+    return Diagnosis(
+        verdict=verdict or said,
+        summary="",
+        steps=steps,
+        model_before=MODEL,
+        model_after=MODEL,
+        traces=("a",),
+        seconds=0.0,
+        robot_seconds=0.0,
+    )
+
+
+def named(*effects: str, evidence: float = LITTLE, joints: tuple[int, ...] = (1,)) -> Step:
+    """A step that names an effect, or a group of them."""
+    members = tuple(Candidate(effect=name, joints=joints, evidence=40.0) for name in effects)
+    return step(effects[0], joints, evidence=evidence, group=members if len(members) > 1 else ())
+
+
+class Look:
+    """A look that withdraws steps without fitting anything."""
+
+    def __init__(self, said: Diagnosis) -> None:
+        self.answer = said
+
+    def without(self, steps: Collection[Step]) -> Diagnosis:
+        return answer(*(s for s in self.answer.steps if not any(s is one for one in steps)))
+
+
+def joined(first: Diagnosis, other: Diagnosis) -> tuple[list[tuple[str | None, list[str]]], Verdict, list[str]]:
+    """Names with their groups, verdict and kinds of notes of the answer of both."""
+    look: Any = Look(first)
+    found = both_ways._join(look, other)
+    names = [(s.effect, [m.effect for m in s.group]) for s in found.steps]
+    return names, found.verdict, [note.kind for note in found.notes_data]
+
+
+def test_what_held_out_traces_alone_show_is_said_with_a_note() -> None:
+    found = joined(answer(), answer(named("backlash")))
+    assert found == ([("backlash", [])], "named", ["traces-exchanged"])
+    unknown = answer(verdict="unknown-effect")
+    assert joined(answer(), unknown) == ([], "unknown-effect", ["traces-exchanged"])
+    suspected = answer(verdict="suspected")
+    assert joined(answer(), suspected) == ([], "nothing-significant", [])
+
+
+@pytest.mark.parametrize(("evidence", "left"), [(LITTLE, []), (PLENTY, [("spring_torque", [])])])
+def test_one_effect_that_the_others_do_not_show_is_named_where_it_is_plain(
+    evidence: float, left: list[tuple[str, list[str]]]
+) -> None:
+    found = joined(answer(named("spring_torque", evidence=evidence)), answer())
+    assert found == (left, "named" if left else "nothing-significant", [])
+
+
+def test_of_several_effects_those_that_the_others_show_are_named() -> None:
+    both = answer(named("gear_loss", evidence=PLENTY), named("stribeck_friction", evidence=PLENTY))
+    assert joined(both, answer(named("gear_loss"))) == ([("gear_loss", [])], "named", [])
+    elsewhere = answer(named("gear_loss"), named("stribeck_friction", joints=(2,)))
+    assert joined(both, elsewhere)[0] == [("gear_loss", [])]
+    assert joined(both, both)[0] == [("gear_loss", []), ("stribeck_friction", [])]
+
+
+def test_a_group_keeps_the_names_that_both_leave() -> None:
+    group = answer(named("potentiometer_gain", "potentiometer_nonlinearity", "spring_torque", evidence=PLENTY))
+    alone = answer(named("potentiometer_gain"))
+    assert joined(group, alone) == ([("potentiometer_gain", [])], "named", ["names-excluded"])
+    fewer = answer(named("spring_torque", "potentiometer_gain"))
+    expected = ([("potentiometer_gain", ["potentiometer_gain", "spring_torque"])], "ambiguous", ["names-excluded"])
+    assert joined(group, fewer) == expected
+    other_first = answer(named("spring_torque"))  # it excludes the effect that the model was given
+    whole = [(s.effect, [m.effect for m in s.group]) for s in group.steps]
+    assert joined(group, other_first) == (whole, "ambiguous", [])
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_suspicion_stays_where_the_others_have_one_too(again: bool) -> None:
+    doubt = Suspicion(effect="spring_torque", joints=(1,), evidence=19.0, needed=30.0, seconds=10.0)
+    first = answer(verdict="suspected").model_copy(update={"suspicion": doubt})
+    found = joined(first, first if again else answer())
+    assert found == (([], "suspected", []) if again else ([], "nothing-significant", ["suspicion-dropped"]))
+
+
+def test_what_the_others_contradict_has_no_name() -> None:
+    unknown = answer(verdict="unknown-effect")
+    found = joined(answer(named("viscous_friction", evidence=PLENTY)), unknown)
+    assert found == ([], "unknown-effect", ["traces-contradict"])
+
+
+def diagnosed(folder: Path, kind: str, seed: int, case: str) -> Diagnosis:
+    """The answer for a rig of another world."""
+    write_world(folder, kind, seed, case)
+    lab = folder / "lab"
+    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
+    return diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+
+
+def test_a_scale_that_small_steps_do_not_show_is_found_in_a_sweep_that_was_held_out(tmp_path: Path) -> None:
+    """Over 15° a wrong scale is a heavier arm; over 90° it is not."""
+    found = diagnosed(tmp_path, "axis-current-steps", 142537758738129, "single")
+    (adopted,) = [s for s in found.steps if s.adopted]
+    assert (adopted.effect, adopted.joints) == ("potentiometer_gain", (1,)), found.summary
+    assert adopted.parameters["joint1.potentiometer_gain.relative"].value == pytest.approx(0.0702, abs=0.005)
+    assert found.robot_seconds == pytest.approx(8.4, abs=0.1), "the held-out record was fitted to"
+    assert found.notes[0].startswith("The traces that were given to be fitted to show nothing that can be named")
+    assert found.rmse_holdout[0].after < 0.6 * found.rmse_holdout[0].before
+
+
+def test_a_drag_that_looks_viscous_in_one_motion_is_contradicted_by_another(tmp_path: Path) -> None:
+    """Quadratic drag, which the library has no law for."""
+    found = diagnosed(tmp_path, "axis-current-steps", 278342827514058, "open")
+    assert found.verdict == "unknown-effect", found.summary
+    assert not [s for s in found.steps if s.adopted]
+    assert "viscous friction on joint 1 would explain" in found.notes[0].lower()
