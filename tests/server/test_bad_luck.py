@@ -47,6 +47,7 @@ def _partial_trace(service: Service, experiment: dict[str, Any], outcome: str) -
 # ---- a process is killed
 
 
+@pytest.mark.slow
 def test_whatever_process_is_killed_its_work_is_interrupted_and_what_waits_waits_for_a_person(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:
         running, waiting = _left_behind(service)

@@ -3,9 +3,9 @@
 A rival is the sound arm with another effect, in its plainest law. Its sizes and everything that the file states with a
 deviation are refitted by least squares to the readings of the true arm, in the worlds' own simulation without noise or
 rounding. χ² is what remains, over the variance of the noise, and what the numbers of the file cost: each is stated with
-a deviation, as a share of the arm's own number, and costs the square of how many of these it is off; what those of the
-true arm are off is subtracted. No file says that a number is never further off than rigs are drawn with, so that the
-judge does not know it either (docs/decisions/0072). d′ of a rival is √(χ² of the rival − χ² of the effect's own
+a deviation, as a share of itself, and costs the square of how many of these it is off, by its logarithm; what those of
+the true arm are off is subtracted. No file says that a number is never further off than rigs are drawn with, so that
+the judge does not know it either (docs/decisions/0072). d′ of a rival is √(χ² of the rival − χ² of the effect's own
 plainest law), and that of `none` is √χ² of the sound arm. Below 5 record and file do not tell.
 The file counts as it is: friction of twice what is stated to 30 % is what a sound arm with an unlucky file has,
 whatever the true friction would have been without the effect.
@@ -55,8 +55,6 @@ FARTHEST = 3.0
 TELLS = 5.0
 """d′ from which record and file tell. One number that is off by as many deviations costs as much, so that none is moved
 further."""
-LEAST_FACTOR = 0.1
-"""Least ratio of what a file states and what an arm has."""
 DIFFERENCE = 0.05
 """Step of differences in a refit, deviations."""
 LEAST_FALL = 1e-3
@@ -128,8 +126,7 @@ class _Comparison:
         self.sigma = _noise(rig)
         self.shares = np.array([t.share for t in rig.tolerances])
         self.factors = np.array([t.factor for t in rig.tolerances])
-        stated = (1.0 + TELLS * self.shares, np.maximum(1.0 - TELLS * self.shares, LEAST_FACTOR))
-        factors = (self.factors / ratio for ratio in stated)
+        factors = (self.factors * np.exp(off * self.shares) for off in (-TELLS, TELLS))
         self.least, self.most = ((factor - 1.0) / self.shares for factor in factors)
         self.own_cost = _square(self._off(np.zeros(self.shares.size)))
         self.true = self._readings(rig.bodies, rig.joints, rig.loop)
@@ -247,12 +244,13 @@ class _Comparison:
 
     def _off(self, steps: Floats) -> Floats:
         """By how many of its deviations each number of the file is off, where the arm's are `steps` deviations of
-        themselves from the true arm's: the file states an arm's number × (1 + share × deviations)."""
-        return np.asarray((self.factors / (1.0 + self.shares * steps) - 1.0) / self.shares)
+        themselves from the true arm's. It goes by the ratio of both: as a distance, no friction that is stated to 30 %
+        would be more than 3.3 deviations off, however large it is."""
+        return np.asarray(np.log(self.factors / (1.0 + self.shares * steps)) / self.shares)
 
     def _off_slopes(self, steps: Floats) -> Floats:
         """Derivatives of these by the steps."""
-        return np.asarray(-self.factors / (1.0 + self.shares * steps) ** 2)
+        return np.asarray(-1.0 / (1.0 + self.shares * steps))
 
     def _searched(
         self, rival: Callable[[Floats], Rig], sizes: Floats, start: Floats, bounds: tuple[Floats, Floats]

@@ -47,6 +47,7 @@ def test_a_shifted_centre_and_a_heavier_link_are_one_to_an_axis(sound: Rig) -> N
     assert 5.0 < friction.d_prime <= none.d_prime
 
 
+@pytest.mark.slow
 def test_of_two_effects_each_is_looked_for_beside_the_other(sound: Rig) -> None:
     large = hide(sound, "coulomb_friction", 1, 0, {"coulomb": 0.2 * sound.strongest[0]})
     rig = hide(large, "viscous_friction", 1, 0, {"viscous": 1e-6})

@@ -28,6 +28,7 @@ def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tm
     _is_named(diagnosed(tmp_path, modification), name, joint)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(400)
 def test_coulomb_friction_is_told_from_what_looks_like_it(tmp_path: Path) -> None:
     """On slow reversals, a quarter of the 55 s set."""

@@ -83,6 +83,7 @@ def test_validate_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_
     said.complains(2, "joint9")
 
 
+@pytest.mark.slow
 def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_path: Path) -> None:
     assert daq(*RAMP).code == 0
     few = ["--joints", "1", "--effects", "coulomb_friction", "--most", "1"]

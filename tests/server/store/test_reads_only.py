@@ -65,6 +65,7 @@ def _place(service: Service) -> str:
     return f"port {service.client.base_url.port} of {socket.gethostname()}"[:60]
 
 
+@pytest.mark.slow
 def test_one_service_owns_the_arm_and_the_other_reads(postgresql: PostgresServer, tmp_path: Path) -> None:
     database = postgresql.database(template="made1")
     with _beside(tmp_path, database) as (owner, reader):

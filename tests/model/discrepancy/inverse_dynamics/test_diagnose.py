@@ -127,6 +127,7 @@ def test_free_play() -> None:
     assert first(found) == ("backlash", (1,))
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_payload_on_a_six_joint_arm() -> None:
     found = diagnosed("six", {"payload": 1.0}, TorqueOptions(cutoff=3.0, most_steps=1))

@@ -84,6 +84,7 @@ def test_a_magnet_is_weakened_from_four_deviations_of_its_better_known_constant(
         assert loss.value == pytest.approx(weaker, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_far_number_is_named_beside_a_small_effect_on_little_evidence() -> None:
     """Its 4.6 deviations bring evidence of 7: every other effect needs 30, and 10 to stay when all are looked for
     again."""

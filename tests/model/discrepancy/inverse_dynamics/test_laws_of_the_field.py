@@ -50,6 +50,7 @@ def test_a_law_is_named_and_its_size_found(
     assert step.parameters[f"joint{joints[0]}.{effect}.{part}"].value == pytest.approx(value, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_payload_that_was_fitted_as_a_mass_is_named(tmp_path: Path) -> None:
     """Stated masses have taken it over by eight of their deviations: of the payload itself, a small rest shows."""

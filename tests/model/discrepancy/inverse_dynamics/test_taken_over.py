@@ -125,6 +125,7 @@ def test_friction_that_goes_with_the_place_contradicts_friction_everywhere_and_a
     assert not rubs_elsewhere(step(effect), 2, [against])
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_quadratic_drag_is_no_viscous_friction(tmp_path: Path) -> None:
     found = of_world(tmp_path, "axis-current", 505)

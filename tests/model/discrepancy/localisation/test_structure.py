@@ -81,6 +81,7 @@ TONE = 2.0
 """Variance of a tone, in that of the noise beside it."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coloured", [0.0, 1.5])
 def test_a_tone_is_a_shape_and_noise_of_three_times_the_size_is_none(
     arm: Model, records: tuple[Record, ...], coloured: float

@@ -86,6 +86,7 @@ def test_a_dead_zone_is_found() -> None:
     assert next(iter(step.parameters.values())).value == pytest.approx(1.2, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_sound_controller_gives_no_finding_and_settles_its_effects(sound: outside_arm.OutsideArm) -> None:
     made = with_errors([outside_arm.record(sound, 11)], MACHINE)
     assert check_controller(made, MACHINE) == ()
