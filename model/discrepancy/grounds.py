@@ -45,6 +45,7 @@ NoteKind = Literal[
     "larger-noise",
     "names-excluded",
     "no-experiment-left",
+    "not-exchanged",
     "not-looked-for",
     "not-separable",
     "nothing-held-out",

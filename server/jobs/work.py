@@ -226,7 +226,7 @@ class _Worker:
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
             comparison = self._compared(models, [*traces, *held], found.holdout, DIAGNOSIS_SHARE, MAP_SHARE)
             self.mailbox.tell(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
-            given = where_given(begin, traces)
+            given = where_given(begin, [t for t in (*traces, *held) if t.record.trace_id in found.traces])
         changed = found.model_after.identity != found.model_before.identity
         if changed:
             self._keep_model(found.model_after)

@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
 from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
-from model.discrepancy.explanation.renderer import not_examined_words, size_words, suspicion_words, was_taken_back
+from model.discrepancy.explanation.renderer import (
+    not_examined_words,
+    size_words,
+    suspicion_words,
+    was_found_one_way,
+    was_taken_back,
+)
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
 
@@ -25,18 +31,25 @@ def _finding_of(found: Diagnosis) -> str:
     if found.verdict == "suspected" and found.suspicion is not None:
         return f"perhaps {suspicion_words(found.suspicion)}"
     if found.verdict == "nothing-significant":
-        if found.examined_nothing:
-            return "the traces say nothing of the model"
-        if any(map(was_taken_back, found.steps)):
-            return "none of the known effects, and what is left has no shape of one"
-        if any(s.effect is not None for s in found.steps):
-            return "nothing that the held-out traces confirm"
-        return "the model explains these traces within their noise and its tolerances"
+        return _nothing(found)
     shown = [s for s in found.steps if s.adopted and (s.main_joints or not s.joints)]
     findings = [_group(s, found.inseparable) if s.group else _finding(s) for s in shown]
     if found.verdict == "unknown-effect":
         findings.append("none of the known effects explains what is left")
     return "; ".join(findings) or "several effects that these traces cannot tell apart"
+
+
+def _nothing(found: Diagnosis) -> str:
+    """Why nothing is named."""
+    if found.examined_nothing:
+        return "the traces say nothing of the model"
+    if any(map(was_taken_back, found.steps)):
+        return "none of the known effects, and what is left has no shape of one"
+    if any(map(was_found_one_way, found.steps)):
+        return "nothing that all traces show"
+    if any(s.effect is not None for s in found.steps):
+        return "nothing that the held-out traces confirm"
+    return "the model explains these traces within their noise and its tolerances"
 
 
 def _group(step: Step, classes: Sequence[Inseparable]) -> str:

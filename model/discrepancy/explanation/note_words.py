@@ -89,6 +89,13 @@ def _no_experiment_left(v: Values) -> str:
     )
 
 
+def _not_exchanged(_: Values) -> str:
+    return (
+        "held-out traces were a check alone: they are too short, too slow or too quiet to be fitted to in turn, which "
+        "would show whether they lead to the same answer"
+    )
+
+
 def _not_looked_for(v: Values) -> str:
     return "not looked for: " + "; ".join(f"{effect_name(name)} ({why})" for name, why in v["effects"].items())
 
@@ -153,8 +160,8 @@ def _times(value: float, stated: float) -> str:
 
 def _suspicion_dropped(v: Values) -> str:
     return (
-        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f} in the fitted traces, and next to "
-        "none in the held-out ones when they are fitted to in turn: it is not suspected"
+        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f}, but the held-out traces, fitted "
+        "to in turn, neither show it nor raise a suspicion: it is not suspected"
     )
 
 
@@ -194,14 +201,14 @@ def _traces_contradict(v: Values) -> str:
     effects = " and ".join(effect_on(one["effect"], one["joints"]) for one in v["effects"])
     return (
         f"{effects} would explain the traces that were given to be fitted to, but not those held out, which are fitted "
-        "to here: what is missing is something else, which the library has no law for"
+        "to here: what is missing is something else, which none of the effects that were tried describes"
     )
 
 
 def _traces_exchanged(_: Values) -> str:
     return (
-        "the traces that were given to be fitted to show nothing that can be named; this was found in those held out, "
-        "which are fitted to here, and it is checked on the others, which are held out here in turn"
+        "the traces that were given to be fitted to show nothing plain that has a name: this is what those held out "
+        "show, which are fitted to here, while the others are held out in turn"
     )
 
 
@@ -224,6 +231,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "larger-noise": _larger_noise,
     "names-excluded": _names_excluded,
     "no-experiment-left": _no_experiment_left,
+    "not-exchanged": _not_exchanged,
     "not-looked-for": _not_looked_for,
     "not-separable": _not_separable,
     "nothing-held-out": _nothing_held_out,

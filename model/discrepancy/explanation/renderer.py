@@ -151,7 +151,7 @@ def refusal_words(refusal: Refusal) -> str:
         case "falls-too-little":
             words = f"on records not fitted to, the mean square falls by only {n['share']:.1%}"
         case "found-one-way":
-            words = "the held-out traces do not show it when they are fitted to in turn"
+            words = "a search in the held-out traces, which are fitted to in turn, does not find it"
         case "leaves-more-than-noise":
             words = (
                 f"it takes {n['share']:.0%} of the mean square on records not fitted to, and leaves "
@@ -194,7 +194,9 @@ def _summary_of(answer: Diagnosis) -> str:
             return "The traces say nothing of the model."
         case "nothing-significant":
             rejected = [s for s in answer.steps if not s.adopted]
-            return _nothing(next(filter(was_taken_back, rejected), rejected[0] if rejected else None))
+            first = rejected[0] if rejected else None
+            first = next(filter(was_found_one_way, rejected), first)
+            return _nothing(next(filter(was_taken_back, rejected), first))
         case "suspected":
             return _suspected(answer)
         case "unknown-effect":
@@ -208,6 +210,11 @@ def _summary_of(answer: Diagnosis) -> str:
 def was_taken_back(step: Step) -> bool:
     """Whether an effect was in the model for a while, and did not explain what it was to explain."""
     return step.refusal is not None and step.refusal.kind == "only-resembles"
+
+
+def was_found_one_way(step: Step) -> bool:
+    """Whether the fitted traces show an effect, and the held-out ones, fitted to in turn, do not."""
+    return step.refusal is not None and step.refusal.kind == "found-one-way"
 
 
 def _suspected(answer: Diagnosis) -> str:
@@ -295,6 +302,11 @@ def _nothing(rejected: Step | None) -> str:
             f"{rejected.evidence:.0f}, and taken back, because {rejected.rejected_because}. What is left without it "
             "has no shape of an effect."
         )
+    if was_found_one_way(rejected):
+        return (
+            f"Nothing is named: {_called(rejected.effect, rejected.joints)} explains more of the fitted traces, with "
+            f"evidence of {rejected.evidence:.0f}, but {rejected.rejected_because}."
+        )
     because = rejected.rejected_because or "records that were not fitted to do not confirm it"
     return (
         f"No effect holds on records that were not fitted to: {_called(rejected.effect, rejected.joints)} explains "
@@ -318,7 +330,8 @@ def _unknown(answer: Diagnosis) -> str:
     """Why none of the known effects is named, and what a torque that would explain it goes with."""
     where, joints = answer.where, answer.unexplained_joints
     places = [] if where is None else [_left_on(joints, where) if joints and where.joint is None else where.summary]
-    parts = [*places, sentence(f"no known effect explains it; {what_is_left(answer.remaining)}")]
+    known = "no known effect that all traces show" if any(map(was_found_one_way, answer.steps)) else "no known effect"
+    parts = [*places, sentence(f"{known} explains it; {what_is_left(answer.remaining)}")]
     if answer.worse_held_out:
         parts.append(
             "The fit of the tolerance parameters does not hold on held-out traces, where the error of "

@@ -9,42 +9,51 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Progress, part_of
-from model.discrepancy.diagnosis import Diagnosis, Step, Suspicion, Verdict
+from model.discrepancy.diagnosis import Diagnosis, SignalError, Step, Suspicion, Verdict
 from model.discrepancy.grounds import Note
+from model.discrepancy.inverse_dynamics.left_over import SHAPED_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.looks import Look, Records, first_finding, found_in_torques, names_of
 
 PLAIN = 100.0
-"""Evidence of all records from which effects are plain to see, so that they are named even where the held-out traces
-show nothing when they are fitted to: too little may move in these."""
+"""Evidence of all records from which an effect is plain to see, so that it is named even where the held-out traces show
+nothing of it when they are fitted to: too little may move in these."""
 
 
 def diagnose_both_ways(records: Records, progress: Progress) -> Diagnosis:
     """What traces to fit to and held-out traces show, without its sentences and the time that it took.
 
-    Raises SpecError where nothing moves beyond the noise of its readings.
+    Raises:
+        TraceError, SpecError: for traces that cannot be compared in torques, or in which nothing moves beyond the noise
+            of its readings. CancelledError: when asked to end.
     """
-    look = first_finding(records, part_of(progress, 0.0, 0.5 if records.held_out else 1.0))
-    other = _look_the_other_way(records, look.answer, part_of(progress, 0.5, 1.0))
-    return look.answer if other is None else _join(look, other)
+    if not records.held_out:
+        return first_finding(records, progress).answer
+    look = first_finding(records, part_of(progress, 0.0, 0.5))
+    if look.answer.verdict == "unknown-effect":  # what has no name here gets none elsewhere
+        return look.answer
+    try:
+        other = _look_the_other_way(records, look.answer, part_of(progress, 0.5, 1.0))
+    except (TraceError, SpecError):  # the traces serve as a check and cannot be fitted to; the first answer stands
+        other = None
+    return _with_note(look.answer, Note(kind="not-exchanged")) if other is None else _join(look, other)
 
 
 def _look_the_other_way(records: Records, found: Diagnosis, progress: Progress) -> Diagnosis | None:
-    """The answer with the traces exchanged; None where it would say nothing more.
+    """The answer with the traces exchanged; None where those held out are too short to be fitted to.
 
     Where one effect with one name is plain to see, that effect alone is looked for at first: what the others may show
-    is that they contradict it. Where something is left that has no name, no other traces give it one.
+    is that they contradict it.
     """
-    if not records.held_out or found.verdict == "unknown-effect":
-        return None
     exchanged = records.exchanged()
-    if exchanged is None or exchanged.unseen is not None:
+    if not exchanged.bears(exchanged.highest_cutoff):
         return None
     steps = found_in_torques(found)
-    if len(steps) == 1 and not steps[0].group and _evidence(steps) >= PLAIN:
+    if len(steps) == 1 and not steps[0].group and _evidence(steps[0]) >= PLAIN:
         options = records.options.model_copy(update={"effects": tuple(names_of(steps[0]))})
         alone = first_finding(replace(exchanged, options=options), part_of(progress, 0.0, 0.5)).answer
-        if alone.verdict != "unknown-effect":
+        if not _contradicts(alone, found):
             return alone
         progress = part_of(progress, 0.5, 1.0)
     return first_finding(exchanged, progress).answer
@@ -52,31 +61,48 @@ def _look_the_other_way(records: Records, found: Diagnosis, progress: Progress) 
 
 def _join(look: Look, other: Diagnosis) -> Diagnosis:
     """The answer of both: what the traces to fit to show, without what the others do not confirm, and without names
-    that the others exclude; or what the others show, where the first show nothing. What the others leave without a name
-    has none.
+    that the others exclude; or what the others show, where the first show nothing, or little that they do not confirm.
+    What the others leave without a name has none.
 
     Args:
         look: at the traces to fit to. other: the answer with fitted and held-out traces exchanged.
     """
     found, seen = found_in_torques(look.answer), found_in_torques(other)
-    if other.verdict == "unknown-effect" and found:
+    if _contradicts(other, look.answer):
         return _with_note(other, Note(kind="traces-contradict", values={"effects": [_values(step) for step in found]}))
     if not found and (seen or other.verdict == "unknown-effect"):
         return _with_note(other, Note(kind="traces-exchanged"))
     if not found:
-        return look.answer if other.suspicion is not None else _without_suspicion(look.answer)
-    missing = [step for step in found if not any(_agree(step, one) for one in seen)]
-    if missing and (len(missing) < len(found) or _evidence(found) < PLAIN):
-        return _without_excluded(look.without(missing), seen)
-    return _without_excluded(look.answer, seen)
+        return look.answer if other.suspicion is not None else _without_suspicion(look)
+    confirmed = [step for step in found if _is_shown(step, other)]
+    missing = [s for s in found if s not in confirmed and (_evidence(s) < PLAIN or _is_beside(s, confirmed))]
+    if len(missing) == len(found) and any(_evidence(step) >= PLAIN for step in seen):
+        return _with_note(other, Note(kind="traces-exchanged"))
+    return _without_excluded(look.withdraw(missing) if missing else look.answer, seen)
 
 
-def _without_suspicion(answer: Diagnosis) -> Diagnosis:
+def _contradicts(other: Diagnosis, found: Diagnosis) -> bool:
+    """Whether traces leave something without a name on a joint of an effect that was found in others, and leave it as
+    well with the model that has this effect."""
+    if other.verdict != "unknown-effect":
+        return False
+    joints = other.model_before.machine.modelled_joints
+    own = {joint for step in found_in_torques(found) for joint in step.joints or joints}
+    return bool(own & _far_above_noise(other.rmse_fit) & _far_above_noise(found.rmse_holdout))
+
+
+def _far_above_noise(errors: Sequence[SignalError]) -> set[int]:
+    """The joints whose error is no noise, by the resulting model."""
+    return {error.joint for error in errors if error.after > SHAPED_ABOVE_NOISE * error.floor}
+
+
+def _without_suspicion(look: Look) -> Diagnosis:
     """The answer without an effect that is suspected: the other traces say nothing of it."""
-    if answer.suspicion is None:
-        return answer
-    note = Note(kind="suspicion-dropped", values={**_values(answer.suspicion), "evidence": answer.suspicion.evidence})
-    return _with_note(answer.model_copy(update={"verdict": "nothing-significant", "suspicion": None}), note)
+    suspicion = look.answer.suspicion
+    if suspicion is None:
+        return look.answer
+    note = Note(kind="suspicion-dropped", values={**_values(suspicion), "evidence": suspicion.evidence})
+    return _with_note(look.withdraw(()), note)
 
 
 def _values(step: Step | Suspicion) -> dict[str, object]:
@@ -105,11 +131,29 @@ def _with_note(answer: Diagnosis, note: Note) -> Diagnosis:
     return answer.model_copy(update={"notes_data": (note, *answer.notes_data)})
 
 
-def _evidence(steps: Sequence[Step]) -> float:
-    return sum(step.evidence + (step.evidence_held_out or 0.0) for step in steps)
+def _evidence(step: Step) -> float:
+    """Evidence of all records."""
+    return step.evidence + (step.evidence_held_out or 0.0)
+
+
+def _is_shown(step: Step, other: Diagnosis) -> bool:
+    """Whether the other answer names the effect of a step, or suspects it."""
+    if any(_agree(step, one) for one in found_in_torques(other)):
+        return True
+    suspicion = other.suspicion
+    return suspicion is not None and suspicion.effect in names_of(step) and _meet(step.joints, suspicion.joints)
+
+
+def _is_beside(step: Step, others: Sequence[Step]) -> bool:
+    """Whether a step has a joint in common with any of the others: it may then be a part of what these explain."""
+    return any(_meet(step.joints, one.joints) for one in others)
 
 
 def _agree(step: Step, other: Step) -> bool:
     """Whether two steps may be of the same effect, on a joint of both."""
-    places = not step.joints or not other.joints or bool(set(step.joints) & set(other.joints))
-    return places and bool(names_of(step) & names_of(other))
+    return _meet(step.joints, other.joints) and bool(names_of(step) & names_of(other))
+
+
+def _meet(joints: Sequence[int], others: Sequence[int]) -> bool:
+    """Whether there is a joint in both; an effect without joints is of the whole machine."""
+    return not joints or not others or bool(set(joints) & set(others))

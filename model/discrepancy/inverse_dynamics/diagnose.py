@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.judged_controller import judge_controlle
 from model.discrepancy.inverse_dynamics.looks import Records
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.options import DiagnosisOptions, check_options
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model
 
 
@@ -41,8 +42,14 @@ def diagnose_torques(
     chosen = torque_options(options)
     check_options(chosen, model)
     controller = judge_controller(model, traces)
+    _refuse_unseen(chosen, controller.settled)
     records = Records(model, tuple(traces), tuple(held_out), chosen, controller, cancel or Never())
-    if records.unseen is not None:
-        raise SpecError(records.unseen)
     found = diagnose_both_ways(records, progress)
     return with_sentences(found.model_copy(update={"seconds": time.perf_counter() - begun}))
+
+
+def _refuse_unseen(options: TorqueOptions, settled: Sequence[str]) -> None:
+    """Raises SpecError for a named effect that torques do not show: not finding it would say nothing."""
+    for name in options.effects or ():
+        if name in NOT_IN_TORQUES and name not in settled:
+            raise SpecError(f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out")

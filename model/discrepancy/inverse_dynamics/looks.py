@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, part_of
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -16,7 +15,7 @@ from model.discrepancy.diagnosis import Diagnosis, Step
 from model.discrepancy.explanation.notes import on_unfinished
 from model.discrepancy.gravity_doubts import on_gravity_along
 from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
+from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.left_over import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
@@ -24,7 +23,7 @@ from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
 from model.inverse_dynamics.repeats import repeated_noise
-from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
+from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
 LOOKS = (1.0, 1 / 2, 1 / 3)
@@ -43,7 +42,7 @@ LONG = 20.0
 
 @dataclass(frozen=True)
 class Look:
-    """What torques below one cutoff showed. answer: without its sentences and the time that it took."""
+    """What torques of some records showed below one cutoff (Hz)."""
 
     workflow: TorqueWorkflow
     records: Records
@@ -51,14 +50,15 @@ class Look:
 
     @cached_property
     def answer(self) -> Diagnosis:
-        """What is said of it, as far as it has come."""
+        """What is said of it, without its sentences and the time that it took."""
         traces, held = self.records.traces, self.records.held_out
         fitted, checked = ([t.record.trace_id for t in some] for some in (traces, held))
         robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
         return self.workflow.answer(fitted, checked, self.cutoff).model_copy(update={"robot_seconds": robot})
 
-    def without(self, steps: Collection[Step]) -> Diagnosis:
-        """What is said without some of the steps, which are withdrawn because other records do not show them."""
+    def withdraw(self, steps: Collection[Step]) -> Diagnosis:
+        """Takes steps back, and what is suspected, because other records do not show them. Returns the new answer; that
+        of this look is not to be used any more."""
         self.workflow.withdraw_unconfirmed({(step.effect, step.joints) for step in steps})
         return replace(self).answer
 
@@ -66,11 +66,13 @@ class Look:
 def first_finding(records: Records, progress: Progress) -> Look:
     """What is seen below the cutoff that was asked for, or else below those that accelerations bear.
 
-    Raises SpecError where nothing moves beyond the noise of its readings.
+    Raises:
+        TraceError, SpecError: for traces that cannot be compared in torques, or in which nothing moves beyond the noise
+            of its readings. CancelledError: when asked to end.
     """
     if records.options.cutoff is not None:
         return records.below(records.options.cutoff, progress)
-    return _first_below(records, choose_cutoff(records.traces, records.model.machine), progress)
+    return _first_below(records, records.highest_cutoff, progress)
 
 
 def _first_below(records: Records, highest: float, progress: Progress) -> Look:
@@ -161,27 +163,24 @@ class Records:
         return all(t.time[-1] - t.time[0] >= max(SHORTEST, LONG / cutoff) for t in (*self.traces, *self.held_out))
 
     @property
-    def unseen(self) -> str | None:
-        """What is wrong with asking for an effect that torques do not show: not finding it would say nothing. None
-        where nothing is."""
-        for name in self.options.effects or ():
-            if name in NOT_IN_TORQUES and name not in self.controller.settled:
-                return f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out"
-        return None
+    def highest_cutoff(self) -> float:
+        """The cutoff that was asked for, or the highest one that accelerations of the traces to fit to bear, Hz.
 
-    def exchanged(self) -> Records | None:
-        """The same with fitted and held-out traces exchanged; None where those held out are too short to be fitted to,
-        or where nothing moves in them."""
-        try:
-            cutoff = self.options.cutoff or choose_cutoff(self.held_out, self.model.machine)
-        except SpecError:
-            return None
-        controller = judge_controller(self.model, self.held_out)
-        other = replace(self, traces=self.held_out, held_out=self.traces, controller=controller)
-        return other if other.bears(cutoff) else None
+        Raises SpecError where nothing moves beyond the noise of its readings.
+        """
+        return self.options.cutoff or choose_cutoff(self.traces, self.model.machine)
+
+    def exchanged(self) -> Records:
+        """The same with fitted and held-out traces exchanged. What the traces to fit to prove of the controller stays:
+        the proof is the record's, whatever is fitted."""
+        return replace(self, traces=self.held_out, held_out=self.traces)
 
     def below(self, cutoff: float, progress: Progress) -> Look:
-        """What torques below a cutoff (Hz) show."""
+        """What torques below a cutoff (Hz) show.
+
+        Raises:
+            TraceError, SpecError: for traces that cannot be compared below it. CancelledError: when asked to end.
+        """
         model = self.model
         progress(0.0, f"low-passing the records at {cutoff:g} Hz")
         records = recorded_motions(self.traces, model.machine, cutoff)

@@ -10,7 +10,7 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
-from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Suspicion, Verdict
+from model.discrepancy.diagnosis import Candidate, Diagnosis, SignalError, Step, Suspicion, Verdict
 from model.discrepancy.inverse_dynamics import both_ways
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
@@ -49,8 +49,13 @@ class Look:
     def __init__(self, said: Diagnosis) -> None:
         self.answer = said
 
-    def without(self, steps: Collection[Step]) -> Diagnosis:
+    def withdraw(self, steps: Collection[Step]) -> Diagnosis:
         return answer(*(s for s in self.answer.steps if not any(s is one for one in steps)))
+
+
+def leaves(noises: float) -> SignalError:
+    """The error of a joint that is so many times its noise."""
+    return SignalError(joint=1, before=20.0, after=noises, floor=1.0, unit="N")
 
 
 def joined(first: Diagnosis, other: Diagnosis) -> tuple[list[tuple[str | None, list[str]]], Verdict, list[str]]:
@@ -78,12 +83,27 @@ def test_one_effect_that_the_others_do_not_show_is_named_where_it_is_plain(
     assert found == (left, "named" if left else "nothing-significant", [])
 
 
+def test_little_evidence_gives_way_to_what_the_others_show_plainly() -> None:
+    little = answer(named("spring_torque", evidence=LITTLE))
+    assert joined(little, answer(named("backlash", evidence=LITTLE))) == ([], "nothing-significant", [])
+    found = joined(little, answer(named("backlash", evidence=PLENTY)))
+    assert found == ([("backlash", [])], "named", ["traces-exchanged"])
+
+
+def test_what_the_others_suspect_is_confirmed() -> None:
+    doubt = Suspicion(effect="spring_torque", joints=(1,), evidence=28.0, needed=30.0, seconds=5.0)
+    other = answer(verdict="suspected").model_copy(update={"suspicion": doubt})
+    assert joined(answer(named("spring_torque")), other) == ([("spring_torque", [])], "named", [])
+
+
 def test_of_several_effects_those_that_the_others_show_are_named() -> None:
     both = answer(named("gear_loss", evidence=PLENTY), named("stribeck_friction", evidence=PLENTY))
     assert joined(both, answer(named("gear_loss"))) == ([("gear_loss", [])], "named", [])
     elsewhere = answer(named("gear_loss"), named("stribeck_friction", joints=(2,)))
     assert joined(both, elsewhere)[0] == [("gear_loss", [])]
     assert joined(both, both)[0] == [("gear_loss", []), ("stribeck_friction", [])]
+    apart = answer(named("gear_loss", evidence=PLENTY), named("backlash", evidence=PLENTY, joints=(2,)))
+    assert joined(apart, answer(named("gear_loss")))[0] == [("gear_loss", []), ("backlash", [])]
 
 
 def test_a_group_keeps_the_names_that_both_leave() -> None:
@@ -106,10 +126,22 @@ def test_a_suspicion_stays_where_the_others_have_one_too(again: bool) -> None:
     assert found == (([], "suspected", []) if again else ([], "nothing-significant", ["suspicion-dropped"]))
 
 
-def test_what_the_others_contradict_has_no_name() -> None:
-    unknown = answer(verdict="unknown-effect")
-    found = joined(answer(named("viscous_friction", evidence=PLENTY)), unknown)
-    assert found == ([], "unknown-effect", ["traces-contradict"])
+@pytest.mark.parametrize(
+    ("with_effect", "without", "contradicted"),
+    [
+        pytest.param(8.0, 9.0, True, id="the effect does not explain the others either"),
+        pytest.param(1.2, 9.0, False, id="with the effect, the others are explained"),
+        pytest.param(8.0, 1.1, False, id="the others leave something on another joint"),
+    ],
+)
+def test_what_the_others_contradict_has_no_name(with_effect: float, without: float, contradicted: bool) -> None:
+    first = answer(named("viscous_friction", evidence=PLENTY)).model_copy(
+        update={"rmse_holdout": (leaves(with_effect),)}
+    )
+    unknown = answer(verdict="unknown-effect").model_copy(update={"rmse_fit": (leaves(without),)})
+    found = joined(first, unknown)
+    name = ([("viscous_friction", [])], "named", [])
+    assert found == (([], "unknown-effect", ["traces-contradict"]) if contradicted else name)
 
 
 def diagnosed(folder: Path, kind: str, seed: int, case: str) -> Diagnosis:
@@ -127,7 +159,7 @@ def test_a_scale_that_small_steps_do_not_show_is_found_in_a_sweep_that_was_held_
     assert (adopted.effect, adopted.joints) == ("potentiometer_gain", (1,)), found.summary
     assert adopted.parameters["joint1.potentiometer_gain.relative"].value == pytest.approx(0.0702, abs=0.005)
     assert found.robot_seconds == pytest.approx(8.4, abs=0.1), "the held-out record was fitted to"
-    assert found.notes[0].startswith("The traces that were given to be fitted to show nothing that can be named")
+    assert found.notes[0].startswith("The traces that were given to be fitted to show nothing plain that has a name")
     assert found.rmse_holdout[0].after < 0.6 * found.rmse_holdout[0].before
 
 
@@ -137,3 +169,35 @@ def test_a_drag_that_looks_viscous_in_one_motion_is_contradicted_by_another(tmp_
     assert found.verdict == "unknown-effect", found.summary
     assert not [s for s in found.steps if s.adopted]
     assert "viscous friction on joint 1 would explain" in found.notes[0].lower()
+
+
+def test_friction_that_only_one_record_shows_beside_a_loss_is_taken_back(tmp_path: Path) -> None:
+    """What a loss leaves where motion turns looks like Stribeck friction in steps, and not in a slow ramp."""
+    found = diagnosed(tmp_path, "axis-current-steps", 54738089683743, "single")
+    assert found.verdict == "named"
+    assert [s.effect for s in found.steps if s.adopted] == ["gear_loss"], found.summary
+    (refused,) = [s for s in found.steps if s.refusal is not None and s.refusal.kind == "found-one-way"]
+    assert refused.effect == "stribeck_friction"
+    assert refused.rejected_because == "a search in the held-out traces, which are fitted to in turn, does not find it"
+    assert "stribeck_friction" not in {use.name for use in found.model_after.effects}
+    assert [stage.effect for stage in found.gap.stages if stage.effect] == ["gear_loss"] if found.gap else False
+
+
+@pytest.mark.parametrize(
+    ("every", "kept", "turned"),
+    [
+        pytest.param(25, 1.0, True, id="the traces to fit to are too slow for the cutoff of the others"),
+        pytest.param(1, 0.12, False, id="the others are too short"),
+    ],
+)
+def test_traces_that_cannot_be_fitted_to_are_a_check_alone(
+    every: int, kept: float, turned: bool, tmp_path: Path
+) -> None:
+    write_world(tmp_path, "axis-current-steps", 54738089683743, "single")
+    lab = tmp_path / "lab"
+    names, *rows = (lab / "training.csv").read_text("utf-8").splitlines()
+    (lab / "part.csv").write_text("\n".join([names, *rows[: round(kept * len(rows)) : every]]) + "\n", "utf-8")
+    traces = [import_csv(lab / f"{name}.csv") for name in (("part", "held_out") if turned else ("held_out", "part"))]
+    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), traces[:1], traces[1:])
+    assert found.traces == (traces[0].record.trace_id,)
+    assert any(note.kind == "not-exchanged" for note in found.notes_data), found.verdict
