@@ -11,6 +11,7 @@ import pytest
 from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Candidate, Diagnosis, SignalError, Step, Suspicion, Verdict
+from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.inverse_dynamics import both_ways
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
@@ -158,6 +159,7 @@ def test_a_scale_that_small_steps_do_not_show_is_found_in_a_sweep_that_was_held_
     (adopted,) = [s for s in found.steps if s.adopted]
     assert (adopted.effect, adopted.joints) == ("potentiometer_gain", (1,)), found.summary
     assert adopted.parameters["joint1.potentiometer_gain.relative"].value == pytest.approx(0.0702, abs=0.005)
+    assert method_words(found).endswith("in the traces that were held out; the others were held out in turn")
     assert found.robot_seconds == pytest.approx(8.4, abs=0.1), "the held-out record was fitted to"
     assert found.notes[0].startswith("The traces that were given to be fitted to show nothing plain that has a name")
     assert found.rmse_holdout[0].after < 0.6 * found.rmse_holdout[0].before
