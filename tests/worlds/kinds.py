@@ -342,10 +342,6 @@ REPORTED: dict[str, Kind] = {
         motions=("ramps", "sines"),
         known_loop=False,
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-volts-random": replace(
         _AXIS, rate=(300.0,), bits=(17,), contacts=(TANH,), motions=("random steps", "via points")
     ),
@@ -363,6 +359,47 @@ REPORTING: dict[str, Kind] = {
     ),
     "six-volts-via": replace(
         _ANTHROPOMORPHIC, joints=6, rate=(500.0,), bits=(19,), contacts=(BRISTLE,), motions=("via points", "ramps")
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-cascade-sweep": replace(
+        _AXIS, controller=CASCADE, rate=(400.0,), bits=(18,), contacts=(SWITCH,), motions=("sweep", "random steps")
+    ),
+    "planar-volts-ramps": replace(
+        _PLANAR, rate=(300.0,), bits=(17,), contacts=(TANH,), motions=("ramps", "via points")
+    ),
+    "planar-cascade-random": replace(
+        _PLANAR, controller=CASCADE, rate=(500.0,), bits=(16,), contacts=(BRISTLE,), motions=("random steps",)
+    ),
+    "arm-current-sines": replace(
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(400.0,),
+        bits=(18,),
+        contacts=(SWITCH,),
+        body=True,
+        motions=("sines", "steps"),
+        known_loop=False,
+    ),
+    "arm-rounded-via": replace(
+        _ANTHROPOMORPHIC,
+        rounding=0.002,
+        limit=0.8,
+        rate=(250.0,),
+        bits=(18,),
+        contacts=(TANH,),
+        motions=("via points",),
+    ),
+    "six-cascade-sweep": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        controller=CASCADE,
+        rate=(300.0,),
+        bits=(20,),
+        contacts=(SWITCH,),
+        motions=("sweep", "via points"),
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""

@@ -165,6 +165,7 @@ def test_a_scale_that_small_steps_do_not_show_is_found_in_a_sweep_that_was_held_
     assert found.rmse_holdout[0].after < 0.6 * found.rmse_holdout[0].before
 
 
+@pytest.mark.slow
 def test_a_drag_that_looks_viscous_in_one_motion_is_contradicted_by_another(tmp_path: Path) -> None:
     """Quadratic drag, which the library has no law for."""
     found = diagnosed(tmp_path, "axis-current-steps", 278342827514058, "open")

@@ -22,7 +22,9 @@ from tests.worlds.folder import write_world
             *("planar-torques", 551, "load_dependent_friction", "gravity_torque_friction", (2,), "share", 0.0605),
             marks=pytest.mark.slow,
         ),
-        pytest.param("planar-cascade", 709, None, "one_sided_spring", (2,), "stiffness", 0.7155),
+        pytest.param(
+            *("planar-cascade", 709, None, "one_sided_spring", (2,), "stiffness", 0.7155), marks=pytest.mark.slow
+        ),
         pytest.param(
             *("axis-cascade", 904, None, "direction_dependent_friction", (1,), "difference", 0.115),
             marks=pytest.mark.slow,
