@@ -61,7 +61,8 @@ def _look_the_other_way(records: Records, found: Diagnosis, progress: Progress) 
 
 def _join(look: Look, other: Diagnosis) -> Diagnosis:
     """The answer of both: what the traces to fit to show, without what the others do not confirm, and without names
-    that the others exclude; or what the others show, where the first show nothing, or little that they do not confirm.
+    that the others exclude; or what the others show plainly, where the first show nothing, or little that they do not
+    confirm.
     What the others leave without a name has none.
 
     Args:
@@ -70,13 +71,14 @@ def _join(look: Look, other: Diagnosis) -> Diagnosis:
     found, seen = found_in_torques(look.answer), found_in_torques(other)
     if _contradicts(other, look.answer):
         return _with_note(other, Note(kind="traces-contradict", values={"effects": [_values(step) for step in found]}))
-    if not found and (seen or other.verdict == "unknown-effect"):
+    is_plain = any(_evidence(step) >= PLAIN for step in seen)
+    if not found and (is_plain or other.verdict == "unknown-effect"):
         return _with_note(other, Note(kind="traces-exchanged"))
     if not found:
-        return look.answer if other.suspicion is not None else _without_suspicion(look)
+        return look.answer if seen or other.suspicion is not None else _without_suspicion(look)
     confirmed = [step for step in found if _is_shown(step, other)]
     missing = [s for s in found if s not in confirmed and (_evidence(s) < PLAIN or _is_beside(s, confirmed))]
-    if len(missing) == len(found) and any(_evidence(step) >= PLAIN for step in seen):
+    if len(missing) == len(found) and is_plain:
         return _with_note(other, Note(kind="traces-exchanged"))
     return _without_excluded(look.withdraw(missing) if missing else look.answer, seen)
 

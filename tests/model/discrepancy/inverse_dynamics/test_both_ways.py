@@ -68,8 +68,9 @@ def joined(first: Diagnosis, other: Diagnosis) -> tuple[list[tuple[str | None, l
 
 
 def test_what_held_out_traces_alone_show_is_said_with_a_note() -> None:
-    found = joined(answer(), answer(named("backlash")))
+    found = joined(answer(), answer(named("backlash", evidence=PLENTY)))
     assert found == ([("backlash", [])], "named", ["traces-exchanged"])
+    assert joined(answer(), answer(named("backlash", evidence=LITTLE))) == ([], "nothing-significant", [])
     unknown = answer(verdict="unknown-effect")
     assert joined(answer(), unknown) == ([], "unknown-effect", ["traces-exchanged"])
     suspected = answer(verdict="suspected")
