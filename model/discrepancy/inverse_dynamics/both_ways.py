@@ -62,8 +62,7 @@ def _look_the_other_way(records: Records, found: Diagnosis, progress: Progress) 
 def _join(look: Look, other: Diagnosis) -> Diagnosis:
     """The answer of both: what the traces to fit to show, without what the others do not confirm, and without names
     that the others exclude; or what the others show plainly, where the first show nothing, or little that they do not
-    confirm.
-    What the others leave without a name has none.
+    confirm. What the others leave without a name has none.
 
     Args:
         look: at the traces to fit to. other: the answer with fitted and held-out traces exchanged.
