@@ -107,11 +107,13 @@ class TorqueWorkflow:
         return answer_of(outcome, traces, held_out, cutoff)
 
     def withdraw_unconfirmed(self, effects: Collection[tuple[str | None, tuple[int, ...]]]) -> None:
-        """Takes effects on joints back which the held-out records do not show when they are fitted to in turn."""
+        """Takes effects on joints back which the held-out records do not show when they are fitted to in turn; and what
+        is suspected. The ranking and the sizes at bounds were of the model with these effects."""
+        self.suspicion = None
         for step in [s for s in self.found.adopted if (s.effect, s.joints) in effects]:
             self.found = self._refuse(self.refitter.remove(self.found, step), self.found, step, ONE_WAY)
+            self.tried, self.at_bounds = (), []
         self.found = describe_in_order(self.refitter, self.found)
-        self.suspicion, self.tried, self.at_bounds = None, (), []  # they were of the model with these effects
 
     def _take_steps(self) -> None:
         for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn

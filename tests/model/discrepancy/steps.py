@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from model.discrepancy.diagnosis import UNWRITTEN, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis, Step, Verdict, Where
+from model.machine_model.model import Model
 
 NOWHERE = Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=())
 
@@ -22,3 +23,18 @@ def step(effect: str | None, joints: tuple[int, ...] = (1,), **fields: Any) -> S
         "adopted": True,
     }
     return Step(effect=effect, joints=joints, **(plain | fields))
+
+
+def answer_of(model: Model, *steps: Step, verdict: Verdict | None = None) -> Diagnosis:
+    """An answer that has adopted these steps, the model unchanged; by default with the verdict that they give."""
+    said: Verdict = "ambiguous" if any(s.group for s in steps) else "named" if steps else "nothing-significant"
+    return Diagnosis(
+        verdict=verdict or said,
+        summary="",
+        steps=steps,
+        model_before=model,
+        model_after=model,
+        traces=("a",),
+        seconds=0.0,
+        robot_seconds=0.0,
+    )

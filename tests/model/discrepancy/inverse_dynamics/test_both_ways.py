@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics import both_ways
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
-from tests.model.discrepancy.steps import step
+from tests.model.discrepancy.steps import answer_of, step
 from tests.worlds.folder import write_world
 
 MODEL = base_model(slide_machine())
@@ -25,17 +25,7 @@ LITTLE, PLENTY = 0.3 * both_ways.PLAIN, 3.0 * both_ways.PLAIN
 
 def answer(*steps: Step, verdict: Verdict | None = None) -> Diagnosis:
     """An answer that has adopted these steps."""
-    said: Verdict = "ambiguous" if any(s.group for s in steps) else "named" if steps else "nothing-significant"
-    return Diagnosis(
-        verdict=verdict or said,
-        summary="",
-        steps=steps,
-        model_before=MODEL,
-        model_after=MODEL,
-        traces=("a",),
-        seconds=0.0,
-        robot_seconds=0.0,
-    )
+    return answer_of(MODEL, *steps, verdict=verdict)
 
 
 def named(*effects: str, evidence: float = LITTLE, joints: tuple[int, ...] = (1,)) -> Step:

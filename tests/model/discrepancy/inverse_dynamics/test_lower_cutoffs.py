@@ -15,7 +15,7 @@ from model.discrepancy.inverse_dynamics.looks import JUMPING, LOOKS
 from model.effects.library import library
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
-from tests.model.discrepancy.steps import step
+from tests.model.discrepancy.steps import answer_of, step
 
 MODEL = base_model(slide_machine())
 
@@ -24,16 +24,7 @@ def answer(*effects: str, group: tuple[str, ...] = ()) -> Diagnosis:
     """An answer that names effects, one after the other, the last in a group."""
     members = tuple(Candidate(effect=name, joints=(1,), evidence=40.0) for name in group)
     steps = tuple(step(name, group=members if name == effects[-1] else ()) for name in effects)
-    return Diagnosis(
-        verdict="ambiguous" if group else "named" if effects else "nothing-significant",
-        summary="",
-        steps=steps,
-        model_before=MODEL,
-        model_after=MODEL,
-        traces=("a",),
-        seconds=0.0,
-        robot_seconds=0.0,
-    )
+    return answer_of(MODEL, *steps)
 
 
 @dataclass
