@@ -56,6 +56,11 @@ class Look:
         robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
         return self.workflow.answer(fitted, checked, self.cutoff).model_copy(update={"robot_seconds": robot})
 
+    def speaks_for(self, step: Step) -> bool:
+        """Whether these records speak for the effect of a step, though their motion does not let it be named."""
+        own = names_of(step)
+        return any(f.effect in own and meet(step.joints, f.joints) for f in self.workflow.beyond_motion)
+
     def withdraw(self, steps: Collection[Step]) -> Diagnosis:
         """Takes steps back, and what is suspected, because other records do not show them. Returns the new answer; that
         of this look is not to be used any more."""
@@ -141,6 +146,11 @@ def found_in_torques(answer: Diagnosis) -> list[Step]:
 def names_of(step: Step) -> set[str]:
     """The name that a step gives, or those of its group."""
     return {name for name in (step.effect, *(member.effect for member in step.group)) if name is not None}
+
+
+def meet(joints: Sequence[int], others: Sequence[int]) -> bool:
+    """Whether there is a joint in both; an effect without joints is of the whole machine."""
+    return not joints or not others or bool(set(joints) & set(others))
 
 
 def _jumps(name: str) -> bool:

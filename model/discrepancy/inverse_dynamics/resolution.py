@@ -26,6 +26,8 @@ from model.machine_model.parameter import Parameter
 OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_inductance"})
 """Effects whose torque follows how a torque changes in time: they cut short or shift what is fast, and noise of
 accelerations, or a gear that rattles, is fast."""
+LIMIT = "supply_limit"
+"""The effect of a drive that gives no more than a limit."""
 WARMING = "resistance_rise"
 """The effect of a winding that warms with time, whatever its current."""
 REPEATING = "periodic_disturbance"
@@ -46,6 +48,10 @@ PLACES = 101
 """Places of a sensor's range at which its scale is looked at."""
 HALF = 0.5
 """Share of its mean square that such an effect leaves at most."""
+LIMITED = 0.01
+"""Least share of the record in which the drive is above a limit that is named, so that the low-pass does not decide.
+Limits of hidden ones lie below 1.6 % of it and more; of spikes that filled 0.3 % of it, one of 4 % less than their
+highest was said to be there, on sound arms (decision 0073)."""
 AT_BOUND = 1.01
 """Ratio to its lower bound below which a speed is the bound's."""
 AT_END = 1e-6
@@ -77,7 +83,7 @@ def _is_of_no_machine(found: Fitted) -> bool:
         return True
     values = found.fit.values
     ends = (_warms_at_once(p, values[p.name]) or _fades_beyond(p, values[p.name]) for p in found.parameters)
-    return any(ends) or _is_uneven(found)
+    return any(ends) or _is_uneven(found) or _is_hardly_reached(found)
 
 
 def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
@@ -106,6 +112,25 @@ def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list
 def _is_uneven(found: Fitted) -> bool:
     """Whether a bent sensor's reading would be more uneven than any sensor's is, somewhere in its range."""
     return found.effect == BENT and any(steepest_bend(_as_fitted(found), joint) > MOST_UNEVEN for joint in found.joints)
+
+
+def _is_hardly_reached(found: Fitted) -> bool:
+    """Whether this is a limit above which the drive hardly ever is."""
+    if found.effect != LIMIT:
+        return False
+    for p in found.parameters:
+        drives = np.concatenate([np.abs(r.commanded[:, p.joints[0] - 1]) for r in found.fit.balance.records])
+        if np.mean(drives > found.fit.values[p.name]) < LIMITED:
+            return True
+    return False
+
+
+def is_beyond_motion(found: Fitted, case: TorqueCase) -> bool:
+    """Whether the recorded motion is why this effect cannot be named: it repeats as often, or ends where the motion
+    shows no more of it (a ripple of less than a wave). The records then do not contradict it."""
+    known = found.model.by_name
+    narrowed = [p for p in found.parameters if (p.low, p.high) != (known[p.name].low, known[p.name].high)]
+    return _repeats_with_motion(found, case) or any(_is_at_end(p, found.fit.values[p.name]) for p in narrowed)
 
 
 def _as_fitted(found: Fitted) -> Model:
@@ -171,8 +196,13 @@ def ends_at_bound(p: Parameter, value: float) -> bool:
     """Whether a size, or the rate of a tone, ended at the end of what it may be, where a fit would go on: no machine
     has it, and what it takes is something else. The slowest ripple is a spring."""
     is_shape = p.effect is not None and p.null is None and p.rate_of is None
-    if is_shape or p.effect == "supply_limit":  # records bound a limit
+    if is_shape or p.effect == LIMIT:  # records bound a limit
         return False
+    return _is_at_end(p, value)
+
+
+def _is_at_end(p: Parameter, value: float) -> bool:
+    """Whether a number is at one of its bounds that is not its null value."""
     ends = [bound for bound in (p.low, p.high) if math.isfinite(bound) and bound != p.null]
     return any(abs(value - end) <= AT_END * max(abs(end), p.deviation or 0.0) for end in ends)
 

@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
-from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
+from model.discrepancy.inverse_dynamics.resolution import is_beyond_motion, is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -62,6 +62,8 @@ class TorqueWorkflow:
     ended: list[Fitted] = field(default_factory=list)
     """Candidates of a step whose sizes ended there only when the whole model was fitted with them."""
     suspicion: Suspicion | None = None
+    beyond_motion: tuple[Fitted, ...] = ()
+    """Candidates of the last step with enough evidence that the recorded motion does not let be named."""
 
     def __post_init__(self) -> None:
         self.refitter = Refitter(self.model, self.case)
@@ -129,6 +131,7 @@ class TorqueWorkflow:
                 self.tried = list_tried(self.refitter.standing(self.found), findings)
                 self.suspicion = suspect(self.refitter.standing(self.found), findings)
                 self.at_bounds = self._on_sizes_at_bounds(findings)
+                self.beyond_motion = self._beyond_motion(findings)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
@@ -173,6 +176,12 @@ class TorqueWorkflow:
         enough = [f for f in (*self.ended, *found.unresolved) if f.evidence >= self.case.options.least_evidence]
         best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
         return [_size_at_bound(f) for f in best.values()]
+
+    def _beyond_motion(self, found: Findings) -> tuple[Fitted, ...]:
+        """What would have been enough evidence of all records, had the motion shown more of it."""
+        least = self.case.options.least_evidence
+        enough = (f for f in found.unresolved if f.evidence > 0 and f.evidence + f.told >= least)
+        return tuple(f for f in enough if is_beyond_motion(f, self.case))
 
     def _adopt(self, found: Found, findings: Findings) -> Found:
         """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
