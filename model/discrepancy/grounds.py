@@ -52,6 +52,7 @@ NoteKind = Literal[
     "one-class",
     "positions-of-links",
     "resting-left-out",
+    "shakes-above-cutoff",
     "size-at-bound",
     "stated-numbers-moved",
     "suspicion-dropped",

@@ -122,6 +122,17 @@ def _resting_left_out(_: Values) -> str:
     return "samples at which a joint rests are left out: friction holds it with whatever torque that takes"
 
 
+def _shakes_above_cutoff(v: Values) -> str:
+    def of(joint: Values) -> str:
+        return f"joint {joint['joint']} at {joint['frequency']:.2g} Hz ({joint['factor']:.2g} times)"
+
+    return (
+        f"joints shake faster than torques are compared: {', '.join(map(of, v['joints']))}, in brackets their "
+        f"acceleration above {v['cutoff']:g} Hz over that below. What makes them shake is not looked for: a gear that "
+        "gives or has play, a delay, or gains that are too high for these; a record with lower gains would tell"
+    )
+
+
 def _size_at_bound(v: Values) -> str:
     return (
         f"{effect_on(v['effect'], v['joints'])} would explain more (evidence {v['evidence']:.0f}), but only with "
@@ -238,6 +249,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "one-class": _one_class,
     "positions-of-links": _positions_of_links,
     "resting-left-out": _resting_left_out,
+    "shakes-above-cutoff": _shakes_above_cutoff,
     "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
     "suspicion-dropped": _suspicion_dropped,

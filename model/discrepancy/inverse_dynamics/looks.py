@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis, Step
 from model.discrepancy.explanation.notes import on_unfinished
 from model.discrepancy.gravity_doubts import on_gravity_along
+from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.left_over import FRICTION
@@ -23,6 +24,7 @@ from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
 from model.inverse_dynamics.repeats import repeated_noise
+from model.inverse_dynamics.shaking import find_shaking
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
@@ -206,7 +208,14 @@ class Records:
         steps.run()
         steps.notes += on_gravity_along(model, records)
         steps.notes += on_unfinished((*self.traces, *self.held_out))
+        steps.notes += self._on_shaking(cutoff)
         return Look(steps, self, cutoff)
+
+    def _on_shaking(self, cutoff: float) -> tuple[Note, ...]:
+        """A warning about joints that shake faster than torques are compared; none where none does."""
+        shaking = find_shaking((*self.traces, *self.held_out), self.model.machine, cutoff)
+        values = {"cutoff": cutoff, "joints": [asdict(one) for one in shaking]}
+        return (Note(kind="shakes-above-cutoff", values=values, warning=True),) if shaking else ()
 
 
 def _root_mean_squares(torques: Sequence[Floats]) -> Floats:

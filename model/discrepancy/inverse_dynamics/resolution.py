@@ -126,11 +126,10 @@ def _is_hardly_reached(found: Fitted) -> bool:
 
 
 def is_beyond_motion(found: Fitted, case: TorqueCase) -> bool:
-    """Whether the recorded motion is why this effect cannot be named: it repeats as often, or ends where the motion
-    shows no more of it (a ripple of less than a wave). The records then do not contradict it."""
-    known = found.model.by_name
-    narrowed = [p for p in found.parameters if (p.low, p.high) != (known[p.name].low, known[p.name].high)]
-    return _repeats_with_motion(found, case) or any(_is_at_end(p, found.fit.values[p.name]) for p in narrowed)
+    """Whether the recorded motion is why this effect cannot be named: it repeats as often as the effect, or within less
+    than a wave of it. The records then do not contradict it."""
+    rates = [p for p in found.parameters if p.rate_of is not None and p.low > found.model.by_name[p.name].low]
+    return _repeats_with_motion(found, case) or any(_is_at_end(p, found.fit.values[p.name]) for p in rates)
 
 
 def _as_fitted(found: Fitted) -> Model:

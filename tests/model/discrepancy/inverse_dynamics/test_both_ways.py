@@ -28,17 +28,23 @@ def answer(*steps: Step, verdict: Verdict | None = None) -> Diagnosis:
     return answer_of(MODEL, *steps, verdict=verdict)
 
 
-def named(*effects: str, evidence: float = LITTLE, joints: tuple[int, ...] = (1,)) -> Step:
-    """A step that names an effect, or a group of them."""
+def named(
+    *effects: str, evidence: float = LITTLE, held_out: float = both_ways.CONFIRMED, joints: tuple[int, ...] = (1,)
+) -> Step:
+    """A step that names an effect, or a group of them; `held_out` of its evidence is of held-out traces."""
     members = tuple(Candidate(effect=name, joints=joints, evidence=40.0) for name in effects)
-    return step(effects[0], joints, evidence=evidence, group=members if len(members) > 1 else ())
+    parts = {"evidence": evidence - held_out, "evidence_held_out": held_out}
+    return step(effects[0], joints, **parts, group=members if len(members) > 1 else ())
 
 
 class Look:
     """A look that withdraws steps without fitting anything."""
 
-    def __init__(self, said: Diagnosis) -> None:
-        self.answer = said
+    def __init__(self, said: Diagnosis, spoken_for: tuple[str, ...] = ()) -> None:
+        self.answer, self.spoken_for = said, spoken_for
+
+    def speaks_for(self, step: Step) -> bool:
+        return step.effect in self.spoken_for
 
     def withdraw(self, steps: Collection[Step]) -> Diagnosis:
         return answer(*(s for s in self.answer.steps if not any(s is one for one in steps)))
@@ -49,10 +55,17 @@ def leaves(noises: float) -> SignalError:
     return SignalError(joint=1, before=20.0, after=noises, floor=1.0, unit="N")
 
 
-def joined(first: Diagnosis, other: Diagnosis) -> tuple[list[tuple[str | None, list[str]]], Verdict, list[str]]:
-    """Names with their groups, verdict and kinds of notes of the answer of both."""
+def joined(
+    first: Diagnosis, other: Diagnosis, spoken_for: tuple[str, ...] = ()
+) -> tuple[list[tuple[str | None, list[str]]], Verdict, list[str]]:
+    """Names with their groups, verdict and kinds of notes of the answer of both.
+
+    Args:
+        spoken_for: effects for which the others speak, though their motion does not let them be named.
+    """
     look: Any = Look(first)
-    found = both_ways._join(look, other)
+    exchanged: Any = Look(other, spoken_for)
+    found = both_ways._join(look, exchanged)
     names = [(s.effect, [m.effect for m in s.group]) for s in found.steps]
     return names, found.verdict, [note.kind for note in found.notes_data]
 
@@ -67,11 +80,18 @@ def test_what_held_out_traces_alone_show_is_said_with_a_note() -> None:
     assert joined(answer(), suspected) == ([], "nothing-significant", [])
 
 
-@pytest.mark.parametrize(("evidence", "left"), [(LITTLE, []), (PLENTY, [("spring_torque", [])])])
+@pytest.mark.parametrize(
+    ("evidence", "held_out", "left"),
+    [
+        pytest.param(LITTLE, 20.0, [], id="little"),
+        pytest.param(PLENTY, 20.0, [("spring_torque", [])], id="plain"),
+        pytest.param(PLENTY, 0.0, [], id="plain in the fitted traces alone"),
+    ],
+)
 def test_one_effect_that_the_others_do_not_show_is_named_where_it_is_plain(
-    evidence: float, left: list[tuple[str, list[str]]]
+    evidence: float, held_out: float, left: list[tuple[str, list[str]]]
 ) -> None:
-    found = joined(answer(named("spring_torque", evidence=evidence)), answer())
+    found = joined(answer(named("spring_torque", evidence=evidence, held_out=held_out)), answer())
     assert found == (left, "named" if left else "nothing-significant", [])
 
 
@@ -134,6 +154,14 @@ def test_what_the_others_contradict_has_no_name(with_effect: float, without: flo
     found = joined(first, unknown)
     name = ([("viscous_friction", [])], "named", [])
     assert found == (([], "unknown-effect", ["traces-contradict"]) if contradicted else name)
+    assert joined(first, unknown, ("viscous_friction",)) == name, "too little moves for it to be named"
+
+
+def test_what_the_others_speak_for_without_naming_it_is_confirmed() -> None:
+    """A ripple of which a record shows half a wave."""
+    little = answer(named("torque_ripple"))
+    assert joined(little, answer()) == ([], "nothing-significant", [])
+    assert joined(little, answer(), ("torque_ripple",)) == ([("torque_ripple", [])], "named", [])
 
 
 def diagnosed(folder: Path, kind: str, seed: int, case: str) -> Diagnosis:
@@ -154,6 +182,12 @@ def test_a_scale_that_small_steps_do_not_show_is_found_in_a_sweep_that_was_held_
     assert found.robot_seconds == pytest.approx(8.4, abs=0.1), "the held-out record was fitted to"
     assert found.notes[0].startswith("The traces that were given to be fitted to show nothing plain that has a name")
     assert found.rmse_holdout[0].after < 0.6 * found.rmse_holdout[0].before
+
+
+@pytest.mark.slow
+def test_a_ripple_of_which_the_others_show_less_than_a_wave_keeps_its_name(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, "planar-current-via", 8874690243275, "single")
+    assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("torque_ripple", (2,))], found.summary
 
 
 @pytest.mark.slow

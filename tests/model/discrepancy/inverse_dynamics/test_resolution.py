@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.resolution import (
     MOST_UNEVEN,
+    _is_hardly_reached,
     ends_at_bound,
     is_far,
     is_far_everywhere,
     steepest_bend,
 )
+from model.discrepancy.inverse_dynamics.search import Fitted
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -236,3 +239,21 @@ def test_a_sound_rig_of_another_world_is_sound(kind: str, seed: int, tmp_path: P
     training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
     found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
     assert found.verdict == "nothing-significant", found.summary
+
+
+class _Fit:
+    """A fit along one record whose drive is above 9 V in a share of its samples."""
+
+    def __init__(self, limit: float, above: float) -> None:
+        drive = np.where(np.arange(1000) < 1000 * above, 12.0, -3.0)[:, None]
+        self.balance = SimpleNamespace(records=[SimpleNamespace(commanded=drive)])
+        self.values = {"joint1.supply_limit.voltage": limit}
+
+
+@pytest.mark.parametrize(("above", "hardly"), [(0.003, True), (0.02, False)])
+def test_a_limit_that_the_drive_hardly_ever_exceeds_is_none(above: float, hardly: bool) -> None:
+    """Spikes of one sample are smeared by the low-pass, and sound drives seem to be cut off there."""
+    model = base_model(rigs.bench_machine()).with_effect("supply_limit", (1,))
+    own = tuple(p for p in model.parameters if p.effect == "supply_limit")
+    fit: Any = _Fit(9.0, above)
+    assert _is_hardly_reached(Fitted("supply_limit", (1,), model, own, fit, 150.0)) == hardly
