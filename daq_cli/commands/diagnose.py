@@ -19,7 +19,7 @@ from daq_cli.models.model_input import (
     Comparison,
     ComparisonOption,
     EffectFileOption,
-    HoldoutOption,
+    JudgedByOption,
     MostOption,
     OutOption,
     ReportOption,
@@ -64,7 +64,7 @@ def diagnose(
     model: Annotated[
         str | None, typer.Option(help=f"The model to examine (default: the traces' machine). {MODEL_HELP}")
     ] = None,
-    holdout: HoldoutOption = None,
+    holdout: JudgedByOption = None,
     effects: Annotated[
         str | None,
         typer.Option(

@@ -62,6 +62,15 @@ HoldoutOption = Annotated[
         autocompletion=completion.traces,
     ),
 ]
+JudgedByOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--holdout",
+        help="A trace to judge by, which what is named was not fitted to. Where torques are compared, it is fitted to "
+        "in turn, and the others judge. May be repeated.",
+        autocompletion=completion.traces,
+    ),
+]
 
 EffectFileOption = Annotated[
     list[Path] | None,

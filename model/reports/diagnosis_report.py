@@ -28,7 +28,7 @@ from model.reports.motion import motion_section
 from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed, trace_names
 
 VERDICTS = {
-    "nothing-significant": "nothing significant: the model explains these traces within their noise",
+    "nothing-significant": "nothing significant",
     "named": "named",
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
     "suspected": "suspected: more of this motion would settle it",

@@ -360,10 +360,6 @@ REPORTED: dict[str, Kind] = {
     "six-volts-via": replace(
         _ANTHROPOMORPHIC, joints=6, rate=(500.0,), bits=(19,), contacts=(BRISTLE,), motions=("via points", "ramps")
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-cascade-sweep": replace(
         _AXIS, controller=CASCADE, rate=(400.0,), bits=(18,), contacts=(SWITCH,), motions=("sweep", "random steps")
     ),
@@ -400,6 +396,54 @@ REPORTING: dict[str, Kind] = {
         bits=(20,),
         contacts=(SWITCH,),
         motions=("sweep", "via points"),
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-current-sweep": replace(
+        _AXIS,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(17,),
+        contacts=(BRISTLE,),
+        motions=("sweep", "ramps"),
+        known_loop=False,
+    ),
+    "planar-current-ramps": replace(
+        _PLANAR,
+        drive=CURRENT,
+        rate=(300.0,),
+        bits=(17,),
+        contacts=(SWITCH,),
+        motions=("ramps", "sines"),
+        known_loop=False,
+        body=True,
+    ),
+    "planar-cascade-via": replace(
+        _PLANAR, controller=CASCADE, rate=(400.0,), bits=(17,), contacts=(TANH,), motions=("via points", "steps")
+    ),
+    "arm-volts-random": replace(
+        _ANTHROPOMORPHIC, rate=(200.0,), bits=(17,), contacts=(BRISTLE,), motions=("random steps", "ramps")
+    ),
+    "arm-cascade-sines": replace(
+        _ANTHROPOMORPHIC,
+        controller=CASCADE,
+        rate=(300.0,),
+        bits=(18,),
+        contacts=(TANH,),
+        motions=("sines", "sweep"),
+    ),
+    "six-current-steps": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        drive=CURRENT,
+        rate=(400.0,),
+        bits=(20,),
+        contacts=(BRISTLE,),
+        body=True,
+        motions=("steps", "sines"),
+        known_loop=False,
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""

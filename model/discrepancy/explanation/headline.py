@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
 from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
+from model.discrepancy.explanation.left_words import left_words
 from model.discrepancy.explanation.renderer import (
     not_examined_words,
     size_words,
@@ -16,6 +17,7 @@ from model.discrepancy.explanation.renderer import (
 )
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
+from model.units import with_unit
 
 SHOWN = 3
 """Members of a group that a headline names."""
@@ -49,7 +51,25 @@ def _nothing(found: Diagnosis) -> str:
         return "nothing that all traces show"
     if any(s.effect is not None for s in found.steps):
         return "nothing that the held-out traces confirm"
-    return "the model explains these traces within their noise and its tolerances"
+    left, moved = left_words(found), _moved_number(found)
+    if left is not None:
+        why = f"nothing has the shape of a known effect; {left}"
+    elif moved is not None:
+        why = "the model explains these traces within their noise"
+    else:
+        why = "the model explains these traces within their noise and its tolerances"
+    return why if moved is None else f"{why}; {moved}"
+
+
+def _moved_number(found: Diagnosis) -> str | None:
+    """The number of the machine file whose estimate is farthest from what it states, as a clause; None where all are
+    near."""
+    for note in found.notes_data:
+        if note.kind == "stated-numbers-moved" and note.warning:
+            farthest = note.values["numbers"][0]
+            stated = with_unit(f"{farthest['expected']:.3g}", farthest["unit"])
+            return f"{farthest['name']} comes out at {farthest['value']:.3g}, where {stated} is stated"
+    return None
 
 
 def _group(step: Step, classes: Sequence[Inseparable]) -> str:

@@ -89,10 +89,11 @@ def _no_experiment_left(v: Values) -> str:
     )
 
 
-def _not_exchanged(_: Values) -> str:
+def _not_exchanged(v: Values) -> str:
+    why = f" ({v['why']})" if "why" in v else ""
     return (
-        "held-out traces were a check alone: they are too short, too slow or too quiet to be fitted to in turn, which "
-        "would show whether they lead to the same answer"
+        "held-out traces were a check alone: they are too short, too slow or too quiet to be fitted to in turn"
+        f"{why}, which would show whether they lead to the same answer"
     )
 
 
@@ -156,9 +157,9 @@ def _stated_numbers_moved(v: Values) -> str:
         return f"what is named differs from what the machine file states: {named}"
     subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
     return (
-        f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. File "
-        "and records may not be of the same machine (units, signs, the direction of gravity?), or an effect is missing "
-        "that was not found"
+        f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. The "
+        "file may be wrong there, file and records may not be of the same machine (units, signs, the direction of "
+        "gravity?), or an effect is missing that was not found"
     )
 
 

@@ -39,8 +39,8 @@ def diagnose_both_ways(records: Records, progress: Progress) -> Diagnosis:
         return look.answer
     try:
         other = _look_the_other_way(records, look.answer, part_of(progress, 0.5, 1.0))
-    except (TraceError, SpecError):  # the traces serve as a check and cannot be fitted to; the first answer stands
-        other = None
+    except (TraceError, SpecError) as error:  # a check all the same; the first answer stands
+        return _with_note(look.answer, Note(kind="not-exchanged", values={"why": str(error)}))
     return _with_note(look.answer, Note(kind="not-exchanged")) if other is None else _join(look, other)
 
 
@@ -75,16 +75,26 @@ def _join(look: Look, exchanged: Look) -> Diagnosis:
     found, seen = found_in_torques(look.answer), found_in_torques(other)
     if _contradicts(exchanged, look.answer):
         return _with_note(other, Note(kind="traces-contradict", values={"effects": [_values(step) for step in found]}))
-    is_plain = any(_is_plain(step) for step in seen)
-    if not found and (is_plain or other.verdict == "unknown-effect"):
-        return _with_note(other, Note(kind="traces-exchanged"))
     if not found:
+        plain = _plain_alone(exchanged)
+        if plain is not None:
+            return _with_note(plain, Note(kind="traces-exchanged"))
         return look.answer if seen or other.suspicion is not None else _without_suspicion(look)
     confirmed = [step for step in found if _is_shown(step, other) or exchanged.speaks_for(step)]
     missing = [s for s in found if s not in confirmed and (not _is_plain(s) or _is_beside(s, confirmed))]
-    if len(missing) == len(found) and is_plain:
-        return _with_note(other, Note(kind="traces-exchanged"))
+    if len(missing) == len(found) and any(map(_is_plain, seen)):
+        plain = _plain_alone(exchanged)
+        if plain is not None:
+            return _with_note(plain, Note(kind="traces-exchanged"))
     return _without_excluded(look.withdraw(missing) if missing else look.answer, seen)
+
+
+def _plain_alone(exchanged: Look) -> Diagnosis | None:
+    """What exchanged traces show plainly, without what they show beside it: an effect, or that none of the known ones
+    explains them. None where they show neither."""
+    weak = [step for step in found_in_torques(exchanged.answer) if not _is_plain(step)]
+    answer = exchanged.withdraw(weak) if weak else exchanged.answer
+    return answer if found_in_torques(answer) or answer.verdict == "unknown-effect" else None
 
 
 def _contradicts(exchanged: Look, found: Diagnosis) -> bool:

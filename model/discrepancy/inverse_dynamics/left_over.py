@@ -8,15 +8,18 @@ import numpy as np
 
 from model.discrepancy.diagnosis import RemainingShape, Step
 from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, bends_with_speed, remaining_shapes
+from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.resolution import ends_at_bound
 from model.discrepancy.inverse_dynamics.standing import Standing
+from model.discrepancy.thresholds import FAR_OFF
 from model.effects.library import find_named_effect
 
 FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
-2.6, where friction turns (docs/worlds.md)."""
+2.6, where friction turns (docs/worlds-trials.md)."""
 SHAPED_ABOVE_NOISE = 3.0
 """The same where a shape explains much of it (`ANOTHER_LAW`): the shape says as well that something is missing."""
 LONG_MEMORY = 4.0
@@ -55,14 +58,29 @@ def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
         lowered: names of numbers that the file states and that steps have lowered.
     """
     shapes, left = remaining_shapes(standing.now, standing.case), set(joints_left_over(standing))
+    starved = left & _starved(standing.now)
     for index, step in enumerate(standing.steps):
         joints = left & set(step.joints) if step.adopted else ()
         lowers = bool(lowered & set(step.parameters))
         if step.adopted and _ended(standing, step):
             return index
-        if any(lowers or _bends(standing.steps, step, j, shapes) or rubs_elsewhere(step, j, shapes) for j in joints):
+        if any(
+            lowers
+            or _bends(standing.steps, step, j, shapes)
+            or rubs_elsewhere(step, j, shapes)
+            or (j in starved and _is_of(step, FRICTION))
+            for j in joints
+        ):
             return index
     return None
+
+
+def _starved(now: BalanceFit) -> set[int]:
+    """The joints of which the fit has lowered a friction that the file states far below that: another friction that was
+    added stands for it."""
+    stated = [u.as_stated for u in now.unknowns if u.parameter.effect is not None and u.parameter.deviation]
+    far = [u for u in stated if prior_distance(u, now.values[u.name])[0] <= -FAR_OFF]
+    return {joint for u in far if _family(u.parameter.effect) == FRICTION for joint in u.parameter.joints}
 
 
 def _ended(standing: Standing, step: Step) -> bool:
@@ -74,9 +92,18 @@ def _ended(standing: Standing, step: Step) -> bool:
 def rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
     """Whether a step names friction or a sensor where friction is left that goes with the place: a tight spot looks
     like more friction everywhere, and like a bent sensor."""
-    if step.effect is None or find_named_effect(step.effect).shared_name.family not in (FRICTION, SENSOR):
+    if not _is_of(step, FRICTION, SENSOR):
         return False
     return any(s.joint == joint and s.against_motion and s.explained >= PART_OF_IT for s in shapes)
+
+
+def _is_of(step: Step, *families: str) -> bool:
+    """Whether a step names an effect of one of some families."""
+    return step.effect is not None and _family(step.effect) in families
+
+
+def _family(effect: str | None) -> str | None:
+    return None if effect is None else find_named_effect(effect).shared_name.family
 
 
 def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
@@ -87,4 +114,4 @@ def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[Remai
 def _only_viscous(steps: Sequence[Step], joint: int) -> bool:
     """Whether viscous friction is the only friction that was named on a joint."""
     named = {s.effect for s in steps if s.adopted and joint in s.joints and s.effect is not None}
-    return {name for name in named if find_named_effect(name).shared_name.family == FRICTION} == {VISCOUS}
+    return {name for name in named if _family(name) == FRICTION} == {VISCOUS}

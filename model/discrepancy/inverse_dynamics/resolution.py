@@ -217,8 +217,9 @@ def is_far(p: Parameter, value: float) -> bool:
     """Whether a number is far from what the file states.
 
     Friction is stated to a share of itself, and that roughly: twice and half as much are then equally far. In distances
-    no number down to zero is far from one that is stated to a quarter of itself or worse. A machine's own numbers are
-    far by their distance.
+    no number down to zero is far from one that is stated to a quarter of itself or worse; and a file that states a
+    third of a friction, to 30 % of that, is off by two of the deviations of what is there, and by seven of its own.
+    A machine's own numbers are far by their distance.
     """
     deviation = p.deviation or 0.0
     if p.effect is None or p.low < 0.0 or p.value <= 0.0:

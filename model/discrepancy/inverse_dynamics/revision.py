@@ -64,5 +64,5 @@ def _with_errors(refitter: Refitter, step: Step, before: Found, after: Found) ->
     }
     if case.held_out:
         update["rmse_holdout"] = signal_errors(after.model, others[0], others[1], case.noise)
-        update["excess_removed_holdout"] = excess_removed(case.noise, fitted[0], others[0], others[1])
+        update["excess_removed_holdout"] = excess_removed(case.noise, (fitted[0], fitted[1]), others[0], others[1])
     return step.model_copy(update=update)

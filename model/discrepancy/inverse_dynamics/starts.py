@@ -39,6 +39,9 @@ THRESHOLD_SHARES = tuple(float(share) for share in np.geomspace(0.02, 0.6, 16))
 a search goes from sample to sample, and finds a threshold only from near it."""
 PASSED = 0.3
 """Least share of the record in which the drive is above a threshold that is tried."""
+LEAST_STRETCH = 0.01
+"""Least share of a joint's travel within which a spring on one side is taut. Where a joint dwells at the end of its
+motion, a stiff one that is taut for a thousandth of the travel was found on a sound arm; friction holds it there."""
 LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
 """Limits of the drive that are tried, as shares of its largest value."""
 UNLIMITED = 0.7
@@ -89,7 +92,9 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
         return replace(p, low=min(p.high, max(p.low, slowest)), high=min(p.high, fastest))
     if p.effect == "one_sided_spring" and p.null is None:
         low, high = np.quantile(place.positions, TAUT_WITHIN)
-        return replace(p, low=float(low), high=float(high))
+        ends = LEAST_STRETCH * float(np.ptp(place.positions))
+        first, last = float(place.positions.min()) + ends, float(place.positions.max()) - ends
+        return replace(p, low=max(float(low), first), high=min(float(high), last))
     if p.effect == "resistance_drift" and p.null is not None:
         return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
     if p.effect == "amplifier_threshold":

@@ -52,15 +52,16 @@ def stated_trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceF
 
 
 def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
-    """The machine's own numbers that the fit has moved, those of one kind on one joint together. None where the user
-    has named the effects to look for."""
-    if case.options.effects is not None:
-        return
+    """The machine's own numbers that the fit has moved, those of one kind on one joint together; where the effects to
+    look for are named, those among them."""
+    asked = case.options.effects
     tolerances = _expected(now)
     found: dict[tuple[str, tuple[int, ...]], list[tuple[Parameter, Unknown]]] = {}
     for p in model.parameters:
         name, u = NUMBERS.get((p.component, p.part)), tolerances.get(p.name)
         if name is None or u is None or p.effect is not None or len(p.joints) != 1:
+            continue
+        if asked is not None and name not in asked:
             continue
         if case.options.joints and p.joints[0] not in case.options.joints:
             continue

@@ -55,7 +55,7 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
         rmse_fit=signal_errors(model, compared.fitted_before, compared.fitted_after, case.noise),
         rmse_holdout=signal_errors(model, compared.before, compared.after, case.noise) if case.held_out else (),
         excess_removed_holdout=(
-            excess_removed(case.noise, compared.fitted_before, compared.before, compared.after)
+            excess_removed(case.noise, (compared.fitted_before, compared.fitted_after), compared.before, compared.after)
             if case.held_out
             else None
         ),
@@ -144,19 +144,21 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     return of_records < needed and rival.evidence >= SUSPECTED
 
 
-def excess_removed(noise: Floats, fitted: Floats, before: Floats, after: Floats) -> float | None:
-    """Share of the held-out variance above noise that is gone, joints weighted by their fitted mean square.
+def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats, after: Floats) -> float | None:
+    """Share of the held-out variance above noise that is gone on the joints whose mean square fell in the fit, weighted
+    by their fitted mean square.
 
     Args:
         noise: (n,) standard deviation of a residual of which only noise is left. fitted: (n,) mean squares on the
-            fitted records. before, after: (n,) on held-out ones.
+            fitted records, before and after. before, after: (n,) on held-out ones.
     """
     variance = noise**2
     excess = np.maximum(before - variance, 1e-300)
-    usable = np.isfinite(before) & np.isfinite(after) & (before > ABOVE_NOISE * variance)
+    fell = fitted[1] < (1 - holdout.AFFECTED) * fitted[0]
+    usable = np.isfinite(before) & np.isfinite(after) & (before > ABOVE_NOISE * variance) & fell
     if not usable.any():
         return None
-    weight = np.where(usable, 1 / np.maximum(fitted, 1e-300), 0.0)
+    weight = np.where(usable, 1 / np.maximum(fitted[0], 1e-300), 0.0)
     return float((weight * (before - after))[usable].sum() / (weight * excess)[usable].sum())
 
 
