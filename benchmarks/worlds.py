@@ -77,13 +77,13 @@ def score(truth: Json, answer: Json | None) -> Score:
         named = any(len(names) == 1 for names in steps) and verdict != "suspected"
         return Score(honest=verdict in HONEST and not named)
     known = [{_known_as(hidden)} for hidden in truth["hidden"]]
+    parts = [right | set(hidden.get("beside", ())) for right, hidden in zip(known, truth["hidden"], strict=True)]
     if case == "pair":
         single = [names for names in steps if len(names) == 1]
         found = [any(names & right for names in single) for right in known]
-        no_other = all(any(names & right for right in known) for names in steps)
+        no_other = all(any(names & part for part in parts) for names in steps)
         return Score(both=verdict == "named" and all(found) and no_other)
-    right, joint = known[0], truth["hidden"][0]["joint"]
-    part = right | set(truth["hidden"][0].get("beside", ()))
+    right, part, joint = known[0], parts[0], truth["hidden"][0]["joint"]
     strict = verdict == "named" and all(len(names) == 1 and names <= part for names in steps)
     strict = strict and any(names == right for names in steps)
     answered = any(names & right for names in steps)

@@ -181,6 +181,10 @@ def test_a_gear_loss_of_one_direction_may_be_told_with_its_difference() -> None:
     by_direction = ("direction_dependent_gear_loss", [2], [])
     assert score(lost, answered("named", ("gear_loss", [2], []), by_direction)).strict
     assert not score(lost, answered("named", by_direction)).strict
+    pair = lost | {"case": "pair", "hidden": [*truth("single", ("payload", None))["hidden"], *lost["hidden"]]}
+    both = ("payload", [], []), ("gear_loss", [2], [])
+    assert score(pair, answered("named", *both, by_direction)).both
+    assert not score(pair, answered("named", *both, ("backlash", [2], []))).both
 
 
 def test_a_group_is_right_where_the_record_cannot_tell_its_members_apart() -> None:

@@ -133,7 +133,6 @@ def test_an_answer_without_steps_has_a_page(answer: tuple[Diagnosis, Comparison]
     )
     text = words(diagnosis_page(bare))
     assert text.split()[:3] == ["The", "model", "explains"]
-    assert "the model explains these traces within their noise" in text
     assert "none: nothing below was judged on other data" in text
     assert EFFECT not in text.split("model after")[0]
 
