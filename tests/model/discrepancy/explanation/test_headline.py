@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from model.discrepancy.diagnosis import Diagnosis, Inseparable, PlacedEffect, Suspicion
+from model.discrepancy.diagnosis import Diagnosis, Inseparable, PlacedEffect, SignalError, Suspicion
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.renderer import summary
-from model.discrepancy.grounds import Refusal
+from model.discrepancy.grounds import Note, Refusal
 from tests.model.discrepancy.answers import an_answer
 
 
@@ -65,6 +65,21 @@ def test_it_tells_a_sound_model_from_one_whose_effect_was_refused(answer: Diagno
     assert headline(back) == "none of the known effects, and what is left has no shape of one"
     sound = nothing.model_copy(update={"steps": ()})
     assert headline(sound) == "the model explains these traces within their noise and its tolerances"
+
+
+def test_what_is_left_and_a_number_far_from_its_file_are_told_where_nothing_is_named(answer: Diagnosis) -> None:
+    nothing = answer.model_copy(update={"verdict": "nothing-significant", "steps": ()})
+    error = SignalError(joint=1, unit="deg", before=0.5, after=0.4, floor=0.1)
+    left = nothing.model_copy(update={"rmse_fit": (error,)})
+    assert headline(left) == "nothing has the shape of a known effect; joint 1 is left with 4 times its noise"
+    assert summary(left) == "Nothing has the shape of a known effect, though joint 1 is left with 4 times its noise."
+    number = {"name": "link1.mass", "unit": "kg", "value": 5.51, "expected": 3.0, "deviations": 6.0}
+    moved = Note(kind="stated-numbers-moved", values={"limit": 4.0, "numbers": [number]}, warning=True)
+    assert headline(nothing.model_copy(update={"notes_data": (moved,)})) == (
+        "the model explains these traces within their noise; link1.mass comes out at 5.51, where 3 kg is stated"
+    )
+    unknown = error.model_copy(update={"floor": 1e-9})
+    assert "times its noise" not in headline(nothing.model_copy(update={"rmse_fit": (unknown,)})), "no noise is stated"
 
 
 def test_a_suspicion_says_what_more_motion_would_settle(answer: Diagnosis) -> None:

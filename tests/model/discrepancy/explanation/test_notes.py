@@ -68,8 +68,8 @@ def test_numbers_far_from_what_is_stated_are_one_warning_the_furthest_first() ->
     assert [number["name"] for number in note.values["numbers"]] == ["link2.length", "link1.mass"]
     assert note_words(note).startswith(
         "these numbers came out more than 4 of their stated deviations from what is expected: "
-        "link2.length 0.02 m (21 deviations; 0.23 stated), link1.mass 0 kg (5.5 deviations; 5.5 stated). File and "
-        "records"
+        "link2.length 0.02 m (21 deviations; 0.23 stated), link1.mass 0 kg (5.5 deviations; 5.5 stated). The file "
+        "may be wrong there"
     )
     (note,) = on_stated_numbers([mass], values)
     assert note_words(note).startswith("this number came out more than 4 of its stated deviations")

@@ -40,14 +40,14 @@ def named(
 class Look:
     """A look that withdraws steps without fitting anything."""
 
-    def __init__(self, said: Diagnosis, spoken_for: tuple[str, ...] = ()) -> None:
-        self.answer, self.spoken_for = said, spoken_for
+    def __init__(self, said: Diagnosis, spoken_for: tuple[str, ...] = (), left: Verdict | None = None) -> None:
+        self.answer, self.spoken_for, self.left = said, spoken_for, left
 
     def speaks_for(self, step: Step) -> bool:
         return step.effect in self.spoken_for
 
     def withdraw(self, steps: Collection[Step]) -> Diagnosis:
-        return answer(*(s for s in self.answer.steps if not any(s is one for one in steps)))
+        return answer(*(s for s in self.answer.steps if not any(s is one for one in steps)), verdict=self.left)
 
 
 def leaves(noises: float) -> SignalError:
@@ -56,15 +56,16 @@ def leaves(noises: float) -> SignalError:
 
 
 def joined(
-    first: Diagnosis, other: Diagnosis, spoken_for: tuple[str, ...] = ()
+    first: Diagnosis, other: Diagnosis, spoken_for: tuple[str, ...] = (), left: Verdict | None = None
 ) -> tuple[list[tuple[str | None, list[str]]], Verdict, list[str]]:
     """Names with their groups, verdict and kinds of notes of the answer of both.
 
     Args:
         spoken_for: effects for which the others speak, though their motion does not let them be named.
+        left: the others' verdict once effects are withdrawn from them; by default that of the effects that stay.
     """
     look: Any = Look(first)
-    exchanged: Any = Look(other, spoken_for)
+    exchanged: Any = Look(other, spoken_for, left)
     found = both_ways._join(look, exchanged)
     names = [(s.effect, [m.effect for m in s.group]) for s in found.steps]
     return names, found.verdict, [note.kind for note in found.notes_data]
@@ -78,6 +79,20 @@ def test_what_held_out_traces_alone_show_is_said_with_a_note() -> None:
     assert joined(answer(), unknown) == ([], "unknown-effect", ["traces-exchanged"])
     suspected = answer(verdict="suspected")
     assert joined(answer(), suspected) == ([], "nothing-significant", [])
+
+
+def test_what_held_out_traces_show_beside_a_plain_effect_is_not_said() -> None:
+    both = answer(named("backlash", evidence=PLENTY), named("joint_compliance", evidence=LITTLE))
+    assert joined(answer(), both) == ([("backlash", [])], "named", ["traces-exchanged"])
+    little = answer(named("spring_torque", evidence=LITTLE))
+    assert joined(little, both) == ([("backlash", [])], "named", ["traces-exchanged"])
+
+
+def test_a_weak_name_in_held_out_traces_does_not_hide_that_something_is_left_there() -> None:
+    """Which of the traces was given first makes no difference then."""
+    weak = answer(named("gear_loss", evidence=12.0))
+    assert joined(answer(), weak, left="unknown-effect") == ([], "unknown-effect", ["traces-exchanged"])
+    assert joined(answer(), weak) == ([], "nothing-significant", [])
 
 
 @pytest.mark.parametrize(

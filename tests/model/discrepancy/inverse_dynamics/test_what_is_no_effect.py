@@ -4,6 +4,8 @@ at no recorded speed, sizes at their bounds; and what is said of records that do
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +16,11 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis, FoundValue
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.left_over import first_contradicted
+from model.discrepancy.inverse_dynamics.left_over import _starved, first_contradicted
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.starts import narrowed
+from model.discrepancy.inverse_dynamics.step_record import excess_removed
+from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
@@ -64,6 +69,35 @@ def test_a_size_that_ends_at_its_bound_in_a_later_fit_is_taken_back(share: float
     value = FoundValue.of(size, share * size.high)
     named = step("potentiometer_gain", parameters={size.name: value})
     assert first_contradicted(replace(begun, model=model, now=now, steps=(named,)), frozenset()) == contradicted
+
+
+@pytest.mark.parametrize(("torque", "starved"), [(0.1, {1}), (0.4, set()), (9.0, set())])
+def test_a_friction_far_below_what_is_stated_is_starved_by_another(torque: float, starved: set[int]) -> None:
+    """Quadratic drag was told as Stribeck friction, with a fifth of the Coulomb friction that the file states."""
+    model = base_model(rigs.bench_machine()).with_effect("coulomb_friction", (1,))
+    rub = Unknown(model.parameter("joint1.coulomb_friction.torque"), start=0.5, low=0.0, expected=0.5, deviation=0.1)
+    (mass, *_) = (p for p in model.parameters if p.effect is None)
+    other = Unknown(mass, start=1.0, low=0.0, expected=1.0, deviation=0.01)
+    now: Any = SimpleNamespace(unknowns=(rub, other), values={rub.name: torque, other.name: 0.1})
+    assert _starved(now) == starved
+
+
+def test_a_share_of_held_out_variance_is_of_the_joints_that_an_effect_changes() -> None:
+    noise = np.array([0.1, 0.1])
+    fitted = (np.array([0.5, 0.5]), np.array([0.5, 0.01]))
+    removed = excess_removed(noise, fitted, np.array([0.5, 0.5]), np.array([0.5, 0.01]))
+    assert removed == pytest.approx(1.0)
+    assert excess_removed(noise, (fitted[0], fitted[0]), np.array([0.5, 0.5]), np.array([0.5, 0.01])) is None
+
+
+def test_a_spring_on_one_side_is_taut_for_a_part_of_the_travel() -> None:
+    """Where a joint dwells at the end of its motion, a stiff one for the last thousandth of it follows friction."""
+    model = base_model(rigs.bench_machine()).with_effect("one_sided_spring", (1,))
+    rest = model.parameter("joint1.one_sided_spring.rest")
+    dwelling = np.concatenate([np.linspace(0.0, 1.0, 100), np.full(100, 1.0)])
+    place: Any = SimpleNamespace(positions=dwelling)
+    bounded = narrowed(rest, place)
+    assert (bounded.low, bounded.high) == (pytest.approx(0.1, abs=0.01), pytest.approx(0.99))
 
 
 def test_a_drive_in_another_unit_than_the_machine_files_is_refused() -> None:
