@@ -21,7 +21,7 @@ def test_a_sound_arm_has_no_rivals(sound: Rig) -> None:
     assert detectability(sound) == []
 
 
-@pytest.mark.parametrize(("size", "is_seen"), [(0.2, True), (1e-5, False)])
+@pytest.mark.parametrize(("size", "is_seen"), [pytest.param(0.2, True, marks=pytest.mark.slow), (1e-5, False)])
 def test_an_effect_of_some_size_is_seen_and_one_of_hardly_any_is_not(sound: Rig, size: float, is_seen: bool) -> None:
     rig = hide(sound, "coulomb_friction", 1, 0, {"coulomb": size * sound.strongest[0]})
     none, own = sharpness(rig, ())

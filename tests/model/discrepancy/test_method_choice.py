@@ -37,6 +37,7 @@ def chosen(model: Model, trace: Trace, *, designs: bool = False, **options: obje
     return choose_method(model, [trace], DiagnosisOptions.model_validate(options), designs=designs)
 
 
+@pytest.mark.slow
 def test_torques_are_balanced_where_a_sampled_controllers_drive_was_recorded() -> None:
     assert chosen(ARM, moved()) == "inverse-dynamics"
     assert chosen(ARM, moved(), effects=("coulomb_friction", "dead_zone")) == "inverse-dynamics"

@@ -145,7 +145,10 @@ def _restored(folder: Path, backup: Path, daq: CommandLine) -> None:
     configuration.unlink()
 
 
-@pytest.mark.parametrize("brought", [_as_it_lies, _restored], ids=["its folder", "its backup"])
+@pytest.mark.parametrize(
+    "brought",
+    [pytest.param(_as_it_lies, id="its folder"), pytest.param(_restored, id="its backup", marks=pytest.mark.slow)],
+)
 def test_the_service_of_today_goes_on_with_what_0_1_left(
     folder: Path, backup: Path, brought: Callable[..., None], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -214,6 +214,7 @@ def test_a_drag_that_looks_viscous_in_one_motion_is_contradicted_by_another(tmp_
     assert "viscous friction on joint 1 would explain" in found.notes[0].lower()
 
 
+@pytest.mark.slow
 def test_friction_that_only_one_record_shows_beside_a_loss_is_taken_back(tmp_path: Path) -> None:
     """What a loss leaves where motion turns looks like Stribeck friction in steps, and not in a slow ramp."""
     found = diagnosed(tmp_path, "axis-current-steps", 54738089683743, "single")

@@ -71,7 +71,7 @@ def of_bench(constant: float) -> Diagnosis:
     return diagnose_torques(base_model(Machine.model_validate(stated)), traces[:1], traces[1:])
 
 
-@pytest.mark.parametrize(("constant", "weaker"), [(0.045, 0.1), (0.0465, None)])
+@pytest.mark.parametrize(("constant", "weaker"), [pytest.param(0.045, 0.1, marks=pytest.mark.slow), (0.0465, None)])
 def test_a_magnet_is_weakened_from_four_deviations_of_its_better_known_constant(
     constant: float, weaker: float | None
 ) -> None:

@@ -102,7 +102,7 @@ def test_another_law_that_takes_a_stated_friction_away_is_named_and_not_that_fri
     assert coulomb == pytest.approx(6.0, rel=0.1)
 
 
-@pytest.mark.parametrize("true", [8.0, 15.0])
+@pytest.mark.parametrize("true", [8.0, pytest.param(15.0, marks=pytest.mark.slow)])
 def test_friction_within_what_the_file_states_is_no_effect(true: float) -> None:
     """15 is 5 of the stated deviations above 6, and 2.5 times as much: with 30 % stated, 3 deviations of a ratio."""
     machine = stating_friction(viscous=rigs.quantity(6.0, "N·s/m", low=0.0, deviation=1.8))
@@ -212,6 +212,7 @@ def test_a_reading_that_goes_backwards_is_no_sensor() -> None:
     assert bent(bend_1=0.0025) < 0.01
 
 
+@pytest.mark.slow
 def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> None:
     """White noise of the recorded force, which no file states and no reading shows."""
     draw = np.random.default_rng(5)

@@ -122,6 +122,7 @@ def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> N
     assert holdout.evidence(flow.first, [], flow.case.held_out, flow.case.noise) == []
 
 
+@pytest.mark.slow
 def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
     traces = [rigs.bench_trace(seed, {"constant": 0.042, "back_emf": 0.042}) for seed in (1, 2)]
     model = base_model(weak_bench())

@@ -32,6 +32,7 @@ def answer(machine: Machine, options: TorqueOptions | None = None, **hidden: flo
     return diagnose_torques(base_model(machine), [training], [held_out], options)
 
 
+@pytest.mark.slow
 def test_a_rotor_whose_inertia_is_far_from_what_is_stated_is_named_with_its_value() -> None:
     """0.04 kg·m² true, 0.025 to 8 % stated: 7.5 deviations. Mass and weight of the link say that it is not the link."""
     found = answer(geared(0.025, 0.002))
@@ -50,7 +51,8 @@ def test_a_rotor_whose_inertia_is_far_from_what_is_stated_is_named_with_its_valu
     assert headline(found).startswith("wrong rotor inertia on joint 1, 0.0399 kg·m²")
 
 
-@pytest.mark.parametrize("rotor", [0.036, pytest.param(0.034, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rotor", [0.036, 0.034])
 def test_a_number_within_four_deviations_is_no_step(rotor: float) -> None:
     found = answer(geared(rotor, 0.002))
     assert not any(s.adopted for s in found.steps), found.summary

@@ -93,7 +93,7 @@ def test_a_sound_controller_gives_no_finding_and_settles_its_effects(sound: outs
     assert set(settled_by_records(made, MACHINE)) == {"wrong_gain", "lost_set_points"}
 
 
-@pytest.mark.parametrize("limit", [16.0, 9.0])
+@pytest.mark.parametrize("limit", [pytest.param(16.0, marks=pytest.mark.slow), 9.0])
 def test_lost_set_points_are_proved_by_the_drive(sound: outside_arm.OutsideArm, limit: float) -> None:
     arm = replace(sound.changed("lost", 2, 0.05), limit=limit)
     machine = outside_arm.machine(limit=limit)
