@@ -67,8 +67,11 @@ def _moved_number(found: Diagnosis) -> str | None:
     for note in found.notes_data:
         if note.kind == "stated-numbers-moved" and note.warning:
             farthest = note.values["numbers"][0]
-            stated = with_unit(f"{farthest['expected']:.3g}", farthest["unit"])
-            return f"{farthest['name']} comes out at {farthest['value']:.3g}, where {stated} is stated"
+            number = found.model_before.by_name.get(farthest["name"])
+            effect = None if number is None else number.effect
+            called = farthest["name"] if number is None or effect is None else effect_on(effect, number.joints)
+            value = with_unit(f"{farthest['value']:.3g}", farthest["unit"])
+            return f"{called} comes out at {value}, where {farthest['expected']:.3g} is stated"
     return None
 
 

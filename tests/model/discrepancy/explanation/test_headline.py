@@ -76,7 +76,7 @@ def test_what_is_left_and_a_number_far_from_its_file_are_told_where_nothing_is_n
     number = {"name": "link1.mass", "unit": "kg", "value": 5.51, "expected": 3.0, "deviations": 6.0}
     moved = Note(kind="stated-numbers-moved", values={"limit": 4.0, "numbers": [number]}, warning=True)
     assert headline(nothing.model_copy(update={"notes_data": (moved,)})) == (
-        "the model explains these traces within their noise; link1.mass comes out at 5.51, where 3 kg is stated"
+        "the model explains these traces within their noise; link1.mass comes out at 5.51 kg, where 3 is stated"
     )
     unknown = error.model_copy(update={"floor": 1e-9})
     assert "times its noise" not in headline(nothing.model_copy(update={"rmse_fit": (unknown,)})), "no noise is stated"
