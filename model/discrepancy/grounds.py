@@ -38,6 +38,7 @@ PatternKind = Literal[
 NoteKind = Literal[
     "cutoff",
     "drive-at-limit",
+    "drive-out-of-scale",
     "drive-timing",
     "errors-follow-record",
     "gravity-magnitude",

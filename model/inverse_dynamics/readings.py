@@ -110,7 +110,8 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
 
     Where the machine's sensors measure speed, positions are its integral from the first one recorded.
 
-    Raises TraceError for a trace without drive, of another machine, with a long gap, or with too few samples.
+    Raises TraceError for a trace without drive, of another machine or of more joints than it has, with a long gap, or
+    with too few samples.
     """
     name = trace.record.trace_id
     if trace.drive is None:
@@ -119,6 +120,8 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
         raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
     if len(trace) < FEWEST:
         raise TraceError(f"{trace.called}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
+    if max(trace.joints) > len(machine.joints):
+        raise TraceError(f"{trace.called}: has a joint {max(trace.joints)}; {machine.name} has {len(machine.joints)}")
     units = [unit for j in machine.modelled_joints for unit in machine.joint(j).drive_units]
     if trace.record.drive_unit not in (None, *units):
         allowed = " or ".join(dict.fromkeys(units))

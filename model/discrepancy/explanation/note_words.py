@@ -8,6 +8,7 @@ from typing import Any
 from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.grounds import Note, NoteKind
+from model.discrepancy.numbers import plain
 from model.effects.names import effect_name, effect_on
 
 Values = Mapping[str, Any]
@@ -29,6 +30,17 @@ def _drive_at_limit(v: Values) -> str:
         f"the recorded drive stands at its largest value ({shares}), where less may act than is recorded: how much "
         "less is found beside all else, and nothing is concluded from it"
     ) + (f"; a record tells nothing of joint {unknown}, which is not examined there" if unknown else "")
+
+
+def _drive_out_of_scale(v: Values) -> str:
+    def of(joint: Values) -> str:
+        return f"joint {joint['joint']} {plain(joint['ratio'])} times (its drive is stated in {joint['unit']})"
+
+    return (
+        f"recorded drives do not suit the motion: by the machine file they give {', '.join(map(of, v['joints']))} the "
+        "torque that the recorded motion needs. Check the unit of the drive, that positions are in rad or m and times "
+        "in s, and which column is which"
+    )
 
 
 def _drive_timing(v: Values) -> str:
@@ -236,6 +248,7 @@ def _rounded(value: float, unit: str) -> str:
 WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
     "drive-at-limit": _drive_at_limit,
+    "drive-out-of-scale": _drive_out_of_scale,
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
     "gravity-magnitude": _gravity_magnitude,

@@ -20,6 +20,7 @@ from model.discrepancy.inverse_dynamics.judged_controller import JudgedControlle
 from model.discrepancy.inverse_dynamics.left_over import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.scale_doubts import on_scale
 from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
@@ -209,6 +210,7 @@ class Records:
         steps.notes += on_gravity_along(model, records)
         steps.notes += on_unfinished((*self.traces, *self.held_out))
         steps.notes += self._on_shaking(cutoff)
+        steps.notes += on_scale(model, records) or on_scale(model, case.held_out)
         return Look(steps, self, cutoff)
 
     def _on_shaking(self, cutoff: float) -> tuple[Note, ...]:

@@ -4445,7 +4445,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "gravity-magnitude" | "gravity-reversed" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "drive-out-of-scale" | "drive-timing" | "errors-follow-record" | "gravity-magnitude" | "gravity-reversed" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
             /**
              * Values
              * @default {}
