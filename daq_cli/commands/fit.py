@@ -27,7 +27,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
+from daq_cli.models.parameter_table import print_far_numbers, print_on_the_edge, print_parameters
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -265,4 +265,5 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
         print(f"the search did not converge: {found.message}")
     if found.doubt:
         print(f"WARNING {found.doubt}")
+    print_far_numbers(found.parameters)
     print_on_the_edge(found.on_the_edge)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from daq_cli.app.context import console, print_json, print_table
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import files_of
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
+from daq_cli.models.parameter_table import print_far_numbers, print_on_the_edge, print_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -81,4 +81,5 @@ def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")
     for note in on_drives_at_limit(found.at_limit, found.unknown_joints):
         print(sentence(note_words(note)))
+    print_far_numbers(found.parameters)
     print_on_the_edge(found.on_the_edge)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from daq_cli.app.context import print_table
 
@@ -24,6 +24,27 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     for p in parameters:
         table.add_row(*row_of(p))
     print_table(table, 140)
+
+
+def print_far_numbers(parameters: Sequence[FittedParameter]) -> None:
+    """Prints a warning about the numbers that came out far from what is expected of them, if any did."""
+    from model.discrepancy.explanation.note_words import note_words
+    from model.discrepancy.explanation.notes import on_stated_numbers
+    from model.discrepancy.explanation.renderer import sentence
+
+    known = [p for p in parameters if p.value is not None and p.expected is not None]
+    numbers = [_Stated(p.name, p.unit, p.expected or 0.0, p.expected_deviation) for p in known]
+    for note in on_stated_numbers(numbers, {p.name: p.model_value for p in known}):
+        print(f"WARNING {sentence(note_words(note))}")
+
+
+class _Stated(NamedTuple):
+    """What is expected of a number."""
+
+    name: str
+    unit: str
+    expected: float
+    deviation: float | None
 
 
 def print_on_the_edge(links: Sequence[str]) -> None:
