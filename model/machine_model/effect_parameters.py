@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from daq.contracts.machine import DcMotor, Friction, Machine
+from daq.contracts.machine import DcMotor, Friction, Joint, Machine
 from daq.contracts.quantity import Quantity
 from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale, evaluate_size
@@ -46,10 +46,18 @@ def effect_parameters(
             own = _parameter(kind, p, scale, place)
             if known is not None:
                 own = _with_known(own, known)
-            unit = sliding(own.unit) if first.kind == "prismatic" else own.unit
+            unit = _unit_on(first, own.unit)
             slots = tuple(at.slot(j, p.column + beyond) for j in group)
             found.append(replace(own, unit=unit, slots=slots, joints=group))
     return tuple(found)
+
+
+def _unit_on(joint: Joint, unit: str) -> str:
+    """The unit that a number of an effect has on a joint: of a force where it slides, and of its drive where a motor
+    that is driven by volts would have volts."""
+    if unit == "V" and len(joint.drive_units) == 1:
+        return joint.drive_units[0]
+    return sliding(unit) if joint.kind == "prismatic" else unit
 
 
 def suits_drive(machine: Machine, name: str, joint: int) -> bool:

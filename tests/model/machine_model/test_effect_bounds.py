@@ -8,6 +8,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
+from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 
@@ -27,3 +28,10 @@ def test_a_contact_behind_a_motor_gives_no_more_than_the_motor_can_ask_of_it() -
     assert math.isfinite(high)
     with pytest.raises(SpecError, match="allowed are"):
         model.with_values({CONTACT: 1.01 * high})
+
+
+def test_a_dead_zone_has_the_unit_of_the_drive() -> None:
+    for machine, unit in ((rigs.bench_machine(), "V"), (rigs.slide_machine(), "N")):
+        (drive,) = machine.joint(1).drive_units
+        (width,) = effect_parameters(machine, "dead_zone", (1,), shared=False)
+        assert (width.unit, drive) == (unit, unit)
