@@ -66,8 +66,8 @@ JudgedByOption = Annotated[
     list[str] | None,
     typer.Option(
         "--holdout",
-        help="A trace to judge by, which what is named was not fitted to. Where torques are compared, it is fitted to "
-        "in turn, and the others judge. May be repeated.",
+        help="A held-out trace: it judges what the others show. Where torques are compared, it is fitted to in turn "
+        "while they judge. May be repeated.",
         autocompletion=completion.traces,
     ),
 ]

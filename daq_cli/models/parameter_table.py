@@ -27,18 +27,19 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
 
 
 def print_far_numbers(parameters: Sequence[FittedParameter]) -> None:
-    """Prints a warning about the numbers that came out far from what is expected of them, if any did."""
+    """Prints a warning about the numbers that came out far from what the machine file states of them, if any did; of an
+    effect that it does not state, nothing is expected but that it is not there."""
     from model.discrepancy.explanation.note_words import note_words
     from model.discrepancy.explanation.notes import on_stated_numbers
     from model.discrepancy.explanation.renderer import sentence
 
-    known = [p for p in parameters if p.value is not None and p.expected is not None]
-    numbers = [_Stated(p.name, p.unit, p.expected or 0.0, p.expected_deviation) for p in known]
-    for note in on_stated_numbers(numbers, {p.name: p.model_value for p in known}):
+    numbers = [_Expected(p.name, p.unit, p.expected, p.expected_deviation) for p in parameters if p.expected]
+    known = {p.name: p.value for p in parameters if p.value is not None}
+    for note in on_stated_numbers([n for n in numbers if n.name in known], known):
         print(f"WARNING {sentence(note_words(note))}")
 
 
-class _Stated(NamedTuple):
+class _Expected(NamedTuple):
     """What is expected of a number."""
 
     name: str

@@ -229,7 +229,8 @@ class Step(FrozenRecord):
     rmse_fit: tuple[SignalError, ...]
     rmse_holdout: tuple[SignalError, ...] = ()
     excess_removed_holdout: float | None = None
-    """Share of the held-out variance above the noise floor that the step removed."""
+    """Share of the held-out variance above the noise floor that the step removed; in torques of the joints that it
+    improved on the fitted traces."""
     evidence_held_out: float | None = None
     """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; in torques alone."""
     sum_lambda2_before: float | None = None

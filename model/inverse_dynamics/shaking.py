@@ -52,7 +52,9 @@ def _shaking_in(readings: Readings, joints: Sequence[int], cutoff: float) -> lis
     noise, below = readings.acceleration_noise(highest), readings.acceleration_power(cutoff)
     above = np.sqrt(np.maximum(readings.acceleration_power(highest) ** 2 - below**2, 0.0))
     shakes = (above > ABOVE * below) & (above > BEYOND_NOISE * noise)
-    strongest = _strongest_frequencies(readings, cutoff, highest)
+    if not shakes.any():
+        return []
+    strongest = _strongest_frequencies(readings, cutoff)
     return [
         Shaking(joint, float(above[k] / max(below[k], 1e-300)), float(strongest[k]))
         for k, joint in enumerate(joints)
@@ -60,10 +62,10 @@ def _shaking_in(readings: Readings, joints: Sequence[int], cutoff: float) -> lis
     ]
 
 
-def _strongest_frequencies(readings: Readings, low: float, high: float) -> Floats:
-    """The frequency (n,), Hz, within a band at which each joint accelerates most."""
+def _strongest_frequencies(readings: Readings, low: float) -> Floats:
+    """The frequency (n,), Hz, from `low` on at which each joint accelerates most."""
     order = 2 if readings.speed is None else 1
     signal = np.diff(readings.position if readings.speed is None else readings.speed, order, axis=0)
     frequency, density = welch(signal, 1 / readings.period, nperseg=min(len(signal), 1024), axis=0)
-    inside = (frequency > low) & (frequency <= high)
+    inside = frequency > min(low, frequency[-2])
     return np.asarray(frequency[inside][density[inside].argmax(axis=0)])

@@ -53,8 +53,8 @@ def effect_parameters(
 
 
 def _unit_on(joint: Joint, unit: str) -> str:
-    """The unit that a number of an effect has on a joint: of a force where it slides, and of its drive where a motor
-    that is driven by volts would have volts."""
+    """The unit that a number of an effect has on a joint: of lengths and forces where it slides, and of its drive,
+    where the file says which that is, for what a motor has in volts."""
     if unit == "V" and len(joint.drive_units) == 1:
         return joint.drive_units[0]
     return sliding(unit) if joint.kind == "prismatic" else unit

@@ -398,7 +398,7 @@ REPORTED: dict[str, Kind] = {
         motions=("sweep", "via points"),
     ),
 }
-"""Kinds that a registered trial used and that were looked at then (docs/worlds.md): for tuning from there on."""
+"""Kinds that a registered trial used and that were looked at then (docs/worlds-trials.md): for tuning from there on."""
 
 REPORTING: dict[str, Kind] = {
     "axis-current-sweep": replace(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
 from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
-from model.discrepancy.explanation.left_words import left_words
+from model.discrepancy.explanation.left_words import left_words, moved_number_words
 from model.discrepancy.explanation.renderer import (
     not_examined_words,
     size_words,
@@ -17,7 +17,6 @@ from model.discrepancy.explanation.renderer import (
 )
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
-from model.units import with_unit
 
 SHOWN = 3
 """Members of a group that a headline names."""
@@ -42,37 +41,23 @@ def _finding_of(found: Diagnosis) -> str:
 
 
 def _nothing(found: Diagnosis) -> str:
-    """Why nothing is named."""
+    """Why nothing is named; what is left, and what differs from the machine file."""
     if found.examined_nothing:
         return "the traces say nothing of the model"
+    doubts = [words for words in (left_words(found), moved_number_words(found)) if words is not None]
+    return "; ".join([_why_nothing(found, doubts), *doubts])
+
+
+def _why_nothing(found: Diagnosis, doubts: Sequence[str]) -> str:
     if any(map(was_taken_back, found.steps)):
         return "none of the known effects, and what is left has no shape of one"
     if any(map(was_found_one_way, found.steps)):
         return "nothing that all traces show"
     if any(s.effect is not None for s in found.steps):
         return "nothing that the held-out traces confirm"
-    left, moved = left_words(found), _moved_number(found)
-    if left is not None:
-        why = f"nothing has the shape of a known effect; {left}"
-    elif moved is not None:
-        why = "the model explains these traces within their noise"
-    else:
-        why = "the model explains these traces within their noise and its tolerances"
-    return why if moved is None else f"{why}; {moved}"
-
-
-def _moved_number(found: Diagnosis) -> str | None:
-    """The number of the machine file whose estimate is farthest from what it states, as a clause; None where all are
-    near."""
-    for note in found.notes_data:
-        if note.kind == "stated-numbers-moved" and note.warning:
-            farthest = note.values["numbers"][0]
-            number = found.model_before.by_name.get(farthest["name"])
-            effect = None if number is None else number.effect
-            called = farthest["name"] if number is None or effect is None else effect_on(effect, number.joints)
-            value = with_unit(f"{farthest['value']:.3g}", farthest["unit"])
-            return f"{called} comes out at {value}, where {farthest['expected']:.3g} is stated"
-    return None
+    if doubts:
+        return "no known effect has the evidence to be named"
+    return "the model explains these traces within their noise and its tolerances"
 
 
 def _group(step: Step, classes: Sequence[Inseparable]) -> str:

@@ -1,8 +1,11 @@
-"""What is left where nothing is named, in words."""
+"""What is left where nothing is named, and what differs from the machine file, in words."""
 
 from __future__ import annotations
 
 from model.discrepancy.diagnosis import Diagnosis, SignalError
+from model.discrepancy.numbers import plain
+from model.effects.names import effect_on
+from model.units import with_unit
 
 NOISE_UNKNOWN = 1e6
 """Ratio of a residual to its noise, above which that noise is none: the machine file takes positions for exact, as one
@@ -18,7 +21,21 @@ def left_words(found: Diagnosis) -> str | None:
     most = max(known, key=_noises, default=None)
     if most is None or _noises(most) <= WITHIN_NOISE:
         return None
-    return f"joint {most.joint} is left with {_noises(most):.2g} times its noise"
+    return f"joint {most.joint} is left with {plain(_noises(most), 2)} times its noise"
+
+
+def moved_number_words(found: Diagnosis) -> str | None:
+    """The number of the machine file whose estimate is farthest from what it states, as a clause; None where all are
+    near."""
+    for note in found.notes_data:
+        if note.kind == "stated-numbers-moved" and note.warning:
+            farthest = note.values["numbers"][0]
+            number = found.model_before.by_name.get(farthest["name"])
+            effect = None if number is None else number.effect
+            name = farthest["name"] if number is None or effect is None else effect_on(effect, number.joints)
+            value = with_unit(plain(farthest["value"], 3), farthest["unit"])
+            return f"{name} comes out at {value}, where {plain(farthest['expected'], 3)} is stated"
+    return None
 
 
 def _noises(error: SignalError) -> float:

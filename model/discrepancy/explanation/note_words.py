@@ -34,12 +34,13 @@ def _drive_at_limit(v: Values) -> str:
 
 def _drive_out_of_scale(v: Values) -> str:
     def of(joint: Values) -> str:
-        return f"joint {joint['joint']} {plain(joint['ratio'])} times (its drive is stated in {joint['unit']})"
+        stated = f" (its drive is stated in {joint['unit']})" if joint["unit"] else ""
+        return f"joint {joint['joint']} {plain(joint['ratio'])} times{stated}"
 
     return (
         f"recorded drives do not suit the motion: by the machine file they give {', '.join(map(of, v['joints']))} the "
         "torque that the recorded motion needs. Check the unit of the drive, that positions are in rad or m and times "
-        "in s, and which column is which"
+        "in s, and which column is which; or nearly all of it goes into friction that the file does not state"
     )
 
 
@@ -102,10 +103,10 @@ def _no_experiment_left(v: Values) -> str:
 
 
 def _not_exchanged(v: Values) -> str:
-    why = f" ({v['why']})" if "why" in v else ""
+    why = v.get("why", "they are too short for the cutoff that they bear")
     return (
-        "held-out traces were a check alone: they are too short, too slow or too quiet to be fitted to in turn"
-        f"{why}, which would show whether they lead to the same answer"
+        "held-out traces were a check alone, and were not fitted to in turn, which would show whether they lead to the "
+        f"same answer: {why}"
     )
 
 
@@ -137,7 +138,7 @@ def _resting_left_out(_: Values) -> str:
 
 def _shakes_above_cutoff(v: Values) -> str:
     def of(joint: Values) -> str:
-        return f"joint {joint['joint']} at {joint['frequency']:.2g} Hz ({joint['factor']:.2g} times)"
+        return f"joint {joint['joint']} at {plain(joint['frequency'], 2)} Hz ({plain(joint['factor'], 2)} times)"
 
     return (
         f"joints shake faster than torques are compared: {', '.join(map(of, v['joints']))}, in brackets their "

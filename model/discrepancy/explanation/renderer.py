@@ -31,7 +31,7 @@ from model.discrepancy.diagnosis import (
 )
 from model.discrepancy.explanation.class_words import class_of_group, class_words
 from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
-from model.discrepancy.explanation.left_words import NOISE_UNKNOWN, left_words
+from model.discrepancy.explanation.left_words import NOISE_UNKNOWN, left_words, moved_number_words
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
@@ -43,6 +43,8 @@ NOTICEABLE = 0.98
 """Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
 ALL = 0.95
 """Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
+LEAST_SHOWN = 5e-4
+"""Least share of a mean square that is not shown as 0.0 %."""
 NO_NOISE_STATED = "and the machine file states no noise of the sensors to compare it with"
 PHASES: Mapping[Phase, str] = {
     "ramp_start": "as motion starts",
@@ -147,8 +149,10 @@ def refusal_words(refusal: Refusal) -> str:
                 "variances of a reading"
             )
         case "falls-too-little":
-            fall = f"falls by only {n['share']:.1%}" if n["share"] >= 0.0 else f"grows by {-n['share']:.1%}"
-            words = f"on records not fitted to, the mean square {fall}"
+            change = "does not fall"
+            if abs(n["share"]) >= LEAST_SHOWN:
+                change = f"falls by only {n['share']:.1%}" if n["share"] > 0.0 else f"grows by {-n['share']:.1%}"
+            words = f"on records not fitted to, the mean square {change}"
         case "found-one-way":
             words = "a search in the held-out traces, which are fitted to in turn, does not find it"
         case "leaves-more-than-noise":
@@ -195,7 +199,8 @@ def _summary_of(answer: Diagnosis) -> str:
             rejected = [s for s in answer.steps if not s.adopted]
             first = rejected[0] if rejected else None
             first = next(filter(was_found_one_way, rejected), first)
-            return _nothing(next(filter(was_taken_back, rejected), first), left_words(answer))
+            doubts = [words for words in (left_words(answer), moved_number_words(answer)) if words is not None]
+            return _nothing(next(filter(was_taken_back, rejected), first), doubts)
         case "suspected":
             return _suspected(answer)
         case "unknown-effect":
@@ -291,16 +296,16 @@ def best_tried(candidates: Sequence[Candidate], significant: float) -> str:
     return f"{told}; {subject} named from {needed:.3g}."
 
 
-def _nothing(rejected: Step | None, left: str | None) -> str:
+def _nothing(rejected: Step | None, doubts: Sequence[str]) -> str:
     """Why no effect is named.
 
     Args:
         rejected: a step that was refused on records not fitted to, or taken back.
-        left: what is left, as a clause, where that is more than noise.
+        doubts: what is left above noise, and what differs from the machine file, as clauses.
     """
     if rejected is None or rejected.effect is None:
-        if left is not None:
-            return f"Nothing has the shape of a known effect, though {left}."
+        if doubts:
+            return f"No known effect has the evidence to be named, though {' and '.join(doubts)}."
         return "Nothing significant: the model explains the traces within noise and stated tolerances."
     if was_taken_back(rejected):
         return (

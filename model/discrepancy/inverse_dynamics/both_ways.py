@@ -18,11 +18,11 @@ from model.discrepancy.inverse_dynamics.left_over import SHAPED_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.looks import Look, Records, first_finding, found_in_torques, meet, names_of
 
 PLAIN = 100.0
-"""Evidence of all records from which an effect is plain to see, so that it is named even where the held-out traces show
-nothing of it when they are fitted to: too little may move in these."""
+"""Evidence of all records from which an effect may be plain to see, so that it is named even where the held-out traces
+show nothing of it when they are fitted to: too little may move in these."""
 CONFIRMED = SUSPECTED
-"""Least part of that evidence which is of the held-out traces. On two sound arms (thirteenth trial) 165 and 188 of the
-traces to fit to stood beside 0 and 1."""
+"""Least part of that evidence which has to be of the held-out traces. On two sound arms (thirteenth trial) 165 and 188
+of the traces to fit to stood beside 0 and 1."""
 
 
 def diagnose_both_ways(records: Records, progress: Progress) -> Diagnosis:
@@ -54,7 +54,7 @@ def _look_the_other_way(records: Records, found: Diagnosis, progress: Progress) 
     if not exchanged.bears(exchanged.highest_cutoff):
         return None
     steps = found_in_torques(found)
-    if len(steps) == 1 and not steps[0].group and _evidence(steps[0]) >= PLAIN:
+    if len(steps) == 1 and not steps[0].group and _is_plain(steps[0]):
         options = records.options.model_copy(update={"effects": tuple(names_of(steps[0]))})
         alone = first_finding(replace(exchanged, options=options), part_of(progress, 0.0, 0.5))
         if not _contradicts(alone, found):
@@ -74,18 +74,17 @@ def _join(look: Look, exchanged: Look) -> Diagnosis:
     other = exchanged.answer
     found, seen = found_in_torques(look.answer), found_in_torques(other)
     if _contradicts(exchanged, look.answer):
-        return _with_note(other, Note(kind="traces-contradict", values={"effects": [_values(step) for step in found]}))
-    if not found:
-        plain = _plain_alone(exchanged)
-        if plain is not None:
-            return _with_note(plain, Note(kind="traces-exchanged"))
-        return look.answer if seen or other.suspicion is not None else _without_suspicion(look)
+        effects = [_values(step) for step in found]
+        left = _plain_alone(exchanged) or other
+        return _with_note(left, Note(kind="traces-contradict", values={"effects": effects}))
     confirmed = [step for step in found if _is_shown(step, other) or exchanged.speaks_for(step)]
     missing = [s for s in found if s not in confirmed and (not _is_plain(s) or _is_beside(s, confirmed))]
-    if len(missing) == len(found) and any(map(_is_plain, seen)):
+    if len(missing) == len(found):
         plain = _plain_alone(exchanged)
         if plain is not None:
             return _with_note(plain, Note(kind="traces-exchanged"))
+    if not found:
+        return look.answer if seen or other.suspicion is not None else _without_suspicion(look)
     return _without_excluded(look.withdraw(missing) if missing else look.answer, seen)
 
 

@@ -76,11 +76,11 @@ def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
 
 
 def _starved(now: BalanceFit) -> set[int]:
-    """The joints of which the fit has lowered a friction that the file states far below that: another friction that was
-    added stands for it."""
-    stated = [u.as_stated for u in now.unknowns if u.parameter.effect is not None and u.parameter.deviation]
+    """The joints of which the fit has lowered a friction far below what is expected of it."""
+    friction = [u for u in now.unknowns if _family(u.parameter.effect) == FRICTION and u.parameter.deviation]
+    stated = [u.as_stated for u in friction if u.low >= 0.0 and u.as_stated.expected > 0.0]
     far = [u for u in stated if prior_distance(u, now.values[u.name])[0] <= -FAR_OFF]
-    return {joint for u in far if _family(u.parameter.effect) == FRICTION for joint in u.parameter.joints}
+    return {joint for u in far for joint in u.parameter.joints}
 
 
 def _ended(standing: Standing, step: Step) -> bool:

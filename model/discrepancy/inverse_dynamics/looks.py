@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, part_of
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -19,6 +20,8 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.left_over import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.resolution import REPEATING
+from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.scale_doubts import on_scale
 from model.effects.library import find_named_effect
@@ -62,7 +65,15 @@ class Look:
     def speaks_for(self, step: Step) -> bool:
         """Whether these records speak for the effect of a step, though their motion does not let it be named."""
         own = names_of(step)
-        return any(f.effect in own and meet(step.joints, f.joints) for f in self.workflow.beyond_motion)
+        same = (f for f in self.workflow.beyond_motion if f.effect in own and meet(step.joints, f.joints))
+        return any(f.effect != REPEATING or self._repeats_alike(step, f) for f in same)
+
+    def _repeats_alike(self, step: Step, found: Fitted) -> bool:
+        """Whether a disturbance repeats as often as that of a step, as far as the shortest of these records tells."""
+        resolved = 1.0 / min(float(np.ptp(t.time)) for t in (*self.records.traces, *self.records.held_out))
+        rates = {v.value for v in step.parameters.values() if v.part == "frequency" and v.value is not None}
+        own = (found.fit.values[p.name] for p in found.parameters if p.part == "frequency")
+        return any(abs(one - other) < resolved for one in own for other in rates)
 
     def withdraw(self, steps: Collection[Step]) -> Diagnosis:
         """Takes steps back, and what is suspected, because other records do not show them. Returns the new answer; that
@@ -209,12 +220,16 @@ class Records:
         steps.run()
         steps.notes += on_gravity_along(model, records)
         steps.notes += on_unfinished((*self.traces, *self.held_out))
-        steps.notes += self._on_shaking(cutoff)
+        steps.notes += self._on_shaking()
         steps.notes += on_scale(model, records) or on_scale(model, case.held_out)
         return Look(steps, self, cutoff)
 
-    def _on_shaking(self, cutoff: float) -> tuple[Note, ...]:
-        """A warning about joints that shake faster than torques are compared; none where none does."""
+    def _on_shaking(self) -> tuple[Note, ...]:
+        """A warning about joints that shake faster than torques can be compared; none where none does."""
+        try:
+            cutoff = choose_cutoff(self.traces, self.model.machine)
+        except SpecError:  # nothing moves beyond noise, and a cutoff was asked for
+            return ()
         shaking = find_shaking((*self.traces, *self.held_out), self.model.machine, cutoff)
         values = {"cutoff": cutoff, "joints": [asdict(one) for one in shaking]}
         return (Note(kind="shakes-above-cutoff", values=values, warning=True),) if shaking else ()

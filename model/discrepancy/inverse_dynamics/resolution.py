@@ -49,9 +49,9 @@ PLACES = 101
 HALF = 0.5
 """Share of its mean square that such an effect leaves at most."""
 LIMITED = 0.01
-"""Least share of the record in which the drive is above a limit that is named, so that the low-pass does not decide.
-Limits of hidden ones lie below 1.6 % of it and more; of spikes that filled 0.3 % of it, one of 4 % less than their
-highest was said to be there, on sound arms (decision 0073)."""
+"""Least share of the record, rests included, in which the drive is above a limit that is named. Hidden limits were
+exceeded in 1.6 % of the samples or more. On sound arms, spikes in 0.3 % of the samples were told as a limit 4 % below
+their highest (decision 0073)."""
 AT_BOUND = 1.01
 """Ratio to its lower bound below which a speed is the bound's."""
 AT_END = 1e-6
@@ -126,10 +126,11 @@ def _is_hardly_reached(found: Fitted) -> bool:
 
 
 def is_beyond_motion(found: Fitted, case: TorqueCase) -> bool:
-    """Whether the recorded motion is why this effect cannot be named: it repeats as often as the effect, or within less
-    than a wave of it. The records then do not contradict it."""
+    """Whether the recorded motion keeps this effect from being named: it repeats as often as the effect, or holds less
+    than a wave of it. Such records do not contradict it."""
     rates = [p for p in found.parameters if p.rate_of is not None and p.low > found.model.by_name[p.name].low]
-    return _repeats_with_motion(found, case) or any(_is_at_end(p, found.fit.values[p.name]) for p in rates)
+    slowest = any(found.fit.values[p.name] <= (1 + AT_END) * p.low for p in rates)
+    return slowest or _repeats_with_motion(found, case)
 
 
 def _as_fitted(found: Fitted) -> Model:
@@ -197,11 +198,6 @@ def ends_at_bound(p: Parameter, value: float) -> bool:
     is_shape = p.effect is not None and p.null is None and p.rate_of is None
     if is_shape or p.effect == LIMIT:  # records bound a limit
         return False
-    return _is_at_end(p, value)
-
-
-def _is_at_end(p: Parameter, value: float) -> bool:
-    """Whether a number is at one of its bounds that is not its null value."""
     ends = [bound for bound in (p.low, p.high) if math.isfinite(bound) and bound != p.null]
     return any(abs(value - end) <= AT_END * max(abs(end), p.deviation or 0.0) for end in ends)
 

@@ -84,17 +84,18 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
     A limit of the drive must leave most of the record below it, and a threshold a part above it: a drive that hardly
     ever acts would explain any motion, with bodies without mass. Friction must not fade within the speeds at which its
     direction is not resolved, nor beyond those that were recorded. A spring on one side must begin to pull within the
-    recorded positions. A ripple repeats itself within them: less than most of a wave is a spring, or a shifted sensor.
+    recorded positions, and before the last hundredth of the travel. A ripple repeats itself within them: less than most
+    of a wave is a spring, or a shifted sensor.
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
         fastest = max(slowest, float(np.quantile(place.speeds, NEARLY_FASTEST)))
         return replace(p, low=min(p.high, max(p.low, slowest)), high=min(p.high, fastest))
     if p.effect == "one_sided_spring" and p.null is None:
-        low, high = np.quantile(place.positions, TAUT_WITHIN)
-        ends = LEAST_STRETCH * float(np.ptp(place.positions))
-        first, last = float(place.positions.min()) + ends, float(place.positions.max()) - ends
-        return replace(p, low=max(float(low), first), high=min(float(high), last))
+        stretch = LEAST_STRETCH * float(np.ptp(place.positions))
+        within = (place.positions.min() + stretch, place.positions.max() - stretch)
+        low, high = np.clip(np.quantile(place.positions, TAUT_WITHIN), *within)
+        return replace(p, low=float(low), high=float(high))
     if p.effect == "resistance_drift" and p.null is not None:
         return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
     if p.effect == "amplifier_threshold":

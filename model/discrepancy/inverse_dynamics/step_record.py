@@ -145,8 +145,8 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
 
 
 def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats, after: Floats) -> float | None:
-    """Share of the held-out variance above noise that is gone on the joints whose mean square fell in the fit, weighted
-    by their fitted mean square.
+    """Share of the held-out variance above noise that is gone on the joints that the step improved on the fitted
+    records, weighted by their fitted mean square. Whether others grew is for `rmse_holdout` to tell.
 
     Args:
         noise: (n,) standard deviation of a residual of which only noise is left. fitted: (n,) mean squares on the

@@ -114,10 +114,11 @@ class TorqueWorkflow:
         self.suspicion = None
         for step in [s for s in self.found.adopted if (s.effect, s.joints) in effects]:
             self.found = self._refuse(self.refitter.remove(self.found, step), self.found, step, ONE_WAY)
-            self.tried, self.at_bounds = (), []
+            self.tried, self.at_bounds, self.beyond_motion = (), [], ()
         self.found = describe_in_order(self.refitter, self.found)
 
     def _take_steps(self) -> None:
+        self.beyond_motion = ()
         for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn
             if len(self.found.adopted) >= self.case.options.most_steps:
                 break
@@ -180,7 +181,7 @@ class TorqueWorkflow:
     def _beyond_motion(self, found: Findings) -> tuple[Fitted, ...]:
         """What would have been enough evidence of all records, had the motion shown more of it."""
         least = self.case.options.least_evidence
-        enough = (f for f in found.unresolved if f.evidence > 0 and f.evidence + f.told >= least)
+        enough = (f for f in found.unresolved if min(f.evidence, f.told) > 0 and f.evidence + f.told >= least)
         return tuple(f for f in enough if is_beyond_motion(f, self.case))
 
     def _adopt(self, found: Found, findings: Findings) -> Found:
@@ -295,8 +296,8 @@ class TorqueWorkflow:
 
     def _withdraw_wrong_laws(self) -> None:
         """Take back effects that the residual contradicts, and all effects after them: friction that was lowered far
-        below what the file states where something is still missing, and viscous friction whose own residual bends
-        with speed."""
+        below what the file states where something is still missing, viscous friction whose own residual bends with
+        speed, and friction in whose place a stated one came out far lower."""
         while (first := first_contradicted(self.refitter.standing(self.found), self.found.lowered)) is not None:
             wrong = self.found.steps[first].joints
             for index, step in enumerate(self.found.steps[first:], start=first):
@@ -305,7 +306,8 @@ class TorqueWorkflow:
                 steps = list(self.found.steps)
                 steps[index] = withdrawn(step, wrong)
                 self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
-            self.suspicion, self.tried, self.at_bounds = None, (), []  # they were of the model with these effects
+            # they were of the model with these effects
+            self.suspicion, self.tried, self.at_bounds, self.beyond_motion = None, (), [], ()
 
 
 def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:

@@ -9,6 +9,7 @@ import pytest
 
 from daq.contracts.trace import Trace
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.shaking import Shaking, find_shaking
 from model.machine_model.model import base_model
@@ -49,15 +50,24 @@ def test_a_slow_motion_and_noise_do_not_shake() -> None:
     assert find_shaking([replace(sound, position=sound.position + noise)], slide_machine(), 12.0) == ()
 
 
-def test_a_record_without_frequencies_above_the_cutoff_says_nothing() -> None:
+@pytest.mark.parametrize("rate", [25.0, 40.0, 40.03])
+def test_a_record_without_frequencies_above_the_cutoff_says_nothing(rate: float) -> None:
     sound = slide_trace(1, {})
-    thin = replace(sound, **{name: getattr(sound, name)[::20] for name in ("time", "position", "drive")})
-    assert find_shaking([thin], slide_machine(), 12.0) == ()
+    time = np.arange(0.0, 16.0, 1.0 / rate)
+    assert sound.drive is not None
+    position, drive = (np.interp(time, sound.time, s[:, 0])[:, None] for s in (sound.position, sound.drive))
+    assert find_shaking([replace(sound, time=time, position=position, drive=drive)], slide_machine(), 12.0) == ()
 
 
-def test_a_diagnosis_warns_of_it_first() -> None:
+def test_a_commanded_sweep_does_not_shake_below_a_low_cutoff() -> None:
+    """What can be compared counts, and not what the user asked to compare."""
+    fitted, held = (shaken(slide_trace(seed, {}, 8.0), 7.0, 0.02) for seed in (1, 2))
+    found = diagnose_torques(base_model(slide_machine()), [fitted], [held], TorqueOptions(cutoff=2.0))
+    assert not [note for note in found.notes_data if note.kind == "shakes-above-cutoff"]
+
+
+def test_a_diagnosis_warns_of_it() -> None:
     fitted, held = (shaken(slide_trace(seed, {}, 8.0), 40.0, 1e-3) for seed in (1, 2))
     found = diagnose_torques(base_model(slide_machine()), [fitted], [held])
-    warning = next(n for n in found.notes_data if n.kind == "shakes-above-cutoff")
-    assert warning.warning
+    assert [note.kind for note in found.notes_data if note.warning] == ["shakes-above-cutoff"]
     assert "joint 1 at 40 Hz" in " ".join(found.notes)

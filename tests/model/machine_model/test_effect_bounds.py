@@ -30,8 +30,9 @@ def test_a_contact_behind_a_motor_gives_no_more_than_the_motor_can_ask_of_it() -
         model.with_values({CONTACT: 1.01 * high})
 
 
-def test_a_dead_zone_has_the_unit_of_the_drive() -> None:
+def test_what_is_lost_of_a_drive_has_the_unit_of_the_drive() -> None:
     for machine, unit in ((rigs.bench_machine(), "V"), (rigs.slide_machine(), "N")):
         (drive,) = machine.joint(1).drive_units
-        (width,) = effect_parameters(machine, "dead_zone", (1,), shared=False)
-        assert (width.unit, drive) == (unit, unit)
+        for name in ("dead_zone", "amplifier_threshold", "supply_limit"):
+            (size,) = effect_parameters(machine, name, (1,), shared=False)
+            assert (size.unit, drive) == (unit, unit)

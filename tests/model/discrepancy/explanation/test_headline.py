@@ -71,13 +71,21 @@ def test_what_is_left_and_a_number_far_from_its_file_are_told_where_nothing_is_n
     nothing = answer.model_copy(update={"verdict": "nothing-significant", "steps": ()})
     error = SignalError(joint=1, unit="deg", before=0.5, after=0.4, floor=0.1)
     left = nothing.model_copy(update={"rmse_fit": (error,)})
-    assert headline(left) == "nothing has the shape of a known effect; joint 1 is left with 4 times its noise"
-    assert summary(left) == "Nothing has the shape of a known effect, though joint 1 is left with 4 times its noise."
+    assert headline(left) == "no known effect has the evidence to be named; joint 1 is left with 4 times its noise"
+    assert summary(left).startswith("No known effect has the evidence to be named, though joint 1 is left with 4 times")
+    refused = left.model_copy(update={"steps": answer.steps})
+    assert headline(refused) == "nothing that the held-out traces confirm; joint 1 is left with 4 times its noise"
+    far = error.model_copy(update={"floor": 0.4 / 1200})
+    assert headline(nothing.model_copy(update={"rmse_fit": (far,)})).endswith(
+        "joint 1 is left with 1200 times its noise"
+    )
     number = {"name": "link1.mass", "unit": "kg", "value": 5.51, "expected": 3.0, "deviations": 6.0}
     moved = Note(kind="stated-numbers-moved", values={"limit": 4.0, "numbers": [number]}, warning=True)
-    assert headline(nothing.model_copy(update={"notes_data": (moved,)})) == (
-        "the model explains these traces within their noise; link1.mass comes out at 5.51 kg, where 3 is stated"
+    doubted = nothing.model_copy(update={"notes_data": (moved,)})
+    assert headline(doubted) == (
+        "no known effect has the evidence to be named; link1.mass comes out at 5.51 kg, where 3 is stated"
     )
+    assert summary(doubted).endswith("though link1.mass comes out at 5.51 kg, where 3 is stated.")
     unknown = error.model_copy(update={"floor": 1e-9})
     assert "times its noise" not in headline(nothing.model_copy(update={"rmse_fit": (unknown,)})), "no noise is stated"
 

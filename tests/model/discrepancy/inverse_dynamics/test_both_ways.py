@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
-from model.discrepancy.diagnosis import Candidate, Diagnosis, SignalError, Step, Suspicion, Verdict
+from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion, Verdict
 from model.discrepancy.explanation.method_words import method_words
-from model.discrepancy.inverse_dynamics import both_ways
+from model.discrepancy.inverse_dynamics import both_ways, looks
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
@@ -245,3 +247,31 @@ def test_traces_that_cannot_be_fitted_to_are_a_check_alone(
     found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), traces[:1], traces[1:])
     assert found.traces == (traces[0].record.trace_id,)
     assert any(note.kind == "not-exchanged" for note in found.notes_data), found.verdict
+
+
+class _Candidate:
+    """A fitted effect of which a record's motion shows too little."""
+
+    def __init__(self, effect: str, joints: tuple[int, ...], frequency: float) -> None:
+        self.effect, self.joints = effect, joints
+        self.parameters = (SimpleNamespace(name="rate", part="frequency"),)
+        self.fit = SimpleNamespace(values={"rate": frequency})
+
+
+@pytest.mark.parametrize(
+    ("effect", "joints", "frequency", "speaks"),
+    [
+        pytest.param("torque_ripple", (1,), 0.0, False, id="another effect"),
+        pytest.param("periodic_disturbance", (2,), 1.5, False, id="another joint"),
+        pytest.param("periodic_disturbance", (1,), 1.55, True, id="as often"),
+        pytest.param("periodic_disturbance", (1,), 0.4, False, id="less often"),
+    ],
+)
+def test_records_speak_for_a_disturbance_that_repeats_as_often(
+    effect: str, joints: tuple[int, ...], frequency: float, speaks: bool
+) -> None:
+    records: Any = SimpleNamespace(traces=(SimpleNamespace(time=np.array([0.0, 8.0])),), held_out=())
+    workflow: Any = SimpleNamespace(beyond_motion=(_Candidate(effect, joints, frequency),))
+    rate = FoundValue(value=1.5, low=1.4, high=1.6, unit="Hz", part="frequency", joints=(1,))
+    found = step("periodic_disturbance", parameters={"joint1.periodic_disturbance.frequency": rate})
+    assert looks.Look(workflow, records, 12.0).speaks_for(found) == speaks

@@ -98,6 +98,8 @@ def test_a_spring_on_one_side_is_taut_for_a_part_of_the_travel() -> None:
     place: Any = SimpleNamespace(positions=dwelling)
     bounded = narrowed(rest, place)
     assert (bounded.low, bounded.high) == (pytest.approx(0.1, abs=0.01), pytest.approx(0.99))
+    hardly: Any = SimpleNamespace(positions=np.append(np.linspace(0.0, 1.0, 3), np.full(100, 1.0)))
+    assert narrowed(rest, hardly).low == narrowed(rest, hardly).high == pytest.approx(0.99)
 
 
 def test_a_drive_in_another_unit_than_the_machine_files_is_refused() -> None:
