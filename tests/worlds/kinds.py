@@ -397,10 +397,6 @@ REPORTED: dict[str, Kind] = {
         contacts=(SWITCH,),
         motions=("sweep", "via points"),
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/worlds-trials.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-current-sweep": replace(
         _AXIS,
         drive=CURRENT,
@@ -444,6 +440,40 @@ REPORTING: dict[str, Kind] = {
         body=True,
         motions=("steps", "sines"),
         known_loop=False,
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/worlds-trials.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-volts-via": replace(
+        _AXIS, rate=(300.0,), bits=(17,), contacts=(BRISTLE,), motions=("via points", "sines"), body=True
+    ),
+    "planar-volts-sines": replace(
+        _PLANAR, rate=(400.0,), bits=(16,), contacts=(SWITCH,), motions=("sines", "random steps")
+    ),
+    "planar-cascade-sweep": replace(
+        _PLANAR,
+        controller=CASCADE,
+        rate=(300.0,),
+        bits=(18,),
+        contacts=(BRISTLE,),
+        motions=("sweep", "ramps"),
+        body=True,
+    ),
+    "arm-current-random": replace(
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(500.0,),
+        bits=(17,),
+        contacts=(TANH,),
+        motions=("random steps", "via points"),
+        known_loop=False,
+    ),
+    "arm-volts-sweep": replace(
+        _ANTHROPOMORPHIC, rate=(250.0,), bits=(18,), contacts=(SWITCH,), body=True, motions=("sweep", "steps")
+    ),
+    "six-volts-ramps": replace(
+        _ANTHROPOMORPHIC, joints=6, rate=(400.0,), bits=(19,), contacts=(TANH,), motions=("ramps", "via points")
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
