@@ -14,9 +14,9 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
 OUT_OF_SCALE = 100.0
-"""Ratio between the torque that a drive gives by the machine file and that which the motion needs, either way, from
-which the drive is taken to be of another unit: thousandths are the nearest that are mistaken for one another. On 784
-records of rigs in other worlds, whose files state friction, it was 0.6 to 4.6."""
+"""Ratio between the torque that a drive gives by the machine file and that which the motion needs, or its inverse, from
+which the drive is taken to be of another unit. mA for A, or mV for V, make it a thousand. On 784 records of rigs in
+other worlds, whose files state friction, the drive gave 0.6 to 4.6 times what was needed."""
 
 
 def on_scale(model: Model, records: Sequence[RecordedMotion]) -> tuple[Note, ...]:

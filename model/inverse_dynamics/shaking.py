@@ -67,5 +67,5 @@ def _strongest_frequencies(readings: Readings, low: float) -> Floats:
     order = 2 if readings.speed is None else 1
     signal = np.diff(readings.position if readings.speed is None else readings.speed, order, axis=0)
     frequency, density = welch(signal, 1 / readings.period, nperseg=min(len(signal), 1024), axis=0)
-    inside = frequency > min(low, frequency[-2])
+    inside = frequency > min(low, frequency[-2])  # the last one at least, where the bins are wide
     return np.asarray(frequency[inside][density[inside].argmax(axis=0)])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, Step
 from model.discrepancy.explanation.class_words import called, class_of_group
 from model.discrepancy.explanation.effect_words import words_of
-from model.discrepancy.explanation.left_words import left_words, moved_number_words
+from model.discrepancy.explanation.left_words import doubts_of
 from model.discrepancy.explanation.renderer import (
     not_examined_words,
     size_words,
@@ -44,7 +44,7 @@ def _nothing(found: Diagnosis) -> str:
     """Why nothing is named; what is left, and what differs from the machine file."""
     if found.examined_nothing:
         return "the traces say nothing of the model"
-    doubts = [words for words in (left_words(found), moved_number_words(found)) if words is not None]
+    doubts = doubts_of(found)
     return "; ".join([_why_nothing(found, doubts), *doubts])
 
 

@@ -15,7 +15,13 @@ WITHIN_NOISE = 3.0
 rigs of other worlds leave up to 2.6, where friction turns."""
 
 
-def left_words(found: Diagnosis) -> str | None:
+def doubts_of(found: Diagnosis) -> list[str]:
+    """What speaks against an answer that names nothing, as clauses: what is left above noise, and the number that is
+    farthest from the machine file."""
+    return [words for words in (_left_words(found), _moved_number_words(found)) if words is not None]
+
+
+def _left_words(found: Diagnosis) -> str | None:
     """The joint that is left farthest above its noise, as a clause; None where all are within it."""
     known = [e for e in (*found.rmse_fit, *found.rmse_holdout) if 0.0 < e.after < NOISE_UNKNOWN * e.floor]
     most = max(known, key=_noises, default=None)
@@ -24,7 +30,7 @@ def left_words(found: Diagnosis) -> str | None:
     return f"joint {most.joint} is left with {plain(_noises(most), 2)} times its noise"
 
 
-def moved_number_words(found: Diagnosis) -> str | None:
+def _moved_number_words(found: Diagnosis) -> str | None:
     """The number of the machine file whose estimate is farthest from what it states, as a clause; None where all are
     near."""
     for note in found.notes_data:

@@ -31,7 +31,7 @@ from model.discrepancy.diagnosis import (
 )
 from model.discrepancy.explanation.class_words import class_of_group, class_words
 from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
-from model.discrepancy.explanation.left_words import NOISE_UNKNOWN, left_words, moved_number_words
+from model.discrepancy.explanation.left_words import NOISE_UNKNOWN, doubts_of
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
@@ -199,8 +199,7 @@ def _summary_of(answer: Diagnosis) -> str:
             rejected = [s for s in answer.steps if not s.adopted]
             first = rejected[0] if rejected else None
             first = next(filter(was_found_one_way, rejected), first)
-            doubts = [words for words in (left_words(answer), moved_number_words(answer)) if words is not None]
-            return _nothing(next(filter(was_taken_back, rejected), first), doubts)
+            return _nothing(next(filter(was_taken_back, rejected), first), doubts_of(answer))
         case "suspected":
             return _suspected(answer)
         case "unknown-effect":
