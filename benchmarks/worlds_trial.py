@@ -1,15 +1,15 @@
 """A registered trial in worlds that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
 
     python -m benchmarks worlds_trial --hashes                                                      # for a registration
-    python -m benchmarks worlds_trial --registration docs/trial/worlds-1.toml --folder FOLDER --seconds 500
+    python -m benchmarks worlds_trial --registration docs/trial/worlds-15.toml --folder FOLDER --seconds 500
     python -m benchmarks worlds_trial --folder FOLDER --sharpness --seconds 500
-    python -m benchmarks worlds_trial --table docs/trial/worlds-1.csv
+    python -m benchmarks worlds_trial --table FILE.csv
 
 The second is given again until there are enough arms: each goes on where the last one stopped. Two of them run side by
 side where `--only` gives each its kinds. Seeds are drawn from the
 commit that registered the file, cases take turns, and the kind on which the least time was spent comes next. The third
 works out from the truth which effects a sound arm can imitate, and which those can that were named in their place.
-Every arm is a line of FOLDER/cases.csv; the last prints the table of such lines. docs/worlds.md has the rules.
+Every arm is a line of FOLDER/cases.csv; the last prints the table of such lines. docs/trial.md has the rules.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ BROUGHT = {
 }
 LONGEST_WHOLE = 28
 """Most characters of code that a phone shows in one line beside a bullet."""
-BELOW = {"decisions/README": "0*", "trial": "trial/*"}
+BELOW = {"decisions/README": "0*"}
 """Pages that have others below them, by pattern."""
 LINK = re.compile(r"(\[[^\]]*)(\]\(<?)([^)\s>]+)(>?\))")
 CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)

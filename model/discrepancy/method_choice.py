@@ -19,7 +19,7 @@ def choose_method(model: Model, traces: Sequence[Trace], options: DiagnosisOptio
     """The method that the options ask for, else the one that suits machine and traces.
 
     Without a controller or without set points nothing can be simulated. Where a sampled controller's drive was
-    recorded, the drive says what acted on the arm, whatever the controller did: torques are balanced (decision 0063).
+    recorded, the drive says what acted on the arm, whatever the controller did: torques are balanced (decision 0053).
     The loop is simulated for the board, whose readings are too coarse for accelerations; for effects that torques do
     not show; and where an experiment is to be designed, which needs simulations of the rivals.
 

@@ -34,7 +34,7 @@ OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
     "load_dependent_friction": dict.fromkeys((1, 2), ("gravity_torque_friction", ())),
     # it is larger one way and smaller the other than what the file states: a coefficient and a difference
     "viscous_friction": dict.fromkeys((1, 2), ("direction_dependent_viscous_friction", ("viscous_friction",))),
-    # a loss that differs by direction is in part a change of the torque constant: the loss is its name (decision 0062)
+    # a loss that differs by direction is in part a change of the torque constant: the loss is its name (decision 0053)
     "gear_loss": dict.fromkeys((1, 2), ("gear_loss", ("direction_dependent_gear_loss",))),
     "dead_zone": {JUMP: ("amplifier_threshold", ())},
     "resistance_drift": {2: ("resistance_rise", ())},

@@ -442,7 +442,7 @@ REPORTED: dict[str, Kind] = {
         known_loop=False,
     ),
 }
-"""Kinds that a registered trial used and that were looked at then (docs/worlds-trials.md): for tuning from there on."""
+"""Kinds that a registered trial used and that were looked at then (docs/how-well.md): for tuning from there on."""
 
 REPORTING: dict[str, Kind] = {
     "axis-volts-via": replace(

@@ -19,7 +19,7 @@ from model.effects.library import find_named_effect
 FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
 friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
-2.6, where friction turns (docs/worlds-trials.md)."""
+2.6, where friction turns (docs/how-well.md)."""
 SHAPED_ABOVE_NOISE = 3.0
 """The same where a shape explains much of it (`ANOTHER_LAW`): the shape says as well that something is missing."""
 LONG_MEMORY = 4.0

@@ -43,7 +43,7 @@ SLOWER = 0.5
 the fifth power of the cutoff, so 3 % of it is left there."""
 NO_NOISE = 5.0
 """Residual, in noise floors, that is not noise. Sound rigs leave up to 2.6, but for those whose current loop runs out
-of voltage: what is left there is no noise either (decision 0065)."""
+of voltage: what is left there is no noise either (decision 0053)."""
 PLACES = 101
 """Places of a sensor's range at which its scale is looked at."""
 HALF = 0.5
@@ -51,7 +51,7 @@ HALF = 0.5
 LIMITED = 0.01
 """Least share of the record, rests included, in which the drive is above a limit that is named. Hidden limits were
 exceeded in 1.6 % of the samples or more. On sound arms, spikes in 0.3 % of the samples were told as a limit 4 % below
-their highest (decision 0073)."""
+their highest (decision 0053)."""
 AT_BOUND = 1.01
 """Ratio to its lower bound below which a speed is the bound's."""
 AT_END = 1e-6
