@@ -17,8 +17,6 @@ RELATIVE = r"\((?![a-z][a-z+.-]*:)[^)]*\)"
 """Target of a link or picture without a scheme such as https."""
 PICTURE = re.compile(rf"^!\[[^\]]*\]{RELATIVE}\n+(?:\*[^*\n]+\*\n+)?", re.MULTILINE)
 """A picture in a paragraph of its own, with its caption in italics."""
-PAGES = re.compile(r"^\| page \|.*\n(?:\|.*\n)+", re.MULTILINE)
-"""The table of the documents."""
 LINK = re.compile(rf"\[([^\]]*)\]{RELATIVE}")
 PICTURE_TARGET = re.compile(r"(?P<before>!\[[^\]]*\])\((?![a-z][a-z+.-]*:)(?P<path>[^)]*)\)")
 """A relative picture, and its file."""
@@ -45,6 +43,5 @@ def absolute(readme: str, repository: str, version: str) -> str:
 
 
 def description(readme: str) -> str:
-    """The text without relative pictures and the table of pages; of relative links, the words remain."""
-    text = PAGES.sub("The pages are in the folder `docs` of the source distribution.\n", PICTURE.sub("", readme))
-    return LINK.sub(r"\1", text)
+    """The text without relative pictures; of relative links, the words remain."""
+    return LINK.sub(r"\1", PICTURE.sub("", readme))

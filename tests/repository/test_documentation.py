@@ -69,12 +69,6 @@ def test_the_index_of_decisions_names_every_one_by_its_title() -> None:
     ]
 
 
-def test_the_readme_leads_to_every_page() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    pages = {path.relative_to(ROOT).as_posix() for path, _ in PAGES if path.parent in (ROOT, ROOT / "docs")}
-    assert {page for page in pages if f"({page})" not in readme} == {"README.md"}
-
-
 def test_make_help_names_every_command() -> None:
     commands = re.findall(r"^\.PHONY: (.+)$", MAKEFILE, re.MULTILINE)[0].split()
     printed = subprocess.run(["make", "help"], cwd=ROOT, check=True, capture_output=True, text=True).stdout

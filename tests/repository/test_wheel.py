@@ -51,7 +51,7 @@ def test_where_the_project_has_an_address_the_description_keeps_its_pictures_and
     assert len(targets) == len(re.findall(r"\]\(([^)]*)\)", readme))
     assert [target for target in targets if not target.startswith("https://")] == []
     own = [target for target in targets if target.startswith("https://example.org/us/arm/")]
-    assert "https://example.org/us/arm/raw/v9.8.7/docs/images/ramp.png" in own
+    assert "https://example.org/us/arm/raw/v9.8.7/docs/images/dashboard-live.png" in own
     assert "https://example.org/us/arm/blob/v9.8.7/docs/how-well.md" in own
     for target in own:
         assert (ROOT / re.sub(r".*?/v9\.8\.7/", "", target).partition("#")[0]).exists(), target
