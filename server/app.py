@@ -34,7 +34,6 @@ from server.api import (
 )
 from server.api.state_metrics import StateMetrics
 from server.page import page_router
-from server.reading import reads_only
 from server.services import Services
 from server.site import serve_site
 
@@ -48,10 +47,7 @@ Angles are in rad, times in s, joints are numbered from 1. Errors are applicatio
 def make_app(services: Services, gate: Gate) -> FastAPI:
     """Makes the application, behind its gate, for services that are not yet started."""
     app = bare_app(services)
-    if services.reads_only:
-        app.add_middleware(lambda inner: reads_only(inner, services.store))
-    else:
-        services.metrics.registry.register(StateMetrics(services))
+    services.metrics.registry.register(StateMetrics(services))
     app.add_middleware(gate.middleware)
     return app
 

@@ -6,7 +6,6 @@ import signal
 import socket
 from collections.abc import Callable
 from contextlib import closing, suppress
-from dataclasses import replace
 from types import FrameType
 
 import uvicorn
@@ -31,7 +30,6 @@ from server.steady import keep_steady
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
 from server.store.lock import sole_use, sqlite_file
-from server.store.owner_name import owner_name
 
 KEEP_ALIVE = 60
 """Time (s) for which an idle connection stays open. Clients close theirs after a few seconds (httpx: 5 s); if the
@@ -44,11 +42,8 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal comes. Calls `ready` with the address. Raises ListenError, InUseError, StoreError,
     SpecError, StopDoorError."""
     section = settings.server
-    if section.reads_only:
-        _serve_reading(settings, ready)
-        return
     with (
-        sole_use(section.database_url) as tell_name,
+        sole_use(section.database_url),
         listening(section) as (listener, beside),
         # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
@@ -63,8 +58,6 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         _tell_sessions(services, gate, door)
         config, address = _configuration(make_app(services, gate)), _address_of(listener)
         _connect(services, door, beside)
-        bound, port = listener.getsockname()[:2]
-        tell_name(owner_name(section.names, bound, port, socket.gethostname()))
 
         def ending() -> None:
             for rig in services.robots():
@@ -77,32 +70,6 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         door.wait_ready()
         with suppress(KeyboardInterrupt):  # by then the web server has ended in order
             _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
-
-
-def _serve_reading(settings: Settings, ready: Callable[[str], None]) -> None:
-    """Does the same for a service that only reads: without lock, stop listener and audit log."""
-    # `stop_port` is that of the service that owns the arms, where both have one configuration.
-    section = settings.server.model_copy(update={"stop_port": None})
-    with listening(section) as (listener, beside):
-        services = Services(settings)
-        try:
-            gate = replace(_gate(services, section, 0), stop_port=None, audit=None)
-        except SpecError:
-            services.close()
-            raise
-        config, address = _configuration(make_app(services, gate)), _address_of(listener)
-
-        def ending() -> None:
-            for rig in services.robots():
-                rig.hub.end_waiting()
-            services.end_processes()
-
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        with suppress(KeyboardInterrupt):
-            server = _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm)
-            # Clients ask for a stop at the port after the service's, too. It is refused there by this service itself:
-            # at a port left free another service might listen, and stop an arm that nobody meant.
-            server.run([listener, beside])
 
 
 def _configuration(app: FastAPI) -> uvicorn.Config:

@@ -73,7 +73,6 @@ from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
-from server.store.lock import owner_of
 from server.store.models import ModelStore
 from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
@@ -88,8 +87,6 @@ SHUTDOWN, TIDYING = 2.0, 0.5
 robot's port finishes alone if it needs longer."""
 AUDIT_KEPT = "audit-waiting.jsonl"
 """File of the rows of the audit log that could not be written before the service ended."""
-NOTHING_KEPT = "audit-of-who-only-reads.jsonl"
-"""The same of a service that only reads, which notes nothing, and leaves the other one's file alone."""
 ENDING = 0.5
 """Time (s) to write the last rows of the audit log and of the outbox when the service ends."""
 KEEPING = 0.3
@@ -167,9 +164,7 @@ class Services:
         parse_service_address(settings.server.executor)
         bucket = open_bucket(settings.archive)
         destinations = destinations_of(settings.notifications)
-        self.reads_only = settings.server.reads_only
-        """Whether another service owns the arms, and this one only reads what that has stored."""
-        self.store = Store(settings.server.database_url, reads_only=self.reads_only)
+        self.store = Store(settings.server.database_url)
         self.store.migrate()
         self.store.require_sound()
         self.experiments = ExperimentStore(self.store)
@@ -181,8 +176,7 @@ class Services:
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
         self.audit_log = AuditLog(self.store)
-        kept = self.folder / (NOTHING_KEPT if self.reads_only else AUDIT_KEPT)
-        self.audit = Audit(AuditWriter(self.audit_log, kept), self.clock.utc)
+        self.audit = Audit(AuditWriter(self.audit_log, self.folder / AUDIT_KEPT), self.clock.utc)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
         self.stop_port = 0
@@ -207,8 +201,7 @@ class Services:
         self.notifier = self._make_notifier(settings, destinations)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
-        if not self.reads_only:
-            self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
+        self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
         """Returns all robots, in the order of the configuration."""
@@ -221,9 +214,7 @@ class Services:
         return self._robots[name]
 
     def start(self) -> None:
-        """Updates the catalogue, connects the robots and starts the queues. A service that only reads does nothing."""
-        if self.reads_only:
-            return
+        """Updates the catalogue, connects the robots and starts the queues."""
         self.notifier.start()
         for rig in self.robots():
             try:
@@ -271,8 +262,6 @@ class Services:
             self.clock, lambda holder: self._lapsed(robot, holder), lambda holder: self._given_back(robot, holder)
         )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
-
-        catalogue.reads_only = self.reads_only
         queue = self._make_queue(robot, control, catalogue, settings)
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
@@ -302,7 +291,6 @@ class Services:
                 at_once=settings.server.jobs_at_once,
                 executor=settings.server.executor,
                 workers=self.workers,
-                reads_only=self.reads_only,
             )
         )
         return RobotServices(
@@ -316,7 +304,7 @@ class Services:
             hub=hub,
             jobs=jobs,
             models=models,
-            archive=None if bucket is None or self.reads_only else self._make_archive(bucket, catalogue, name, jobs),
+            archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
             unattended=settings.server.unattended,
             audit=self.audit,
             owners=settings.robot.owners,
@@ -344,8 +332,6 @@ class Services:
         """Returns what will need somebody soon, one line each."""
         warn_at, rigs = self.settings.traces.warn_at, self.robots()
         found = self.storage_warnings()
-        if self.reads_only:
-            found.insert(0, f"this service only reads; the one that owns the arms: {owner_of(self.store)}")
         for rig in rigs:
             lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
@@ -414,7 +400,6 @@ class Services:
                 add_trace=add_trace,
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
-                reads_only=self.reads_only,
                 reviewer=None if settings.robot.review == "off" else settings.robot.review,
                 paused=lambda reason: self.notifier.tell(of_pause(robot.name, reason, self.clock.utc())),
                 ended=lambda identity, state, reason: self.notifier.tell(

@@ -40,9 +40,6 @@ class ServiceSettings(FrozenRecord):
     """Folder of the database, models and results of jobs."""
     database: str | None = None
     """URL of the database; None for a SQLite file in `folder`."""
-    reads_only: TrueOrFalse = False
-    """Whether this service only reads, beside the one that owns the arms, what both have in a database of PostgreSQL
-    (docs/service.md)."""
     connect_at_start: bool = True
     """Whether the service connects to the robot when it starts; connecting moves nothing."""
     unattended: TrueOrFalse = False

@@ -20,9 +20,6 @@ def serve(
         str | None, typer.Option(help="Address to listen on (default: the configured one, else 127.0.0.1).")
     ] = None,
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any free one.")] = None,
-    reads_only: Annotated[
-        bool, typer.Option("--reads-only", help="Only read, beside the service that owns the arms (PostgreSQL).")
-    ] = False,
 ) -> None:
     """Serve experiments, traces and the dashboard to people and programs."""
     from daq.contracts.extras import require_extra
@@ -34,11 +31,7 @@ def serve(
     call = invocation(context)
     settings = call.configuration
     section = settings.server.model_copy(
-        update={
-            key: value
-            for key, value in (("host", host), ("port", port), ("reads_only", reads_only or None))
-            if value is not None
-        }
+        update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
     )
     if not settings.robots:
         settings = settings.model_copy(update={"robot": settings.robot.model_copy(update={"port": call.port})})

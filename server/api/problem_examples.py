@@ -116,13 +116,6 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "set [archive] in its daq.toml (docs/archive.md)",
     ),
     _met(
-        ".*",
-        409,
-        "reads-only",
-        "this service only reads what is stored, and has no arm: nothing was done",
-        "ask the service that owns the arms: http://127.0.0.1:8300 at bench; an emergency stop always works",
-    ),
-    _met(
         "get .*/traces/",
         503,
         "trace-in-archive",

@@ -19,11 +19,6 @@ router = APIRouter(prefix="/robots", tags=["robots"], responses=PROBLEMS)
 @router.get("")
 async def list_robots(services: ServicesDep, _: Viewer) -> tuple[RobotSummary, ...]:
     """Lists the robots of this service."""
-    if services.reads_only:
-        return tuple(
-            RobotSummary(robot=rig.robot.name, machine=rig.robot.machine.name, connection="elsewhere", arm=None)
-            for rig in services.robots()
-        )
     return tuple(
         RobotSummary(
             robot=rig.robot.name,

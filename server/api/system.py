@@ -23,7 +23,6 @@ from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
 from server.services import Services
-from server.store.address import StoreError
 from server.store.tables import TraceRow
 
 plain = APIRouter(tags=["system"])
@@ -113,8 +112,6 @@ def _size_of(file: Path) -> int | None:
 
 
 def _checks(services: Services) -> dict[str, str]:
-    if services.reads_only:
-        return _checks_of_reading(services)
     checks = {"database": ""}
     file = _database_file(services)
     try:
@@ -131,19 +128,6 @@ def _checks(services: Services) -> dict[str, str]:
         if rig.archive is not None:
             checks[f"archive of {rig.robot.name}"] = "; ".join(rig.archive.warnings(services.settings.traces.warn_at))
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
-    return checks
-
-
-def _checks_of_reading(services: Services) -> dict[str, str]:
-    """What a service that only reads needs: tables of its version, and the folders. It writes neither."""
-    checks = {"database": ""}
-    try:
-        services.store.require_version()
-    except StoreError as error:
-        checks["database"] = one_line(error)
-    for rig in services.robots():
-        name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
-        checks[name] = "" if rig.catalogue.folder.is_dir() else f"{rig.catalogue.folder}: there is no such folder"
     return checks
 
 

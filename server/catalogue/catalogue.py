@@ -76,8 +76,6 @@ class Catalogue:
         self._lock = threading.Lock()
         self.limits = limits
         self.archive: Fetching | None = None
-        self.reads_only = False
-        """Whether another service fetches traces from the archive, and this one has only what is there."""
         self._opened: dict[str, float] = {}
         self._pruned = time.monotonic()
         self._opening = threading.Lock()
@@ -178,9 +176,6 @@ class Catalogue:
         if not self._traces.is_archived(identity):
             advice = "it was removed from the folder of traces: upload it again, or delete the trace"
             raise not_found(f"file for trace {identity!r} any more", advice)
-        if self.reads_only:
-            line = f"only the archive has trace {identity!r}, and this service only reads what is in the folder"
-            raise conflict("reads-only", line, "fetch it at the service that owns the arms")
         if self.archive is None:
             line = f"only the archive has trace {identity!r}, and this service has no archive"
             raise conflict("no-archive", line, "set [archive] in its daq.toml (docs/archive.md)")

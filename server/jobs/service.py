@@ -63,8 +63,6 @@ class JobContext:
     make_executor: Callable[[str, int], Workers] = job_workers
     workers: SharedWorkers | None = None
     """The workers that the robots of a service share; None for workers of its own."""
-    reads_only: bool = False
-    """Whether another service computes the jobs, and this one only lists them."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +88,7 @@ class JobService:
         """Waiting jobs whose traces are fetched from the archive."""
         self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
-        if not context.reads_only:
-            context.jobs.settle_after_restart(context.robot, context.clock.utc())
+        context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
     def start(self) -> None:
         """Starts to compute waiting jobs. Jobs never move the arm."""

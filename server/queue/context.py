@@ -40,8 +40,6 @@ class QueueContext:
     add_unfinished_traces: Callable[[], None]
     """Called after a run whose trace could not be closed or added to the catalogue, to add what was written of it."""
     unattended: bool
-    reads_only: bool = False
-    """Whether another service runs the experiments, and this one only lists them."""
     reviewer: Reviewer | None = None
     """Who must approve an experiment before it moves a real arm; None for nobody."""
     paused: Callable[[str], None] = lambda _reason: None

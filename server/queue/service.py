@@ -78,11 +78,8 @@ class QueueService:
         self._runs = DueRuns(context)
         self.review = Review.of(context.robot.name, context.robot.place.machine, context.reviewer)
         """The rule by which experiments are approved before they move a real arm."""
-        if context.reads_only:
-            self._state = QueueState(True, "this service only reads", context.clock.utc())
-        else:
-            self._state = self._state_at_start()
-            self._runs.leave_out_missed()
+        self._state = self._state_at_start()
+        self._runs.leave_out_missed()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
 
     def start(self) -> None:

@@ -10,14 +10,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import resources
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 from alembic import command
 from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from pydantic import ValidationError
 from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, DBAPIError, OperationalError
@@ -44,14 +41,9 @@ __all__ = ["Store", "StoreError", "migrations"]
 class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
-    def __init__(self, url: str, *, reads_only: bool = False) -> None:
-        """reads_only: for a service that reads beside the one that writes. Raises StoreError if the database is not of
-        PostgreSQL, then."""
+    def __init__(self, url: str) -> None:
+        """Raises StoreError."""
         parsed = parse_address(url)
-        if reads_only and parsed.get_backend_name() != "postgresql":
-            line = f"database {masked(parsed)}: a service that only reads needs one of PostgreSQL"
-            raise StoreError(f"{line}: name it in server.database, or leave out server.reads_only and --reads-only")
-        self._reads_only = reads_only
         if parsed.get_backend_name() == "sqlite" and parsed.database:
             try:
                 Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
@@ -69,8 +61,6 @@ class Store:
             event.listen(self.engine, "begin", _begin)
         elif parsed.get_backend_name() == "postgresql":
             event.listen(self.engine, "connect", _planned_anew)
-            if reads_only:
-                event.listen(self.engine, "connect", _reading_alone)
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
@@ -79,14 +69,9 @@ class Store:
         event.listen(self.engine, "before_cursor_execute", self._note_statement)
         self._changes: Counter[str] = Counter()
         """Number of transactions written so far that changed each table."""
-        self._looks = count(1)
 
     def migrate(self) -> None:
-        """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version. A store
-        that only reads raises StoreError for tables of any other version."""
-        if self._reads_only:
-            self.require_version()
-            return
+        """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version."""
         try:
             with self.engine.connect() as connection:
                 config = migrations()
@@ -101,19 +86,6 @@ class Store:
         except Exception as error:
             line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
             raise StoreError(f"{line}; {BRING_BACK}") from error
-
-    def require_version(self) -> None:
-        """Raises StoreError unless the tables are of this version, and the database can be reached."""
-        try:
-            with self.engine.connect() as connection:
-                there = MigrationContext.configure(connection).get_current_revision()
-        except DatabaseError as error:
-            line = f"database {self.place}: cannot be opened: {line_of(error)}"
-            raise StoreError(f"{line}; {advice_of(error)}") from error
-        own = ScriptDirectory.from_config(migrations()).get_current_head()
-        if there != own:
-            line = f"database {self.place}: its tables are of version {there or 'none'}, and this program's of {own}"
-            raise StoreError(f"{line}: a service that only reads changes no tables; give both services one version")
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
@@ -140,9 +112,7 @@ class Store:
 
     def changes_of(self, tables: Iterable[str]) -> int:
         """Returns a number that grows with every transaction that has changed one of these tables: what was read before
-        may be out of date. Beside another service that writes, it grows with every call."""
-        if self._reads_only:
-            return next(self._looks)
+        may be out of date."""
         return self._changes[_ANY] + sum(self._changes[table] for table in tables)
 
     @contextmanager
@@ -222,13 +192,6 @@ def _planned_anew(connection: Any, _record: Any) -> None:
         cursor.execute("SET plan_cache_mode = force_custom_plan")
         cursor.execute("SET jit = off")
         cursor.execute("SET join_collapse_limit = 1")
-    connection.commit()
-
-
-def _reading_alone(connection: Any, _record: Any) -> None:
-    """Lets PostgreSQL refuse every change that this connection asks for."""
-    with connection.cursor() as cursor:
-        cursor.execute("SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY")
     connection.commit()
 
 

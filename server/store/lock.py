@@ -8,7 +8,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine, text
@@ -18,17 +18,11 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from server.database_errors import line_of
 from server.store.address import StoreError, masked, open_engine, parse_address
-from server.store.engine import Store
 
 LOOKED_AT = 10.0
 """Time (s) between two looks at the lock of PostgreSQL, which is lost when its server is started again."""
 _NUMBER = int.from_bytes(b"ma2000dq")
 """Number of the advisory lock. Locks of different databases of one server do not meet."""
-_HOLDER = text(
-    "SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid) WHERE locktype = 'advisory' AND granted"
-    " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-    " AND objsubid = 1 AND (classid::bigint << 32) + objid::bigint = :number"  # 1: a lock of one number, not of two
-)
 log = logging.getLogger("server")
 
 
@@ -45,30 +39,21 @@ def sqlite_file(url: str) -> Path | None:
 
 
 @contextmanager
-def sole_use(url: str) -> Iterator[Callable[[str], None]]:
+def sole_use(url: str) -> Iterator[None]:
     """Keeps other services and restores from using this database within the block. Raises InUseError, and StoreError
-    if a database server cannot be reached. Yields a function that tells services that only read who this is.
+    if a database server cannot be reached.
 
     Databases other than SQLite and PostgreSQL are not locked.
     """
     file = sqlite_file(url)
     if file is not None:
         with _locked_file(file):
-            yield lambda _name: None
+            yield
     elif parse_address(url).get_backend_name() == "postgresql":
-        with _locked_server(url) as lock:
-            yield lock.tell
+        with _locked_server(url):
+            yield
     else:
-        yield lambda _name: None
-
-
-def owner_of(store: Store) -> str:
-    """Returns who holds the lock of a database of PostgreSQL now, in words."""
-    with store.reading() as session:
-        found = session.execute(_HOLDER, {"number": _NUMBER}).first()
-    if found is None:
-        return "none runs now"
-    return found[0] or "its name is not known"
+        yield
 
 
 @contextmanager
@@ -88,13 +73,13 @@ def _locked_file(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _locked_server(url: str) -> Iterator[ServerLock]:
+def _locked_server(url: str) -> Iterator[None]:
     engine = open_engine(url)
     place = masked(parse_address(url))
     try:
         lock = ServerLock(engine, place, lambda: os.kill(os.getpid(), signal.SIGTERM))
         try:
-            yield lock
+            yield
         finally:
             lock.close()
     finally:
@@ -111,7 +96,6 @@ class ServerLock:
         self._place = place
         self._lost = lost
         self._closing = threading.Event()
-        self._name = ""
         self._using = threading.Lock()
         """Held by who uses the connection."""
         try:
@@ -120,16 +104,6 @@ class ServerLock:
             raise StoreError(f"database {place}: cannot be opened: {line_of(error)}") from error
         self._watch = threading.Thread(target=self._look_again, name="database lock", daemon=True)
         self._watch.start()
-
-    def tell(self, name: str) -> None:
-        """Tells services that only read who holds the lock: by the name of its connection, which ends with it."""
-        self._name = name
-        with self._using, suppress(DatabaseError):  # the next look takes the lock again, and tells the name
-            self._tell(self._connection)
-
-    def _tell(self, connection: Connection | None) -> None:
-        if connection is not None and self._name:
-            connection.execute(text("SELECT set_config('application_name', :name, false)"), {"name": self._name})
 
     def look(self) -> bool:
         """Returns whether the lock is held, after taking it again if the connection was lost. False, with one line in
@@ -169,7 +143,6 @@ class ServerLock:
     def _taken(self) -> Connection:
         connection = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
         if connection.execute(text("SELECT pg_try_advisory_lock(:number)"), {"number": _NUMBER}).scalar():
-            self._tell(connection)
             return connection
         connection.close()
         raise InUseError(f"database {self._place}: a service uses it; end that one first")

@@ -104,10 +104,8 @@ class RobotSummary(Wire):
 
     robot: str
     machine: str
-    connection: ConnectionState | Literal["elsewhere"]
-    """`elsewhere`: this service only reads, and another one owns the arm."""
-    arm: ArmState | None
-    """None where that is not known here."""
+    connection: ConnectionState
+    arm: ArmState
 
 
 class StopResult(Wire):

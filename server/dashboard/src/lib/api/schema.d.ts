@@ -5448,10 +5448,16 @@ export interface components {
             robot: string;
             /** Machine */
             machine: string;
-            /** Connection */
-            connection: ("disconnected" | "connecting" | "connected" | "lost") | "elsewhere";
-            /** Arm */
-            arm: ("disconnected" | "idle" | "armed" | "running" | "stopped" | "fault") | null;
+            /**
+             * Connection
+             * @enum {string}
+             */
+            connection: "disconnected" | "connecting" | "connected" | "lost";
+            /**
+             * Arm
+             * @enum {string}
+             */
+            arm: "disconnected" | "idle" | "armed" | "running" | "stopped" | "fault";
         };
         /**
          * Rod
