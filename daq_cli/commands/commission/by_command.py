@@ -52,12 +52,16 @@ def stop(bench: Bench) -> dict[str, Any]:
             bench.consent, what="it will be stopped where it stands, and released again", refused="it is stopped"
         )
         asked.require(bench.call.port, controller.identity)
+        if StatusFlag.FROZEN in controller.status().flags:  # while the person was asked, by somebody else
+            raise NotCommissionedError(
+                "the arm has been stopped meanwhile: look at it; this step releases no such stop"
+            )
         begun = time.perf_counter()
         confirmation = controller.stop()
         taken = 1e3 * (time.perf_counter() - begun)
         if not confirmation.acknowledged:
             raise NotCommissionedError(f"the stop was not confirmed: {confirmation.problem}. Use the emergency stop")
-        controller.release()
+        controller.release(controller.status().stop)
     return {
         "confirmed_ms": round(taken, 2),
         "frozen": [confirmation.frozen[joint] for joint in sorted(confirmation.frozen)],
