@@ -199,19 +199,34 @@ class Controller:
             return StopConfirmation(sent=True, acknowledged=False, problem=str(error))
 
     def stop_here(self, stop: int) -> int:
-        """Ends the stop of number `stop` by another one: the set points are then the posture measured now. A second
-        stop alone would change nothing, since the board measures the posture when a stop begins.
+        """Ends the stop of number `stop` by another one, whose number it returns: the set points are then the posture
+        measured now. A second stop alone would change nothing: the board measures the posture when a stop begins.
 
-        Returns the new stop's number, by which it alone is released: the question for it is written with the stop.
         Raises RequestRefusedError when there is a newer stop than `stop`: that one holds. Raises NotFrozenError.
         """
         self.release(stop)
+        confirmation, number = self.stop_numbered()
+        if not confirmation.acknowledged:
+            raise NotFrozenError(f"reset here: {confirmation.problem}; the set points are not known to be here")
+        if number is None:
+            raise RequestRefusedError("Release", Refusal.OTHER_STOP)
+        return number
+
+    def stop_numbered(self) -> tuple[StopConfirmation, int | None]:
+        """Freezes the arm as `stop` does, for a release to come. Returns the number of this very stop, too, by which
+        it alone is released; None where somebody else had stopped the arm already, so that nothing may be released.
+
+        What the board is asked before and after the stop is written with it, so that nothing comes between.
+        """
         try:
-            stopped, status = self.link.exchange(Stop(), ReadStatus())
-            self._frozen(expect(Stop(), stopped, Stopped))
-            return expect(ReadStatus(), status, Status).stop
-        except (LinkError, RequestRefusedError) as error:
-            raise NotFrozenError(f"reset here: {error}; the set points are not known to be here") from error
+            before, stopped, after = self.link.exchange(ReadStatus(), Stop(), ReadStatus())
+            was_frozen = StatusFlag.FROZEN in StatusFlag(expect(ReadStatus(), before, Status).status)
+            confirmation = self._frozen(expect(Stop(), stopped, Stopped))
+            return confirmation, None if was_frozen else expect(ReadStatus(), after, Status).stop
+        except LinkError as error:
+            return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error)), None
+        except RequestRefusedError as error:
+            return StopConfirmation(sent=True, acknowledged=False, problem=str(error)), None
 
     def _frozen(self, stopped: Stopped) -> StopConfirmation:
         frozen = dict(zip(self.joints, stopped.postures, strict=True))
