@@ -216,10 +216,13 @@ class Controller:
         """Freezes the arm as `stop` does, for a release to come. Returns the number of this very stop, too, by which
         it alone is released; None where somebody else had stopped the arm already, so that nothing may be released.
 
-        What the board is asked before and after the stop is written with it, so that nothing comes between.
+        What the board is asked before and after the stop is written with it, so that nothing comes between. A line
+        protocol of another kind has one host, and is asked one after the other.
         """
+        asked = (ReadStatus(), Stop(), ReadStatus())
+        together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
         try:
-            before, stopped, after = self.link.exchange(ReadStatus(), Stop(), ReadStatus())
+            before, stopped, after = (reply for requests in together for reply in self.link.exchange(*requests))
             was_frozen = StatusFlag.FROZEN in StatusFlag(expect(ReadStatus(), before, Status).status)
             confirmation = self._frozen(expect(Stop(), stopped, Stopped))
             return confirmation, None if was_frozen else expect(ReadStatus(), after, Status).stop

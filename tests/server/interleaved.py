@@ -129,7 +129,7 @@ class Wire:
     """The link to a board that stops and releases, and what the board has seen. It is `Link` to whoever uses it."""
 
     state, url, lock_step, complaint = LinkState.CONNECTED, "wire", False, ""
-    counters = SimpleNamespace(numbers=dict)
+    counters, scale = SimpleNamespace(numbers=dict), SimpleNamespace(turn_bytes=None)
 
     def __init__(self, world: World) -> None:
         self.world = world

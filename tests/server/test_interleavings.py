@@ -84,8 +84,8 @@ class People:
 
     def seen(self) -> int:
         """The stop that the page shows, as soon as it shows one."""
-        self.scene.world.until(lambda: self.rig.status().stop is not None)
-        return int(self.rig.status().stop)
+        self.scene.world.until(lambda: self.rig.robot.arm.stop is not None)
+        return int(self.rig.robot.arm.stop)
 
     def reset(self, *, here: bool = False, stop: int | None = None) -> None:
         request = ResetRequest(stop=self.seen() if stop is None else stop, here=here)
