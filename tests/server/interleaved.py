@@ -248,6 +248,8 @@ class InboxHere(Inbox):
         self._drive, self._said, self._long = None, -math.inf, 0
         self._world, self._end = world, end
         self.idle: Callable[[], bool] = lambda: True
+        self.sent: dict[int, float] = {}
+        """When each order was sent in truth, whatever it says."""
 
     def take(self, patience: float = 0.0) -> Any:
         """Waits while there is nothing else to do, and notes whose order comes next."""
@@ -256,7 +258,7 @@ class InboxHere(Inbox):
             self._world.until(lambda: not self._waiting.empty() or self.closing.is_set() or not self.idle())
         order = super().take()
         if order is not None:
-            me.sent, me.named = order.asked, getattr(order, "stop", None)
+            me.sent, me.named = self.sent[order.number], getattr(order, "stop", None)
         return order
 
     def _end_what_runs(self, said: bytes) -> None:
@@ -454,6 +456,8 @@ class Scene:
 
     def _ask(self, kind: Callable[..., Any], **fields: object) -> Told:
         number = len(self.asked) + 1
+        me = cast(Actor, greenlet.getcurrent())
+        self.inbox.sent[number] = self.world.clock.now if me.sent == -math.inf else me.sent
         self.asked[number] = answer = Told(self.world)
         self.inbox._put(kind(number=number, **fields))
         return answer

@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from typing import Any, cast
 
+import greenlet
 import pytest
 
 from daq.acquisition import guardian
@@ -24,9 +25,9 @@ from server.owner import long_orders, owned_robot, owner, quick_orders
 from server.problems import ProblemError
 from server.queue.service import Review
 from server.robot import control
-from tests.server.interleaved import RULE, Scene, World, moved
+from tests.server.interleaved import RULE, Actor, Scene, World, moved
 
-SOON, ALL = 400, 4000
+SOON, ALL = 300, 2500
 """Seeds of each scene: in every run of the tests, and in the slow one."""
 SERVICES: Any = SimpleNamespace(record_event=lambda *_, **__: None)
 
@@ -63,7 +64,7 @@ class People:
 
     def ask(self, carried_out: Callable[[float], object]) -> None:
         """A request: its first byte, its last one, its turn among the threads."""
-        arrived = self.scene.world.clock.now
+        arrived = cast(Actor, greenlet.getcurrent()).sent = self.scene.world.clock.now
         self.scene.world.step()
         self.scene.world.step()
         carried_out(arrived)
