@@ -21,6 +21,7 @@ import shutil
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -221,8 +222,9 @@ def _move(service: RunningService, seconds: float) -> None:
     """Lets the arm sway for the rest of the measurement. A busy machine may have ended it: the owner of the port does,
     when samples come too late."""
     if not _is_moving(service):
-        for path in ("/reset", "/queue/resume"):
-            service.robot.post(path, json={})  # where it is refused the arm stands still, and the figures say so
+        with suppress(RuntimeError):  # where it is refused the arm stands still, and the figures say so
+            service.reset()
+            service.ask("POST", "/queue/resume", json={})
         service.submit(sway(4 * (seconds + WARM_UP) + 40))
 
 

@@ -235,7 +235,7 @@ class Campaign:
         return str(ended["trace"])
 
     def _resume(self) -> None:
-        self._there.ask("POST", "/reset", json={})
+        self._there.reset()
         self._there.ask("POST", "/queue/resume", json={})
 
     def _occupy(self, victim: str) -> None:

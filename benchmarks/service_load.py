@@ -112,7 +112,7 @@ def jitter(path: Path) -> tuple[list[float], int]:
 
 def ready_again(service: RunningService) -> None:
     """Makes the robot ready after a run that was not completed."""
-    service.ask("POST", "/reset", json={})
+    service.reset()
     service.ask("POST", "/queue/resume", json={})
 
 

@@ -44,6 +44,13 @@ class RunningService:
             raise RuntimeError(f"{method} {path}: {answer.status_code} {answer.text}")
         return answer.json() if answer.content else None
 
+    def reset(self) -> None:
+        """Ends the stop that is in force. Raises RuntimeError as `ask` does."""
+        address = str(self.robot.base_url).rstrip("/")
+        while (found := self.ask("GET", address))["stop"] is None and found["arm"] != "disconnected":
+            time.sleep(0.02)  # the owner of the port has yet to read its number
+        self.ask("POST", "/reset", json={"stop": found["stop"] or 0})
+
     def submit(self, spec: dict[str, Any]) -> str:
         """Queues an experiment; its number."""
         return str(self.ask("POST", "/experiments", json={"spec": spec})["id"])

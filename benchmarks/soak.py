@@ -101,7 +101,7 @@ def _batch(service: RunningService) -> None:
 def _in_between(service: RunningService) -> None:
     """A stop, a reset, and a moment of control: what people do between runs."""
     service.ask("POST", "/stop")
-    service.ask("POST", "/reset", json={})
+    service.reset()
     lease = {"Control-Lease": service.ask("POST", "/control", json={})["lease"]}
     service.ask("PUT", "/gains", json={"gains": {"6": [2, 0, 0]}}, headers=lease)
     service.ask("DELETE", "/control", headers=lease)

@@ -62,8 +62,8 @@ class Guardian:
         self._wakeup_before = -1
         self._closing = False
         self._cause: EndCause | None = None
-        self._asked = -math.inf
-        """When the newest request to end came: monotonic clock, s."""
+        self._answered = -math.inf
+        """When the newest request to end was carried out (monotonic clock, s); infinite while one is under way."""
         self._lock = threading.Lock()
         """Held for moments only: of cause and time of the newest request together."""
 
@@ -76,16 +76,17 @@ class Guardian:
 
     def forget(self, asked: float) -> bool:
         """For an explicit reset, asked for at this moment (monotonic clock, s): what ended the work before ends nothing
-        any more. False, and nothing is forgotten, when somebody has wanted the end since."""
+        any more. False, and nothing is forgotten, for a request that is `outdated`."""
         with self._lock:
-            if self.newer_than(asked):
+            if self.outdated(asked):
                 return False
             self._cause = None
             return True
 
-    def newer_than(self, asked: float) -> bool:
-        """Whether somebody has wanted the end since this moment (monotonic clock, s)."""
-        return self._asked >= asked
+    def outdated(self, asked: float) -> bool:
+        """Whether what was asked for at this moment (monotonic clock, s) was asked before the newest request to end had
+        been carried out: whoever asked did not know of that."""
+        return self._answered >= asked
 
     def __enter__(self) -> Self:
         self._wake_read, self._wake_write = os.pipe()
@@ -122,9 +123,12 @@ class Guardian:
 
     def _end(self, cause: EndCause) -> StopAnswer:
         with self._lock:
-            self._asked = time.monotonic()
+            self._answered = math.inf
             self._cause = self._cause or cause
-        return self._freeze(cause.value)
+        try:
+            return self._freeze(cause.value)
+        finally:
+            self._answered = time.monotonic()
 
     def _listen(self) -> None:
         watched = select.poll()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 
 from daq.client import stopping
@@ -22,6 +23,9 @@ from daq.contracts.service.teaching import CalibrationRequest, TeachingStatus
 
 CONNECT_PATIENCE = 60.0
 """Time (s) allowed for a mock with its physics engine to start on a busy computer."""
+NUMBERED_WITHIN, LOOK_EVERY = 5.0, 0.02
+"""Times (s) for the service to read the number of a stop just made, which takes a control period or two, and between
+two looks for it."""
 
 
 class Robot:
@@ -64,9 +68,20 @@ class Robot:
         """Has the service give the port back."""
         return self._connection.ask(Done, Request("POST", f"{self._path}/disconnect"))
 
-    def reset(self, *, here: bool = False) -> Done:
-        """Ends a stop or a fault; with `here` the posture measured now becomes the set points first."""
-        return self._connection.ask(Done, Request("POST", f"{self._path}/reset", ResetRequest(here=here)))
+    def reset(self, *, here: bool = False, stop: int | None = None) -> Done:
+        """Ends a stop or a fault; with `here` the posture measured now becomes the set points first.
+
+        stop: which one, by `RobotStatus.stop`; None for the one that is in force when this is called. A later one
+            holds, and raises ServiceError.
+        """
+        body = ResetRequest(stop=self._newest_stop() if stop is None else stop, here=here)
+        return self._connection.ask(Done, Request("POST", f"{self._path}/reset", body))
+
+    def _newest_stop(self) -> int:
+        until = time.monotonic() + NUMBERED_WITHIN
+        while (found := self.status()).stop is None and found.arm != "disconnected" and time.monotonic() < until:
+            time.sleep(LOOK_EVERY)
+        return found.stop or 0  # which releases no stop: the service says what is wrong
 
     def gains(self) -> JointGains:
         """P, I, D of every joint."""

@@ -7,6 +7,7 @@ from daq.driver.errors import (
     GainsNotTakenError,
     HardwareFaultError,
     NoSampleError,
+    NotFrozenError,
     ProtocolVersionError,
 )
 from daq.driver.line_rate import LineRate
@@ -26,6 +27,7 @@ __all__ = [
     "LineRate",
     "LockStepClock",
     "NoSampleError",
+    "NotFrozenError",
     "ProtocolVersionError",
     "RealClock",
     "StopConfirmation",

@@ -17,14 +17,14 @@ from typing import Self
 
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.driver.double_read import DoubleReader
-from daq.driver.errors import GainsNotTakenError, ProtocolVersionError
+from daq.driver.errors import GainsNotTakenError, NotFrozenError, ProtocolVersionError
 from daq.driver.line_rate import LineRate, line_rate, polled_rate
 from daq.driver.polled_sampling import PolledSampling
 from daq.driver.sampling import Deliveries, MemorySampling, RingSampling, Sampling
 from daq.driver.set_point_watch import SetPointWatch
 from daq.driver.snapshot import BoardSnapshot
 from daq.driver.stop import StopConfirmation
-from daq.link import Link, LinkCounters, LinkError, LinkState, RequestRefusedError
+from daq.link import Link, LinkCounters, LinkError, LinkState, RequestRefusedError, expect
 from daq.transport import TransportError
 from firmware_protocol.commands import (
     ALL_JOINTS,
@@ -49,6 +49,8 @@ from firmware_protocol.commands import (
     SetPointsTaken,
     Status,
     StatusFlag,
+    Stop,
+    Stopped,
     WriteOutputs,
     joints_of,
     mask_of,
@@ -190,34 +192,64 @@ class Controller:
         """Freezes the arm at its measured posture. At once, from any thread, as often as one likes; never raises
         for a link that fails: the confirmation says what is known."""
         try:
-            stopped = self.link.stop()
+            return self._frozen(self.link.stop())
         except LinkError as error:
             return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error))
         except RequestRefusedError as error:
             return StopConfirmation(sent=True, acknowledged=False, problem=str(error))
+
+    def stop_here(self, stop: int) -> int:
+        """Ends the stop of number `stop` by another one, whose number it returns: the set points are then the posture
+        measured now. A second stop alone would change nothing: the board measures the posture when a stop begins.
+
+        Raises RequestRefusedError when there is a newer stop than `stop`: that one holds. Raises NotFrozenError.
+        """
+        self.release(stop)
+        confirmation, number = self.stop_numbered()
+        if not confirmation.acknowledged:
+            raise NotFrozenError(f"reset here: {confirmation.problem}; the set points are not known to be here")
+        if number is None:
+            raise RequestRefusedError("Release", Refusal.OTHER_STOP)
+        return number
+
+    def stop_numbered(self) -> tuple[StopConfirmation, int | None]:
+        """Freezes the arm as `stop` does, for a release to come. Returns the number of this very stop, too, by which
+        it alone is released; None where somebody else had stopped the arm already, so that nothing may be released.
+
+        What the board is asked before and after the stop is written with it, so that nothing comes between. A line
+        protocol of another kind has one host, and is asked one after the other.
+        """
+        asked = (ReadStatus(), Stop(), ReadStatus())
+        together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
+        try:
+            before, stopped, after = (reply for requests in together for reply in self.link.exchange(*requests))
+            was_frozen = StatusFlag.FROZEN in StatusFlag(expect(ReadStatus(), before, Status).status)
+            confirmation = self._frozen(expect(Stop(), stopped, Stopped))
+            return confirmation, None if was_frozen else expect(ReadStatus(), after, Status).stop
+        except LinkError as error:
+            return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error)), None
+        except RequestRefusedError as error:
+            return StopConfirmation(sent=True, acknowledged=False, problem=str(error)), None
+
+    def _frozen(self, stopped: Stopped) -> StopConfirmation:
         frozen = dict(zip(self.joints, stopped.postures, strict=True))
         self._watch.replaced(frozen, stopped.tick + 1)
         return StopConfirmation(sent=True, acknowledged=True, tick=stopped.tick, frozen=frozen)
 
-    def release(self, stop: int | None = None) -> None:
+    def release(self, stop: int) -> None:
         """Ends the freeze; the set points stay where the stop put them. Takes the control back from another host.
 
-        `stop` is the number of the stop that is to end (`ControllerStatus.stop`, read when the release was asked for);
-        None is the newest. Raises RequestRefusedError when there is a newer one: that one holds. Raises
-        ControllerRestartedError.
+        `stop` is the number of the stop that is to end: `ControllerStatus.stop` as it was seen by whoever asks. Raises
+        RequestRefusedError when there is a newer one: that one holds. Raises ControllerRestartedError.
         """
         try:
-            self._release(stop)
+            self.link.request(Release(stop), Released)
         except RequestRefusedError as error:
             if error.reason != Refusal.BAD_SESSION:
                 raise
             self._deliveries.check_restart(self.link.request(ReadStatus(), Status).status)
             self.hello()
-            self._release(stop)
-
-    def _release(self, stop: int | None) -> None:
-        named = self.link.request(ReadStatus(), Status).stop if stop is None else stop
-        self.link.request(Release(named), Released)
+            self.link.request(Release(stop), Released)
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
         """Joint → (P, I, D), each 0–20; empty where the memory map, the bridge's or the own one, has no gains."""

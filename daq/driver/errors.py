@@ -30,6 +30,12 @@ class GainsNotTakenError(DaqError):
     exit_code = exit_codes.FAULT
 
 
+class NotFrozenError(DaqError):
+    """The board has not confirmed that it took the measured posture as its set points."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
 class HardwareFaultError(DaqError):
     """A drive reports that something is wrong with it, or does not hold its joint any more."""
 

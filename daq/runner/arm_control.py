@@ -38,6 +38,8 @@ class ArmControl:
         self._arm = Arm()
         self._halted: str | None = None
         self._frozen = False
+        self.freezes = 0
+        """Number of stops that have been sent and answered, or given up."""
         self.handle(Event.CONNECTED)
 
     @property
@@ -55,9 +57,9 @@ class ArmControl:
         """Whether set points may be sent now."""
         return self._arm.state is State.RUNNING and self._halted is None
 
-    def handle(self, event: Event, cause: str | None = None, stop: int | None = None) -> StopConfirmation | None:
+    def handle(self, event: Event, cause: str | None = None, stop: int = 0) -> StopConfirmation | None:
         """Takes an event and carries out its actions; returns what became of a freeze, if there was one. A RESET ends
-        the stop of number `stop` and no other; None is the newest.
+        the stop of number `stop` and no other.
 
         Raises StoppedError for an orderly step when the arm has been halted meanwhile, IllegalEventError, LinkError
         when a release cannot be sent, and RequestRefusedError when there is a newer stop.
@@ -98,10 +100,11 @@ class ArmControl:
 
     def _freeze(self) -> StopConfirmation:
         confirmation = self._controller.stop()
+        self.freezes += 1
         self._frozen = self._frozen or confirmation.acknowledged
         return confirmation
 
-    def _release(self, stop: int | None) -> None:
+    def _release(self, stop: int) -> None:
         self._controller.release(stop)
         if self._halted is not None:
             # A stop was written while the release was on its way, and the release may have undone it.

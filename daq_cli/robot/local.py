@@ -10,9 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq.contracts import exit_codes
 from daq.contracts.consent import lacks_consent
-from daq.contracts.errors import DaqError, ReachError, SafetyError, SpecError, TraceError
+from daq.contracts.errors import ReachError, SafetyError, SpecError, TraceError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.robot.answers import BagChoice, ImportedTrace, ResetDone, RobotState
@@ -32,12 +31,6 @@ if TYPE_CHECKING:
 
 SIGNALS = 8
 """Number of process inputs, and of outputs."""
-
-
-class NotFrozenError(DaqError):
-    """The board has not confirmed that it took the measured posture as its set points."""
-
-    exit_code = exit_codes.NOT_REACHED
 
 
 @dataclass
@@ -164,21 +157,14 @@ class LocalRobot:
         return stop_configured(self.call, reached)
 
     def reset(self, *, adopt_posture: bool) -> ResetDone:
-        """Ends the stop that the board is in. Raises NotFrozenError."""
+        """Ends the stop that the board is in when this begins. Raises NotFrozenError."""
         from daq.contracts.limp import doubts_line
         from firmware_protocol.commands import StatusFlag
 
         with self._connected() as controller:
             status = controller.status()
-            frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # this ends no stop that comes later
-            if adopt_posture:
-                # A second stop would change nothing: the board measures the posture when a stop begins.
-                controller.release(stop)
-                stopped = controller.stop()
-                if not stopped.acknowledged:
-                    raise NotFrozenError(f"reset --here: {stopped.problem}; the set points are not known to be here")
-                stop = controller.status().stop
-            controller.release(stop)
+            frozen = StatusFlag.FROZEN in status.flags
+            controller.release(controller.stop_here(status.stop) if adopt_posture else status.stop)
             limp = doubts_line(controller.gains())
         if not frozen and not adopt_posture:
             return ResetDone("was not stopped", limp)

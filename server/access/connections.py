@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from http import HTTPStatus
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
@@ -74,9 +75,11 @@ class Connection(HttpToolsProtocol):
         super().data_received(data)
 
     def on_message_begin(self) -> None:
-        """Resets the counts at the beginning of a request."""
+        """Resets the counts at the beginning of a request, and notes when it arrived: from here on it may wait for its
+        other bytes, for the request before it on this connection, and for a thread."""
         self._silent = 0
         super().on_message_begin()
+        self.scope["state"]["arrived"] = time.monotonic()
         self._reading_head, self._headers, self._head, self._untold = True, 0, 0, 0
 
     def on_url(self, url: bytes) -> None:

@@ -89,7 +89,7 @@ class Gate:
     async def _http(self, app: ASGIApp, scope: Scope, receive: Receive, send: Send) -> None:
         begun = time.perf_counter()
         state = scope.setdefault("state", {})
-        state["arrived"] = time.monotonic()
+        state.setdefault("arrived", time.monotonic())
         state["request_id"] = request_id = secrets.token_hex(8)
         logs.request_id.set(request_id)
         status = 500

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
-from server.api.dependencies import LeaseHeader, Operator, RobotDep, ServicesDep, Viewer
+from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, ServicesDep, Viewer
 from server.owner.messages import Answer, MoveGripper, ReadGains, ReadProcess, WriteGains, WriteOutput
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
@@ -18,14 +18,19 @@ OutputNumber = Annotated[int, Path(ge=0, le=7)]
 
 
 @router.get("/gains")
-def get_gains(rig: RobotDep, _: Viewer) -> JointGains:
+def get_gains(rig: RobotDep, _: Viewer, arrived: Arrived) -> JointGains:
     """Reads the gains P, I and D of every joint from the controller."""
-    return JointGains.model_validate(answer_of(rig.robot, ReadGains).data)
+    return JointGains.model_validate(answer_of(rig.robot, ReadGains, arrived).data)
 
 
 @router.put("/gains")
 def set_gains(
-    request: JointGains, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
+    request: JointGains,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
+    arrived: Arrived,
+    lease: LeaseHeader = None,
 ) -> JointGains:
     """Writes gains of the named joints and reads all back. Refused for a joint that would jump to its set point."""
     rig.require_motion(lease)
@@ -33,16 +38,16 @@ def set_gains(
     for joint in request.gains:
         if joint > count:
             raise SpecError(f"gains.{joint}: {rig.robot.machine.name} has joints 1 to {count}")
-    gains = JointGains.model_validate(answer_of(rig.robot, WriteGains, gains=request.gains).data)
+    gains = JointGains.model_validate(answer_of(rig.robot, WriteGains, arrived, gains=request.gains).data)
     gains_of = ", ".join(f"joint {joint}: {'/'.join(map(str, gain))}" for joint, gain in sorted(request.gains.items()))
     services.record_event(rig.robot.name, "gains", f"gains set: {gains_of}", actor=caller.name)
     return gains
 
 
 @router.get("/process")
-def get_process(rig: RobotDep, _: Viewer) -> ProcessState:
+def get_process(rig: RobotDep, _: Viewer, arrived: Arrived) -> ProcessState:
     """Reads the process inputs and outputs, and the gripper."""
-    return _process(answer_of(rig.robot, ReadProcess))
+    return _process(answer_of(rig.robot, ReadProcess, arrived))
 
 
 @router.put("/process/outputs/{output}")
@@ -52,12 +57,13 @@ def set_output(
     rig: RobotDep,
     services: ServicesDep,
     caller: Operator,
+    arrived: Arrived,
     lease: LeaseHeader = None,
 ) -> ProcessState:
     """Switches one process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped` is set."""
     rig.require_motion(lease)
     switched = {"output": output, "on": request.on, "while_stopped": request.while_stopped}
-    state = _process(answer_of(rig.robot, WriteOutput, **switched))
+    state = _process(answer_of(rig.robot, WriteOutput, arrived, **switched))
     services.record_event(
         rig.robot.name, "process", f"output {output} switched {'on' if request.on else 'off'}", actor=caller.name
     )
@@ -66,11 +72,17 @@ def set_output(
 
 @router.put("/gripper")
 def set_gripper(
-    request: GripperRequest, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
+    request: GripperRequest,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
+    arrived: Arrived,
+    lease: LeaseHeader = None,
 ) -> ProcessState:
     """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped` is set."""
     rig.require_motion(lease)
-    state = _process(answer_of(rig.robot, MoveGripper, closed=request.closed, while_stopped=request.while_stopped))
+    wanted = {"closed": request.closed, "while_stopped": request.while_stopped}
+    state = _process(answer_of(rig.robot, MoveGripper, arrived, **wanted))
     services.record_event(
         rig.robot.name, "process", f"gripper {'closed' if request.closed else 'opened'}", actor=caller.name
     )

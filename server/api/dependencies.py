@@ -76,7 +76,7 @@ async def _arrived(connection: HTTPConnection) -> float:
 
 
 Arrived = Annotated[float, Depends(_arrived)]
-"""When the request arrived (s, monotonic), before it waited for anything."""
+"""When the request's first byte arrived (s, monotonic), before it waited for anything."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 Auditor = Operator

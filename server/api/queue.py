@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import ApprovalRequest, Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
 from server.access.caller import Caller
 from server.api.dependencies import (
+    Arrived,
     CursorOf,
     Identity,
     LeaseHeader,
@@ -23,18 +22,9 @@ from server.api.dependencies import (
 )
 from server.api.experiments import require_possible
 from server.problems import PROBLEMS
-from server.queue.notices import Seen
 from server.services import RobotServices, Services
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
-
-
-async def _seen(rig: RobotDep) -> Seen:
-    """Returns what an operator could see when the request arrived, before it waited for a thread or for the queue."""
-    return rig.queue.notices.seen
-
-
-SeenDep = Annotated[Seen, Depends(_seen)]
 
 
 @router.get("/queue", tags=["queue"])
@@ -57,10 +47,10 @@ def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
 
 
 @router.post("/queue/resume", tags=["queue"])
-def resume_queue(request: QueueResume, rig: RobotDep, seen: SeenDep, caller: Operator) -> QueueStatus:
+def resume_queue(request: QueueResume, rig: RobotDep, arrived: Arrived, caller: Operator) -> QueueStatus:
     """Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then resume with moves_real_arm")
-    rig.queue.resume(caller.name, moves_real_arm=request.moves_real_arm, seen=seen)
+    rig.queue.resume(caller.name, moves_real_arm=request.moves_real_arm, asked=arrived)
     return rig.queue.status()
 
 

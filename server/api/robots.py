@@ -8,7 +8,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.robot import Done, ResetRequest, RobotStatus, RobotSummary, StopResult
-from server.api.dependencies import CursorOf, LeaseHeader, Limit, Operator, RobotDep, ServicesDep, Viewer
+from server.api.dependencies import Arrived, CursorOf, LeaseHeader, Limit, Operator, RobotDep, ServicesDep, Viewer
 from server.owner.messages import Reset
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
@@ -73,11 +73,19 @@ async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> St
 
 @router.post("/{robot}/reset")
 def reset_robot(
-    request: ResetRequest, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
+    request: ResetRequest,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
+    arrived: Arrived,
+    lease: LeaseHeader = None,
 ) -> Done:
-    """Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed."""
+    """Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed.
+
+    It ends the stop that it names, `stop` of the robot's status, and is refused if another one has come since.
+    """
     rig.control.require_free_of_others(lease)
-    text = str(answer_of(rig.robot, Reset, here=request.here).data["text"])
+    text = str(answer_of(rig.robot, Reset, arrived, stop=request.stop, here=request.here).data["text"])
     services.record_event(rig.robot.name, "reset", text, actor=caller.name)
     return Done(text=text)
 

@@ -230,6 +230,7 @@ def _parts(status: RobotStatus, now: float) -> list[tuple[Topic, BaseModel]]:
         identity=status.identity,
         arm=status.arm,
         cause=status.cause,
+        stop=status.stop,
         activity=status.activity,
         experiment=status.experiment,
         limp=status.limp,

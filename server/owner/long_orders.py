@@ -7,7 +7,7 @@ import time
 from daq.acquisition.guardian import EndCause
 from daq.acquisition.messages import Finished
 from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError, ReachError, SafetyError
+from daq.contracts.errors import DaqError, SafetyError
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
@@ -17,26 +17,16 @@ from daq.teaching.jog import top_speed
 from daq.teaching.performer import FollowingPerformer
 from firmware_protocol.errors import ProtocolError
 from server.owner.messages import (
-    BEGINS_WITHIN,
     Answer,
     JogBegin,
     JogDrive,
     LeadBegin,
-    Long,
     Quick,
     RunExperiment,
     RunProgram,
 )
 from server.owner.owned_robot import OwnedRobot
 from server.owner.quick_orders import carry_out
-
-
-def require_in_time(order: Long) -> None:
-    """Raises ReachError for an order so late that a motion now would surprise people."""
-    waited = time.monotonic() - order.asked
-    if waited > BEGINS_WITHIN:
-        line = f"the robot's process came to it after {waited:.1f} s, {BEGINS_WITHIN:g} s are allowed"
-        raise ReachError(f"{order.activity}: {line}; nothing moved")
 
 
 def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
@@ -76,7 +66,7 @@ def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
         nonlocal newest
         _between_samples(robot)
         said = robot.inbox.drive()
-        if said is not None and _allowed(robot, said):
+        if said is not None and not robot.guardian.outdated(said.said) and _allowed(robot, said):
             on_its_way = time.monotonic() - said.said
             newest = JogCommand(said.velocities, robot.controller.clock.now() - on_its_way)
         return newest

@@ -45,15 +45,15 @@ class _Request(FrozenRecord):
 
 
 class _QuickRequest(_Request):
-    """A quick request, made at the time `asked` (s, this computer's monotonic clock). It is refused after
+    """A quick request that arrived at the time `asked` (s, this computer's monotonic clock). It is refused after
     WAITS_AT_MOST: the client may have given up, and another may have control of the arm by now."""
 
     asked: float
 
 
 class _LongRequest(_Request):
-    """A request that moves the arm, made at the time `asked`. It is refused after BEGINS_WITHIN, since nobody expects
-    the motion any more."""
+    """A request that moves the arm, and arrived at the time `asked`. It is refused after BEGINS_WITHIN, since nobody
+    expects the motion any more."""
 
     asked: float
 
@@ -149,9 +149,10 @@ class MoveGripper(_QuickRequest):
 
 
 class Reset(_QuickRequest):
-    """Ends a stop."""
+    """Ends the stop of number `stop` (`ArmReport.stop`), and no other."""
 
     kind: Literal["reset"] = "reset"
+    stop: int
     here: StrictBool
 
 
@@ -219,6 +220,8 @@ class ArmReport(FrozenRecord):
     limp: tuple[int, ...]
     link: Literal["connected", "degraded", "lost"]
     counters: dict[str, float]
+    stop: int | None = None
+    """Number of the board's newest stop, 0 if there was none; None while it is not known, such as just after a stop."""
 
 
 class TeachingText(FrozenRecord):

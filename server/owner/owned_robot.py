@@ -40,6 +40,8 @@ class OwnedRobot:
     speaker: Speaker
     activity: Activity = "none"
     gains: dict[int, Gain] = field(default_factory=dict)
+    _stop: tuple[int, int, float] = (0, -1, 0.0)
+    """Number of the board's newest stop, and the stops that this process had sent and the time (s) when it was read."""
     _told: ArmReport | None = None
     _told_at: float = 0.0
 
@@ -67,6 +69,20 @@ class OwnedRobot:
         self.gains = {joint: gain for joint, gain in self.controller.gains().items() if joint <= count}
         return self.gains
 
+    @property
+    def newest_stop(self) -> int | None:
+        """The number of the board's newest stop; None while it must be read anew, since there has been another."""
+        number, freezes, read = self._stop
+        return None if freezes != self.control.freezes or self.guardian.outdated(read) else number
+
+    def number_stop(self) -> None:
+        """Reads the number of the newest stop where it is not known; of an arm that is not idle once a second, since
+        somebody else may stop it again, which no sample shows. Raises LinkError."""
+        now, freezes = time.monotonic(), self.control.freezes
+        due = self.control.arm.state is not State.IDLE and now - self._stop[2] >= REPORT_EVERY
+        if due or self.newest_stop is None:
+            self._stop = (self.controller.status().stop, freezes, now)
+
     def say(self, line: str) -> None:
         """Reports a line for the operator who teaches."""
         self.speaker.say(TeachingText(text=line))
@@ -84,6 +100,7 @@ class OwnedRobot:
             limp=tuple(limp_joints(self.gains)),
             link=self.controller.link.state.value,
             counters=counters,
+            stop=self.newest_stop,
         )
         if anew or report != self._told or self._due():
             self._told, self._told_at = report, time.monotonic()

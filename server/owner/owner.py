@@ -15,8 +15,9 @@ from daq.safety import Event, State
 from firmware_protocol.commands import StatusFlag
 from firmware_protocol.errors import ProtocolError
 from server.owner import long_orders
-from server.owner.messages import Answer, JogBegin, LeadBegin, Long, Quick, RunExperiment
+from server.owner.messages import BEGINS_WITHIN, Answer, JogBegin, LeadBegin, Long, Quick, RunExperiment
 from server.owner.owned_robot import OwnedRobot
+from server.owner.quick_orders import require_current
 from server.owner.watched_controller import is_frozen
 
 LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.DEAF)
@@ -76,6 +77,7 @@ def _watch(robot: OwnedRobot, last: int | None) -> int:
     snapshot = robot.controller.next_snapshot(None if last is None else last + every - 1)
     if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
         robot.control.stop("on the board, by somebody else")
+    robot.number_stop()
     return snapshot.tick
 
 
@@ -90,7 +92,7 @@ def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
     try:
         if _is_away(robot):
             raise ReachError(_being_tried(robot))
-        long_orders.require_in_time(order)
+        require_current(robot, order, BEGINS_WITHIN)
         robot.activity = order.activity
         robot.tell_arm()  # at once, so that the service refuses orders that are not possible meanwhile
         answer = _moved(robot, order)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError, ReachError, SafetyError
+from daq.contracts.errors import ReachError, SafetyError
 from daq.contracts.limp import doubts_line, require_no_jump
 from daq.link import RequestRefusedError
 from daq.runner import StoppedError
@@ -13,6 +12,7 @@ from daq.safety import Event, State
 from firmware_protocol.commands import Refusal
 from server.owner.messages import (
     WAITS_AT_MOST,
+    Long,
     MoveGripper,
     Quick,
     ReadGains,
@@ -24,22 +24,26 @@ from server.owner.messages import (
 from server.owner.owned_robot import OwnedRobot
 
 BITS = 8
-_WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
+_READS = (ReadProcess, ReadGains)
+_WHILE_TEACHING = (*_READS, WriteOutput, MoveGripper)
 
 
-class NotFrozenError(DaqError):
-    """The board has not confirmed that it took the measured posture as its set points."""
-
-    exit_code = exit_codes.NOT_REACHED
+def require_current(robot: OwnedRobot, order: Long | Quick, within: float) -> None:
+    """Raises ReachError for an order that nobody expects any more `within` s after its arrival, and SafetyError for one
+    that changes something and arrived before the newest stop: whoever sent it did not know of that."""
+    name = order.kind if isinstance(order, Quick) else order.activity
+    waited = time.monotonic() - order.asked
+    if waited > within:
+        line = f"{name}: the robot's process came to it {waited:.1f} s after its arrival, {within:g} s are allowed"
+        raise ReachError(f"{line}; nothing was done")
+    if robot.guardian.outdated(order.asked) and not isinstance(order, _READS):
+        raise _overtaken(name, robot.end_cause())
 
 
 def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
     """Carries out an order, and returns the answer's data. Raises DaqError; nothing has changed then, unless the error
     says so."""
-    waited = time.monotonic() - order.asked
-    if waited > WAITS_AT_MOST:
-        line = f"{order.kind}: the robot's process came to it after {waited:.1f} s, {WAITS_AT_MOST:g} s are allowed"
-        raise ReachError(f"{line}; nothing was done")
+    require_current(robot, order, WAITS_AT_MOST)
     if robot.activity != "none" and not isinstance(order, _WHILE_TEACHING):
         raise SafetyError(f"not while the arm is busy ({robot.activity}): wait for its end, or stop it")
     match order:
@@ -88,47 +92,37 @@ def _process(robot: OwnedRobot) -> dict[str, object]:
 
 
 def _release(robot: OwnedRobot, order: Reset) -> None:
-    """Releases the arm. Raises RequestRefusedError or SafetyError if another stop has come since the reset was
-    requested.
-
-    The stop's number is read before the guardian is asked. A stop through the guardian reaches the guardian first and
-    then the board, so the guardian knows of any stop before that read, and any later stop has another number.
-    """
+    """Releases the arm from the stop that the order names. Raises RequestRefusedError or SafetyError if there is a
+    newer one: of one from this computer the guardian knows first, of one from elsewhere the board alone."""
     controller, control = robot.controller, robot.control
-    seen = controller.status().stop
-    if robot.guardian.newer_than(order.asked):
-        raise _overtaken(robot)
-    if order.here:
-        # A second stop would change nothing: the board measures the posture when a stop begins.
-        controller.release(seen)
-        stopped = controller.stop()
-        if not stopped.acknowledged:
-            raise NotFrozenError(f"reset here: {stopped.problem}; the set points are not known to be here")
-        seen = controller.status().stop
+    number = controller.stop_here(order.stop) if order.here else order.stop
     if not robot.guardian.forget(order.asked):
-        raise _overtaken(robot)
+        raise _overtaken(order.kind, robot.end_cause())
     if control.arm.state in (State.STOPPED, State.FAULT):
-        control.handle(Event.RESET, stop=seen)
+        control.handle(Event.RESET, stop=number)
     else:
-        controller.release(seen)
+        controller.release(number)
 
 
-def _overtaken(robot: OwnedRobot) -> SafetyError:
-    return SafetyError(f"the arm has been stopped since this reset was asked for ({robot.end_cause()}): reset again")
+def _overtaken(name: str, cause: str | None = None) -> SafetyError:
+    why = f" ({cause})" if cause else ""
+    return SafetyError(f"{name}: the arm has been stopped since this was asked for{why}: look at it, then ask again")
 
 
 def _reset(robot: OwnedRobot, order: Reset) -> str:
-    """Ends the stop or fault that existed when the reset was requested. A stop that has come since remains."""
+    """Ends the stop or fault that the sender of the reset saw. Another one remains."""
     control, here = robot.control, order.here
     if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
         return "was not stopped"
+    if robot.controller.status().stop != order.stop:  # before anything changes; the board looks once more
+        raise _overtaken(order.kind)
     try:
         _release(robot, order)
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
         control.stop(robot.end_cause() or "on the board, by somebody else")
-        raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
+        raise _overtaken(order.kind) from error
     if (cause := robot.end_cause()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")

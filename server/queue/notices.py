@@ -7,8 +7,9 @@ only noted here.
 
 from __future__ import annotations
 
+import math
 import threading
-from dataclasses import dataclass
+from collections.abc import Callable
 
 from server.owner.messages import ArmReport
 from server.queue.readiness import why_paused
@@ -16,25 +17,20 @@ from server.queue.readiness import why_paused
 LOOK_FIRST = "look at the arm, then resume the queue"
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What a person could have seen when a request arrived: the number of notices and of ended connections so far."""
-
-    notices: int
-    connections: int
-
-
 class Notices:
-    """The reason to pause the queue. Safe to use from any thread, since its lock is held for a few assignments only."""
+    """The reason to pause the queue. Safe to use from any thread, since its lock is held for a few assignments only.
+    `now`: the monotonic clock (s) by which requests arrive."""
 
-    def __init__(self) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
         self.reason = ""
         """The first reason noted; empty if there is none."""
-        self._lock = threading.Lock()
-        self._noted = 0
-        self._newest = ""
-        self._connections = 0
+        self.connections = 0
         """Number of connections that have ended."""
+        self._now = now
+        self._lock = threading.Lock()
+        self._newest = ""
+        self._noted_at = self._ended_at = -math.inf
+        """When the newest reason was noted, and when the newest connection ended."""
         self._connected = False
         self._link_lost = False
 
@@ -44,23 +40,19 @@ class Notices:
             reason, self.reason = self.reason, ""
             return reason
 
-    @property
-    def seen(self) -> Seen:
-        """What a person who sends a request now can have seen."""
+    def acknowledge(self, asked: float) -> int | None:
+        """Forgets the notices that a person can have seen whose request arrived at this time (s). The newest of any
+        later ones becomes the reason, even if a reason has been taken since. Returns the connection that they saw, by
+        the number of those before it; None if it has ended meanwhile."""
         with self._lock:
-            return Seen(self._noted, self._connections)
-
-    def acknowledge(self, seen: Seen) -> None:
-        """Forgets the notices that a person had `seen`. The newest of any later ones becomes the reason, even if a
-        reason has been taken since."""
-        with self._lock:
-            self.reason = self._newest if self._noted > seen.notices else ""
+            self.reason = self._newest if self._noted_at >= asked else ""
+            return None if self._ended_at >= asked else self.connections
 
     def note(self, reason: str) -> None:
         """Notes a reason. The first one stays until it is popped."""
         with self._lock:
             self.reason = self.reason or reason
-            self._newest, self._noted = reason, self._noted + 1
+            self._newest, self._noted_at = reason, self._now()
 
     def arm_reported(self, arm: ArmReport) -> None:
         """Notes a stop, a fault, a lost link, or a link that comes back: somebody may be at the cable."""
@@ -100,7 +92,7 @@ class Notices:
         was, self._connected = self._connected, False
         if was:
             with self._lock:
-                self._connections += 1
+                self.connections, self._ended_at = self.connections + 1, self._now()
             self.note(f"the connection to the robot has ended ({why}): {LOOK_FIRST}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ from server.problems import ProblemError, conflict
 from server.queue.attendance import Attendance
 from server.queue.context import QueueContext
 from server.queue.due_runs import DueRuns
-from server.queue.notices import Notices, Seen
+from server.queue.notices import Notices
 from server.queue.readiness import Circumstances, approval_missing, what_is_missing, why_paused
 from server.store.experiments import NotApprovedError
 from server.store.queues import QueueState
@@ -65,11 +66,11 @@ class QueueService:
         self._changed = threading.Event()
         self._closing = False
         self._consented_connection: int | None = None
-        """The connection, by its number in `Seen`, for which a person consented to moving a real arm."""
+        """The connection, by the number of those before it, for which a person consented to moving a real arm."""
         self._attendance = Attendance(context.clock)
         self._running: Running | None = None
         self._waiting_for = ""
-        self.notices = Notices()
+        self.notices = Notices(context.clock.monotonic)
         """Reasons to pause the queue that no operator has acknowledged yet. Call `wake` after adding one."""
         self._written = True
         """Whether the state is in the database."""
@@ -129,12 +130,11 @@ class QueueService:
             if by is None:
                 self._context.paused(reason)
 
-    def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
-        """Resumes the queue with the operator's consent that it may move the arm. A notice newer than what the operator
-        had `seen` pauses it again. Raises a 409 while the arm is stopped or at fault."""
-        seen = seen or self.notices.seen
+    def resume(self, by: str, *, moves_real_arm: bool, asked: float = math.inf) -> None:
+        """Resumes the queue with the operator's consent that it may move the arm. A notice since their request arrived
+        (`asked`, s, monotonic) pauses it again. Raises a 409 while the arm is stopped or at fault."""
         with self._lock:
-            self.notices.acknowledge(seen)
+            connection = self.notices.acknowledge(asked)
             arm = self._context.robot.arm
             if arm is not None and (cause := why_paused(arm)):
                 self.notices.note(cause)
@@ -143,7 +143,7 @@ class QueueService:
             state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
             self._context.queues.set(self._context.robot.name, state)  # first: what is not written stays paused
             self._state, self._written = state, True
-            self._consented_connection = seen.connections if moves_real_arm else self._consented_connection
+            self._consented_connection = connection if moves_real_arm else self._consented_connection
             self._attendance.say()
         self._context.record_event("queue", "resumed", actor=by)
         self.wake()
@@ -297,7 +297,7 @@ class QueueService:
         return self._context.experiments.count_waiting(self._context.robot.name)
 
     def _has_consent(self) -> bool:
-        return self._consented_connection == self.notices.seen.connections
+        return self._consented_connection == self.notices.connections
 
     def _needs_review(self) -> bool:
         robot = self._context.robot

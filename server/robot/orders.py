@@ -11,9 +11,10 @@ from server.problems import ProblemError, conflict, of_exit_code
 from server.robot.robot import ANSWER_WITHIN, Robot
 
 
-def answer_of(robot: Robot, order: Callable[..., Any], **fields: object) -> Answer:
-    """Sends an order, and returns the owner's answer. Raises a 409 at once during an experiment, a program or leading
-    by hand, a 429 if too many orders wait, the problem in the answer, or ReachError if none comes in time."""
+def answer_of(robot: Robot, order: Callable[..., Any], arrived: float, **fields: object) -> Answer:
+    """Sends an order that arrived at this time (s, monotonic), and returns the owner's answer. Raises a 409 at once
+    during an experiment, a program or leading by hand, a 429 if too many orders wait, the problem in the answer, or
+    ReachError if none comes within ANSWER_WITHIN of its arrival."""
     activity = "experiment" if robot.experiment is not None else robot.arm.activity if robot.arm else "none"
     if activity not in ("none", "jog"):
         raise conflict("arm-busy", f"the arm is busy: {activity}", "wait for its end, or stop it")
@@ -21,7 +22,8 @@ def answer_of(robot: Robot, order: Callable[..., Any], **fields: object) -> Answ
         line = f"too many orders are waiting already: robot {robot.name} does not answer"
         raise ProblemError(429, "too-many", line, "ask less often", (), {"Retry-After": "1"})
     try:
-        answer = robot.ask(order, asked=robot.clock.monotonic(), **fields).result(ANSWER_WITHIN)
+        left = arrived + ANSWER_WITHIN - robot.clock.monotonic()
+        answer = robot.ask(order, asked=arrived, **fields).result(max(0.0, left))
     except TimeoutError:
         raise ReachError(f"the robot's process did not answer within {ANSWER_WITHIN:g} s") from None
     finally:

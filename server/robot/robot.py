@@ -204,7 +204,8 @@ class Robot:
         """Notes a stop that the board has confirmed, before the owner reports it. Does not block."""
         arm = self.arm
         if arm is not None and arm.arm not in ("stopped", "fault"):
-            stopped = arm.model_copy(update={"arm": "stopped", "cause": "a stop that the board has confirmed"})
+            told = {"arm": "stopped", "cause": "a stop that the board has confirmed", "stop": None}
+            stopped = arm.model_copy(update=told)
             self._arm = Seen(stopped, self.clock.monotonic())
 
     def _begin(self) -> None:

@@ -33,6 +33,7 @@ def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus
         identity=robot.identity,
         arm=arm.arm if arm is not None and connected else "disconnected",
         cause=arm.cause if arm is not None and connected else "",
+        stop=arm.stop if arm is not None and connected else None,
         activity=arm.activity if arm is not None else "none",
         experiment=robot.experiment,
         limp=arm.limp if arm is not None else (),

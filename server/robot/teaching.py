@@ -87,7 +87,7 @@ class TeachingService:
             if self._robot.clock.monotonic() - said > DEAD_MAN:
                 return
             if self._under_way is None or self._under_way[0] != "jog":
-                self._begin(Word(self._robot.clock.monotonic()), "jog", JogBegin)
+                self._begin(Word(said), "jog", JogBegin)
             self._robot.tell(JogDrive(velocities=velocities, said=said))
 
     def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:

@@ -96,7 +96,7 @@ def controller(under_contract: UnderContract) -> Iterator[Controller]:
     """A greeted controller; where it may be moved, it is released before and after."""
     with Controller.connect(under_contract.url) as connected:
         if under_contract.may_move:
-            connected.release()
+            connected.release(connected.status().stop)
         yield connected
         if under_contract.may_move:
-            connected.release()
+            connected.release(connected.status().stop)

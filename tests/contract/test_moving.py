@@ -27,7 +27,7 @@ def start(controller: Controller) -> Iterator[dict[int, int]]:
     """Joint → set point (posture units) in force, put back at the end."""
     set_points = {joint: controller.next_snapshot().set_points[joint] for joint in JOINTS}
     yield set_points
-    controller.release()
+    controller.release(controller.status().stop)
     controller.set_points(set_points)
     settle(controller)
 
@@ -108,7 +108,7 @@ def test_a_stop_freezes_the_arm_where_it_is_until_released(controller: Controlle
     positions = settle(controller)
     assert all(abs(counts_to_posture(positions[joint]) - stopped.frozen[joint]) <= NEAR for joint in JOINTS)
     assert controller.next_snapshot().set_points == stopped.frozen
-    controller.release()
+    controller.release(controller.status().stop)
     assert StatusFlag.FROZEN not in controller.status().flags
     assert controller.next_snapshot().set_points == stopped.frozen, "set points stay where the stop put them"
     controller.set_points(start)

@@ -74,7 +74,7 @@ class Line:
 @pytest.fixture
 def set_points(under_contract: UnderContract) -> tuple[tuple[int, int], ...]:
     with Controller.connect(under_contract.url) as controller:
-        controller.release()
+        controller.release(controller.status().stop)
         return tuple(controller.next_snapshot(joints=(1, 2)).set_points.items())
 
 

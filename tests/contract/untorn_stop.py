@@ -95,4 +95,4 @@ def _frozen(bench: Bench) -> Iterator[int]:
             began = bench.swing_from(side)
             bench.pass_until(began + after_us + shift_us)
             yield bench.link.request(Stop(), Stopped).postures[JOINT - 1]
-            bench.controller.release()
+            bench.controller.release(bench.controller.status().stop)

@@ -10,6 +10,7 @@ import pytest
 
 from tests.deploy.composition import FILE, Composition, as_processes
 from tests.server import postgresql
+from tests.server.polling import reset
 
 MOCK = "mock://?lock_step=1&seed=3"
 """What its arm does depends on no clock, however busy this computer is."""
@@ -46,6 +47,6 @@ def api(running: Composition, token: str) -> Iterator[httpx.Client]:
     url = f"http://{running.address('service')}:8300/api/v1/robots/ma2000"
     with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {token}"}, timeout=100) as client:
         client.post("/connect").raise_for_status()
-        client.post("/reset", json={}).raise_for_status()
+        reset(client).raise_for_status()
         client.post("/queue/resume", json={}).raise_for_status()
         yield client

@@ -17,7 +17,7 @@ from distributed import Client
 
 from tests.deploy.composition import OWN_IMAGE, RAMP, SECRETS, Composition, composition, ended, image
 from tests.repository.tracked import ROOT
-from tests.server.polling import until
+from tests.server.polling import reset, until
 
 SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
 
@@ -58,7 +58,7 @@ def test_who_has_no_token_is_refused_and_the_stop_listener_answers(running: Comp
     stop = f"http://{host}:8301/api/v1/robots/ma2000/stop"
     assert httpx.post(stop).status_code == 401
     assert httpx.post(stop, headers=api.headers).json()["confirmed"]
-    assert api.post("/reset", json={}).is_success
+    assert reset(api).is_success
 
 
 @pytest.mark.parametrize("name", SERVICES)

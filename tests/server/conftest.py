@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.server.polling import reset
 from tests.server.queue.bench import Bench
 from tests.server.service import Service, running_service
 
@@ -41,7 +42,7 @@ def service(shared_service: Service) -> Service:
     """The same, as every test wants to find it: not stopped, nobody in control, the queue open and empty."""
     for one in shared_service.robot.get("/queue/experiments").json():
         shared_service.robot.post(f"/experiments/{one['id']}/cancel")
-    shared_service.robot.post("/reset", json={})
+    reset(shared_service.robot)
     shared_service.robot.post("/queue/resume", json={})
     shared_service.seen.clear()
     return shared_service

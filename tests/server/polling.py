@@ -9,6 +9,16 @@ from typing import Any
 import httpx
 
 
+def reset(
+    robot: httpx.Client, *, here: bool = False, headers: Mapping[str, str] | None = None, name: str = ""
+) -> httpx.Response:
+    """Ends the stop that is in force, as soon as the service knows its number. `name`: the robot's address, where
+    `robot` speaks to the whole service."""
+    path = name or str(robot.base_url).rstrip("/")
+    found = until(robot, path, lambda status: status["stop"] is not None or status["arm"] == "disconnected")
+    return robot.post(f"{name}/reset", json={"stop": found["stop"] or 0, "here": here}, headers=headers)
+
+
 def until(
     client: httpx.Client,
     path: str,

@@ -70,6 +70,8 @@ class RobotMessage(Wire):
     identity: RobotIdentity | None
     arm: ArmState
     cause: str
+    stop: int | None
+    """Number of the newest stop, which a reset names; None while it is not known."""
     activity: Activity
     experiment: str | None
     limp: tuple[int, ...]

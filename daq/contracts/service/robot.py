@@ -88,6 +88,8 @@ class RobotStatus(Wire):
     arm: ArmState
     cause: str = ""
     """Why the arm is stopped or at fault, as it stands behind "stopped:" or "fault:"."""
+    stop: int | None = None
+    """Number of the newest stop, which a reset names; None while it is not known, such as for a moment after a stop."""
     activity: Activity
     experiment: str | None = None
     limp: tuple[int, ...] = ()
@@ -134,8 +136,10 @@ class FleetStopResult(StopResult):
 
 
 class ResetRequest(Wire):
-    """Ends a stop. `here`: first make the measured posture the set points."""
+    """Ends the stop of this number, and no later one. `here`: first make the measured posture the set points."""
 
+    stop: int = Field(ge=0, le=0xFFFFFFFF)
+    """`stop` of the robot's status, as it was seen by whoever wants to end it."""
     here: StrictBool = False
 
 

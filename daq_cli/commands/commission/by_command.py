@@ -46,18 +46,20 @@ def end_freeze(bench: Bench) -> None:
 
 
 def stop(bench: Bench) -> dict[str, Any]:
-    """The program's stop, from the request to the board's confirmation."""
+    """The program's stop, from the request to the board's confirmation and the number by which it is released."""
     with connected(bench) as controller:
         asked = replace(
             bench.consent, what="it will be stopped where it stands, and released again", refused="it is stopped"
         )
         asked.require(bench.call.port, controller.identity)
         begun = time.perf_counter()
-        confirmation = controller.stop()
+        confirmation, number = controller.stop_numbered()
         taken = 1e3 * (time.perf_counter() - begun)
         if not confirmation.acknowledged:
             raise NotCommissionedError(f"the stop was not confirmed: {confirmation.problem}. Use the emergency stop")
-        controller.release()
+        if number is None:
+            raise NotCommissionedError("the arm had been stopped already: look at it; `daq reset` ends that stop")
+        controller.release(number)
     return {
         "confirmed_ms": round(taken, 2),
         "frozen": [confirmation.frozen[joint] for joint in sorted(confirmation.frozen)],

@@ -171,7 +171,7 @@ def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Contro
     with pytest.raises(RequestRefusedError, match="the bench has been stopped"):
         controller.set_points({1: 2600})
     assert goals(bench) == held
-    controller.release()
+    controller.release(controller.status().stop)
     controller.set_points({1: 2600})
 
 
@@ -233,7 +233,7 @@ def test_a_stop_of_another_host_between_the_steps_of_a_release_holds() -> None:
 
         bench.hearing = stopped_before_the_torque
         with pytest.raises(RequestRefusedError, match="stop 1 is newer"):
-            controller.release()
+            controller.release(controller.status().stop)
         assert StatusFlag.FROZEN in controller.status().flags
 
 
@@ -266,7 +266,7 @@ def test_torque_comes_on_by_a_release_alone_and_moves_nothing() -> None:
         with pytest.raises(RequestRefusedError, match="the torque of servo 1, 2 is off"):
             controller.set_points({1: 2048})
         before = positions(bench)
-        controller.release()
+        controller.release(controller.status().stop)
         bench.sleep_until(bench.now() + 0.5)
         assert all(servo.torque for servo in bench.bench.servos)
         assert all(abs(now - then) < 25 for now, then in zip(positions(bench), before, strict=True))
@@ -297,7 +297,7 @@ def test_no_torque_comes_on_while_a_goal_has_not_arrived() -> None:
         torques: list[bool] = []
         bench.saying = lambda data: torques.append(bench.bench.servos[0].torque and goals(bench)[0] == 100) or data  # type: ignore[func-returns-value]
         before = positions(bench)
-        controller.release()
+        controller.release(controller.status().stop)
         bench.sleep_until(bench.now() + 0.5)
         assert not any(torques)
         assert all(servo.torque for servo in bench.bench.servos)
@@ -306,7 +306,7 @@ def test_no_torque_comes_on_while_a_goal_has_not_arrived() -> None:
         bench.hearing = lambda data: without(data, Table.GOAL_POSITION)
         bench.bench.servos[0].write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))
         with pytest.raises(LinkTimeoutError):
-            controller.release()
+            controller.release(controller.status().stop)
         assert not bench.bench.servos[0].torque
 
 
@@ -316,7 +316,7 @@ def test_a_limp_servo_outside_its_own_limits_is_not_given_torque() -> None:
     servo.write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
     with bench.controller() as controller:
         with pytest.raises(RequestRefusedError, match=r"joint 2: servo 2 stands at .* outside its position limits"):
-            controller.release()
+            controller.release(controller.status().stop)
         assert not servo.torque
 
 
@@ -408,7 +408,7 @@ def test_a_hardware_error_is_one_line_that_names_servo_and_error(controller: Con
     with pytest.raises(HardwareFaultError, match="servo 2 reports overheating: its joint may be without torque"):
         controller.next_snapshot()
     with pytest.raises(RequestRefusedError, match="servo 2 reports overheating; when its cause is gone"):
-        controller.release()
+        controller.release(controller.status().stop)
 
 
 def test_a_servo_that_loses_its_supply_for_a_moment_counts_as_restarted(
@@ -479,7 +479,7 @@ def test_a_set_point_beyond_a_servos_own_limits_is_refused_before_it_is_sent(ben
     limited = VirtualBench(Options(torque=False))
     limited.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (1000).to_bytes(4, "little"))
     controller = limited.controller()
-    controller.release()
+    controller.release(controller.status().stop)
     with pytest.raises(ProtocolError, match="joint 2: set point of 900 counts: servo 2 itself allows 1000 to 4095"):
         controller.set_points({2: 900})
     assert controller.next_snapshot()[2].set_point > 1000

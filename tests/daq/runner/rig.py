@@ -121,7 +121,7 @@ def rig_on(mock: MockProcess, folder: Path) -> Iterator[Rig]:
         for fault in arm.ask("fault_list")["faults"]:
             arm.ask("fault_off", fault=fault["label"])
         controller.stop()  # set points where the arm is, whatever a test has done to it
-        controller.release()
+        controller.release(controller.status().stop)
         for joint in range(1, 7):
             controller.set_gains(joint, 2, 0, 0)
         rest = ExperimentSpec(trajectory=Pause(duration=0.1), settle=0, hold=0)

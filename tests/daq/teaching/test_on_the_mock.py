@@ -123,7 +123,7 @@ def test_nothing_is_switched_after_a_stop(controller: Controller) -> None:
             controller, ended, {"kind": "wait", "duration": 0.6}, *[{"kind": "output", "line": 2, "on": True}] * 40
         )
     assert next(asked) <= 34, "the first that asks is told, and nobody else"
-    controller.release()
+    controller.release(controller.status().stop)
     controller.write_outputs(0xFF, before)
 
 
@@ -140,4 +140,4 @@ def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: Watche
         jog(arm, MA2000, MA2000.limits, lambda _row: None, ended, print)
     with pytest.raises(StoppedError):
         arm.set_points({1: 600})
-    controller.release()
+    controller.release(controller.status().stop)

@@ -40,7 +40,7 @@ def served(*options: str) -> Iterator[str]:
 @pytest.mark.parametrize(("image", "every"), [("BRIDGE", 2), ("BRIDG96", 4)])
 def test_a_ramp_runs_at_the_rate_that_the_line_allows(tmp_path: Path, image: str, every: int) -> None:
     with served("--image", image) as url, Controller.connect(url) as controller:
-        controller.release()
+        controller.release(controller.status().stop)
         arm = Rig(controller, ArmControl(controller), tmp_path, load_machine("ma2000"), "")
         trace = arm.trace(result := arm.run(SHORT))
     assert (result.outcome, result.missing) == ("complete", 0)

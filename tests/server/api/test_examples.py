@@ -15,6 +15,7 @@ import pytest
 
 from server.api.problem_examples import PROBLEM_EXAMPLES
 from server.app import bare_app
+from tests.server.polling import reset
 from tests.server.service import Service
 
 JSON = ("application/json", "application/problem+json")
@@ -142,8 +143,8 @@ def _hold(service: Service, gains: Any, lease: dict[str, str]) -> None:
         assert "reset --here" in answer.text, answer.text
         service.robot.post("/stop")
         service.until_arm("stopped")
-        reset = service.robot.post("/reset", json={"here": True}, headers=lease)
-        assert reset.status_code == 200, reset.text
+        released = reset(service.robot, here=True, headers=lease)
+        assert released.status_code == 200, released.text
     assert answer.status_code == 200, answer.text
 
 
@@ -165,7 +166,7 @@ def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
             service.robot.post("/stop")
             service.until_arm("stopped")
             service.until_rest()
-            assert service.robot.post("/reset", json={}, headers=lease).status_code == 200
+            assert reset(service.robot, headers=lease).status_code == 200
             service.until_arm("idle")
             _hold(service, gains, lease)  # a lead that is stopped leaves limp joints
         if path.endswith(("/experiments", "/gain")):

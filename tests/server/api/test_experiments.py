@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 from daq.traces.reader import read_trace
+from tests.server.polling import reset
 from tests.server.service import Service
 
 SHORT = {"trajectory": {"kind": "step", "amplitude": 0.02}, "joints": [1], "settle": 0.1, "hold": 0.2}
@@ -56,7 +57,7 @@ def test_a_running_experiment_is_cancelled_by_a_stop_and_the_queue_waits_for_a_p
     assert status["queue"]["paused"]
     assert "look at the arm" in status["queue"]["reason"]
     assert service.robot.post("/queue/resume", json={}).status_code == 409
-    assert service.robot.post("/reset", json={}).status_code == 200
+    assert reset(service.robot).status_code == 200
     assert service.robot.post("/queue/resume", json={}).status_code == 200
     assert service.end_of(following["id"])["state"] == "done"
 
@@ -72,7 +73,7 @@ def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Serv
 def test_a_stop_while_nothing_waits_pauses_the_queue_until_it_is_resumed(service: Service) -> None:
     assert service.robot.post("/stop").json()["confirmed"]
     service.until_paused()
-    assert service.robot.post("/reset", json={}).status_code == 200
+    assert reset(service.robot).status_code == 200
     service.until_arm("idle")
     queue = service.robot.get("/queue").json()
     assert (queue["paused"], queue["reason"][:22]) == (True, "local requested a stop")

@@ -78,7 +78,7 @@ def test_a_body_that_is_no_request_is_refused(service: Service, body: bytes) -> 
 def test_a_word_that_may_move_something_is_true_or_false_and_nothing_like_it(
     service: Service, method: str, path: str, field: str, nearly: Any
 ) -> None:
-    answer = service.robot.request(method, path, json={field: nearly})
+    answer = service.robot.request(method, path, json=({"stop": 0} if path == "/reset" else {}) | {field: nearly})
     assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, [field]), answer.text
 
 

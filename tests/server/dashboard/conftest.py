@@ -22,6 +22,7 @@ from tests.server.dashboard.browser import (
     watched,
 )
 from tests.server.dashboard.studied import Studied, studied_arm
+from tests.server.polling import reset
 from tests.server.service import Service, running_service
 
 LONGEST_TEST_S = 300
@@ -81,7 +82,7 @@ def dashboard(browser: Browser, served: tuple[Service, MockControl]) -> Iterator
         service.robot.post(f"/experiments/{one['id']}/cancel")
     for one in service.robot.get("/programs").json():
         service.robot.delete(f"/programs/{one['name']}")
-    service.robot.post("/reset", json={})
+    reset(service.robot)
     service.robot.post("/queue/resume", json={})
     context = browser.new_context(viewport=WIDE, color_scheme="light")
     tab = watched(context, service, mock)

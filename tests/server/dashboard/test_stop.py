@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.server.dashboard.browser import TABLET, TABLET_ON_ITS_SIDE, Dashboard
+from tests.server.polling import reset
 
 pytestmark = pytest.mark.browser
 CONFIRMED = "[role=alert] [data-stop=confirmed]"
@@ -148,6 +149,6 @@ def test_a_stop_that_somebody_else_has_ended_is_not_called_confirmed_any_more(da
     page.keyboard.press("F8")
     expect(page.locator(CONFIRMED)).to_be_visible()
     expect(page.get_by_text("The arm is stopped.")).to_be_visible()
-    assert dashboard.service.robot.post("/reset", json={}).status_code == 200
+    assert reset(dashboard.service.robot).status_code == 200
     expect(page.locator("[data-stop=past]")).to_contain_text("Past: stopped at")
     expect(page.locator(CONFIRMED)).not_to_be_attached()

@@ -11,7 +11,7 @@ from daq.client import Client
 from daq.contracts.errors import SpecError
 from daq.traces.reader import read_trace
 from tests.server.fleet_service import FleetService, fleet_service
-from tests.server.polling import until
+from tests.server.polling import reset, until
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,7 @@ def fleet(running: FleetService) -> FleetService:
     for name in ("left", "right"):
         for one in running.get(f"robots/{name}/queue/experiments"):
             running.post(f"robots/{name}/experiments/{one['id']}/cancel")
-        running.post(f"robots/{name}/reset", {})
+        reset(running.client, name=f"robots/{name}")
         running.post(f"robots/{name}/queue/resume", {})
     return running
 

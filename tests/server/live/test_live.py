@@ -24,6 +24,7 @@ from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
 from server.owner.messages import LiveSample
 from tests.server.clocks import HandClock
 from tests.server.live.watching import frames, messages, watching
+from tests.server.polling import reset
 from tests.server.service import Service
 
 
@@ -124,7 +125,7 @@ def test_a_crowd_of_sockets_leaves_room_for_everybody_else(service: Service) -> 
             connect(url, open_timeout=60)
         assert refused.value.response.status_code == 403
         assert service.robot.post("/stop").json()["confirmed"]
-    service.robot.post("/reset", json={})
+    reset(service.robot)
 
 
 @pytest.mark.parametrize("origin", ["http://attacker.example", "null", "http://127.0.0.1:1", "https://127.0.0.1"])

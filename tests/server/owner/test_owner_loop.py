@@ -101,7 +101,9 @@ def served(
         tell_arm=tell_arm,
         read_gains=dict,
         activity="none",
-        guardian=SimpleNamespace(cause=None),
+        guardian=SimpleNamespace(cause=None, outdated=lambda _asked: False),
+        number_stop=lambda: None,
+        end_cause=lambda: None,
         speaker=SimpleNamespace(ended=answers.append),
         inbox=SimpleNamespace(take=take, closing=closing, done=lambda: None),
     )
@@ -139,7 +141,7 @@ def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
 def test_a_reset_is_told_before_its_answer_though_the_stop_before_it_never_was() -> None:
     """The service has noted the stop by then, and lets nobody resume the queue until it is told of another state."""
     told: list[int] = []
-    _, answers = served({0: Reset(number=7, asked=time.monotonic(), here=False)}, anew=told)
+    _, answers = served({0: Reset(number=7, asked=time.monotonic(), stop=0, here=False)}, anew=told)
     assert [answer.number for answer in answers] == [7]
     assert told == [0]
 
@@ -151,7 +153,7 @@ def test_an_order_that_comes_late_moves_nothing() -> None:
     order = cast(Any, RunProgram).model_construct(number=7, asked=late, activity="program")
     _, (answer,) = served({0: order})
     assert answer.exit_code == ReachError.exit_code
-    assert "nothing moved" in answer.problem
+    assert "nothing was done" in answer.problem
 
 
 @pytest.mark.parametrize("activity", ["program", "step"])

@@ -53,7 +53,7 @@ def test_what_cannot_be_done_between_samples_is_refused_before_it_is_asked_for(a
     asked = Asked()
     asked.does(activity)
     with pytest.raises(ProblemError) as refused:
-        answer_of(asked.robot, MoveGripper, closed=False)
+        answer_of(asked.robot, MoveGripper, 0.0, closed=False)
     assert (refused.value.status, refused.value.kind) == (409, "arm-busy")
     assert activity in refused.value.detail
     assert asked.orders == []
@@ -63,14 +63,14 @@ def test_an_experiment_of_the_queue_counts_before_its_owner_reports_it() -> None
     asked = Asked()
     asked.robot.experiment = "77be01d3aa42"
     with pytest.raises(ProblemError, match="the arm is busy: experiment"):
-        answer_of(asked.robot, Reset, here=False)
+        answer_of(asked.robot, Reset, 0.0, stop=1, here=False)
 
 
-def test_an_order_says_when_it_was_asked_for() -> None:
+def test_an_order_says_when_it_arrived_and_not_when_its_turn_came() -> None:
     asked = Asked()
     asked.does("jog")
-    assert answer_of(asked.robot, MoveGripper, closed=False).data == {"gripper": "open"}
-    assert [order.asked for order in asked.orders] == [asked.robot.clock.monotonic()]
+    assert answer_of(asked.robot, MoveGripper, -1.5, closed=False).data == {"gripper": "open"}
+    assert [order.asked for order in asked.orders] == [-1.5]
 
 
 def test_a_silent_robot_holds_up_no_more_than_so_many() -> None:
@@ -78,11 +78,11 @@ def test_a_silent_robot_holds_up_no_more_than_so_many() -> None:
     for _ in range(ORDERS_AT_ONCE):
         assert asked.robot.room_for_orders.acquire(blocking=False)
     with pytest.raises(ProblemError) as refused:
-        answer_of(asked.robot, MoveGripper, closed=False)
+        answer_of(asked.robot, MoveGripper, 0.0, closed=False)
     assert (refused.value.status, refused.value.kind, asked.orders) == (429, "too-many", [])
     asked.robot.room_for_orders.release()
-    answer_of(asked.robot, MoveGripper, closed=False)
-    answer_of(asked.robot, MoveGripper, closed=False)
+    answer_of(asked.robot, MoveGripper, 0.0, closed=False)
+    answer_of(asked.robot, MoveGripper, 0.0, closed=False)
 
 
 # ---- in the owner's process
@@ -97,7 +97,14 @@ def _gripper_of(moved: list[bool]) -> SimpleNamespace:
 
 def _robot(moved: list[bool], ended: str | None = None, halted: str | None = None) -> SimpleNamespace:
     control = SimpleNamespace(halted=halted)
-    return SimpleNamespace(activity="none", controller=_gripper_of(moved), control=control, end_cause=lambda: ended)
+    guardian = SimpleNamespace(outdated=lambda _asked: False)
+    return SimpleNamespace(
+        activity="none",
+        controller=_gripper_of(moved),
+        control=control,
+        guardian=guardian,
+        end_cause=lambda: ended,
+    )
 
 
 @pytest.mark.parametrize(("ended", "halted"), [("daq stop", None), (None, "following error")])

@@ -23,7 +23,7 @@ from daq.safety import State
 from firmware_protocol.commands import ReadStatus, Release, Request, Stop, to_frame
 from firmware_protocol.framing import Frame
 from mock_controller.bridge.bridge import Bridge
-from server.owner.messages import Reset
+from server.owner.messages import MoveGripper, Reset
 from server.owner.owned_robot import OwnedRobot
 from server.owner.quick_orders import carry_out
 from server.owner.watched_controller import WatchedController
@@ -66,9 +66,14 @@ class Scene:
         """Before the next request of a kind reaches the bridge."""
         self.endpoint.bridge.happens, self.endpoint.bridge.before = happens, request
 
-    def reset(self, *, here: bool, asked: float | None = None) -> None:
-        order = Reset(number=1, asked=time.monotonic() if asked is None else asked, here=here)
-        carry_out(self.robot, order)
+    def reset(self, *, here: bool, asked: float | None = None, stop: int | None = None) -> None:
+        asked = time.monotonic() if asked is None else asked
+        carry_out(
+            self.robot, Reset(number=1, asked=asked, stop=self.newest_stop() if stop is None else stop, here=here)
+        )
+
+    def newest_stop(self) -> int:
+        return int(self.endpoint.bridge._newest_stop)
 
     def is_stopped(self) -> bool:
         return bool(self.endpoint.board.frozen) and self.control.arm.state is State.STOPPED
@@ -113,7 +118,7 @@ def test_a_stop_after_the_reset_was_asked_for_holds(scene: Scene, here: bool) ->
     """The owner came to the reset late: it was repeating another request on a bad line."""
     asked = time.monotonic()
     scene.press_stop()
-    with pytest.raises(SafetyError, match=f"stopped since this reset was asked for .{EndCause.STOP.value}"):
+    with pytest.raises(SafetyError, match=f"stopped since this was asked for .{EndCause.STOP.value}"):
         scene.reset(here=here, asked=asked)
     assert scene.is_stopped()
     assert scene.guardian.cause is EndCause.STOP
@@ -127,7 +132,7 @@ def test_a_stop_while_the_reset_is_carried_out_holds(
     scene: Scene, here: bool, request_under_way: type[Request]
 ) -> None:
     scene.between(request_under_way, scene.press_stop)
-    with pytest.raises(SafetyError, match="reset again"):
+    with pytest.raises(SafetyError, match="ask again"):
         scene.reset(here=here)
     assert scene.is_stopped()
     assert scene.guardian.cause is EndCause.STOP
@@ -135,7 +140,7 @@ def test_a_stop_while_the_reset_is_carried_out_holds(
 
 def test_a_stop_just_before_the_one_of_a_reset_here_holds(scene: Scene) -> None:
     scene.between(Stop, scene.press_stop)
-    with pytest.raises(SafetyError, match="stopped since this reset was asked for"):
+    with pytest.raises(SafetyError, match="stopped since this was asked for"):
         scene.reset(here=True)
     assert scene.is_stopped()
     assert scene.guardian.cause is EndCause.STOP
@@ -144,9 +149,40 @@ def test_a_stop_just_before_the_one_of_a_reset_here_holds(scene: Scene) -> None:
 @pytest.mark.parametrize("here", [False, True])
 def test_a_stop_of_another_computer_holds(scene: Scene, here: bool) -> None:
     scene.between(Release, scene.endpoint.bridge.hear_a_stop)
-    with pytest.raises(SafetyError, match="another stop has come meanwhile, and holds: reset again"):
+    with pytest.raises(SafetyError, match="stopped since this was asked for: look at it, then ask again"):
         scene.reset(here=here)
     assert scene.is_stopped()
     assert scene.control.halted is not None
     scene.reset(here=here)
     assert not scene.endpoint.board.frozen
+
+
+@pytest.mark.parametrize("here", [False, True])
+def test_a_reset_ends_no_stop_that_its_sender_had_not_seen_however_late_it_is_said_to_have_arrived(
+    scene: Scene, here: bool
+) -> None:
+    """The service was so busy that the reset got the time at which it was read."""
+    seen = scene.newest_stop()
+    scene.press_stop()
+    with pytest.raises(SafetyError, match="stopped since this was asked for"):
+        scene.reset(here=here, stop=seen)
+    assert scene.is_stopped()
+
+
+def test_what_arrived_before_the_newest_stop_changes_nothing_after_its_reset(scene: Scene) -> None:
+    asked = time.monotonic()
+    scene.press_stop()
+    scene.reset(here=False)
+    late = MoveGripper(number=1, asked=asked, closed=True, while_stopped=True)
+    with pytest.raises(SafetyError, match="gripper: the arm has been stopped since this was asked for"):
+        carry_out(scene.robot, late)
+    carry_out(scene.robot, late.model_copy(update={"asked": time.monotonic()}))
+
+
+def test_a_stop_s_number_is_told_once_it_is_known_to_be_that_of_the_newest(scene: Scene) -> None:
+    scene.robot.number_stop()
+    assert scene.robot.newest_stop == scene.newest_stop()
+    scene.press_stop()
+    assert scene.robot.newest_stop is None
+    scene.robot.number_stop()
+    assert scene.robot.newest_stop == scene.newest_stop()

@@ -142,11 +142,12 @@ def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -
 def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: Bench, taken: bool) -> None:
     bench.queue.pause("by anna", "anna")
     bench.queue.stop_asked("anna")
-    seen = bench.queue.notices.seen  # a request that waits for the queue
+    bench.clock.turn(1)
+    asked = bench.clock.monotonic()  # a request that waits for its last byte, a thread, the queue
     bench.queue.stop_asked("bert")
     if taken:
         bench.queue.notices.pop_reason()
-    bench.queue.resume("anna", moves_real_arm=False, seen=seen)
+    bench.queue.resume("anna", moves_real_arm=False, asked=asked)
     assert bench.queue.status().reason.startswith("bert requested")
     _is_held(bench, "bert requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
 
@@ -154,10 +155,10 @@ def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: B
 def test_a_word_that_was_given_for_one_connection_is_none_for_the_next(bench: Bench) -> None:
     bench.robot.identity = REAL
     bench.queue.connection_made()
-    seen = bench.queue.notices.seen
+    asked = bench.clock.monotonic()
     bench.queue.connection_ended("exit code 0")
     bench.queue.connection_made()
-    bench.queue.resume("anna", moves_real_arm=True, seen=seen)
+    bench.queue.resume("anna", moves_real_arm=True, asked=asked)
     bench.queue.resume("bert", moves_real_arm=False)
     bench.submit()
     bench.queue.start()

@@ -7,6 +7,7 @@ from pathlib import Path
 import httpx
 
 from tests.mock.process.running import RunningMock
+from tests.server.polling import reset
 from tests.server.service import running_service
 
 
@@ -35,7 +36,7 @@ def test_a_stop_while_the_link_is_lost_is_not_said_to_be_confirmed_and_is_there_
             assert mock.control("state")["frozen"] is True
             refused = service.robot.post("/queue/resume", json={})
             assert refused.json()["type"] == "docs/service.md#arm-stopped"
-            assert service.robot.post("/reset", json={}).status_code == 200
+            assert reset(service.robot).status_code == 200
             assert service.robot.post("/queue/resume", json={}).status_code == 200
             assert mock.control("state")["frozen"] is False
         service.robot.post("/disconnect")

@@ -42,6 +42,7 @@ from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
 from tests.server.migrated import migrated_store
 from tests.server.other_user import other_users_command_line
+from tests.server.polling import reset
 from tests.server.service import Service, running_service
 
 LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.1, "duration": 0.5}, "joints": [1, 2], "hold": 600}
@@ -110,7 +111,7 @@ def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked_and_while_the_wh
         texts = [event["text"] for event in service.robot.get("/events").json()["items"] if event["kind"] == "stop"]
         assert any("confirmed by the board" in text for text in texts)
         service.until_arm("stopped")
-        answer = service.robot.post("/reset", json={})
+        answer = reset(service.robot)
         assert answer.status_code == 200, answer.text
         assert service.robot.post("/queue/resume", json={}).status_code == 200
         experiment = _running(service)

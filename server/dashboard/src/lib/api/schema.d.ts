@@ -138,6 +138,8 @@ export interface paths {
         /**
          * Reset Robot
          * @description Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed.
+         *
+         *     It ends the stop that it names, `stop` of the robot's status, and is refused if another one has come since.
          */
         post: operations["reset_robot"];
         delete?: never;
@@ -5316,9 +5318,11 @@ export interface components {
         };
         /**
          * ResetRequest
-         * @description Ends a stop. `here`: first make the measured posture the set points.
+         * @description Ends the stop of this number, and no later one. `here`: first make the measured posture the set points.
          */
         ResetRequest: {
+            /** Stop */
+            stop: number;
             /**
              * Here
              * @default false
@@ -5374,6 +5378,8 @@ export interface components {
             arm: "disconnected" | "idle" | "armed" | "running" | "stopped" | "fault";
             /** Cause */
             cause: string;
+            /** Stop */
+            stop: number | null;
             /**
              * Activity
              * @enum {string}
@@ -5417,6 +5423,8 @@ export interface components {
              * @default
              */
             cause?: string;
+            /** Stop */
+            stop?: number | null;
             /**
              * Activity
              * @enum {string}
