@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
+from fastapi import Response
 
 from server.access.session_cookie import session_cookie, session_of, sign_in_cookie
+from server.access.sign_in import GOOD_FOR, SignIns
+from server.api.login import _set_cookie
+from tests.server.clocks import HandClock
+from tests.server.dashboard.browser import WITHOUT_3D, chromium, playwright
+from tests.server.notifications.receivers import Authority
 
 
 @pytest.mark.parametrize(
@@ -64,11 +76,12 @@ def test_a_browser_takes_both_cookies_over_tls_and_a_page_of_another_path_or_hos
             """Quiet."""
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Page)
-    server.socket = Authority(tmp_path, "127.0.0.1").server().wrap_socket(server.socket, server_side=True)
+    server.socket = Authority(tmp_path, "localhost").server().wrap_socket(server.socket, server_side=True)
     address = f"https://localhost:{server.server_port}"
-    services: Any = SimpleNamespace(settings=SimpleNamespace(server=SimpleNamespace(oidc=SimpleNamespace(address=address))))
+    oidc = SimpleNamespace(address=address)
+    services: Any = SimpleNamespace(settings=SimpleNamespace(server=SimpleNamespace(oidc=oidc)))
     names = (session_cookie(address), sign_in_cookie(address))
-    with closing(server), sync_playwright() as driver, open_chromium(driver) as browser:
+    with server, playwright() as driver, chromium(driver, *WITHOUT_3D) as browser:
         Thread(target=server.serve_forever, daemon=True).start()
         for spoilt in ("", "; Domain=localhost", "; Path=/api"):
             answer = Response()
