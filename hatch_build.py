@@ -21,11 +21,15 @@ PAGE = DASHBOARD / "dist"
 SITE = Path(__file__).parent / "docs" / "_site"
 """The site of the documents, which `make docs` builds: too long a build for every wheel, since it runs notebooks."""
 SCHEMA = DASHBOARD / "src" / "lib" / "api" / "schema.d.ts"
-BUILT_FROM = PAGE / "built-from.txt"
+BUILT_FROM = PAGE / "built-from"
 INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
 LOCK_FILES = ("package.json", "package-lock.json")
 COMPRESS = DASHBOARD / "compress.mjs"
-COMPRESSIBLE = (".html", ".js", ".css", ".svg", ".json", ".webmanifest")
+COMPRESSIBLE = (".html", ".js", ".css", ".svg", ".json", ".txt", ".webmanifest")
+TAKEN, LICENCES = "taken.json", "licences.txt"
+"""Files of the page: what it takes from packages, which vite.config.ts lists, and the licences of those."""
+LICENCE_NAMES = ("licen", "copying", "notice")
+"""Beginnings of the names of files with a licence, or with what it demands to be told."""
 TOOLS = {
     "build": [["vite/bin/vite.js", "build", "--logLevel", "error"]],
     "check": [
@@ -64,10 +68,32 @@ def build_page() -> None:
         return
     print("Building the dashboard's page", file=sys.stderr)
     run("build")
+    taken = PAGE / TAKEN
+    (PAGE / LICENCES).write_text(licences_of(json.loads(taken.read_text("utf-8")), DASHBOARD / "node_modules"), "utf-8")
+    taken.unlink()
     files = sorted(str(path) for path in PAGE.rglob("*") if path.suffix in COMPRESSIBLE)
     if node([str(COMPRESS), *files], cwd=DASHBOARD) != 0:
         raise BuildError(f"{COMPRESS.name} failed in {DASHBOARD}")
     BUILT_FROM.write_text(sources, "utf-8")
+
+
+def licences_of(files: list[str], packages: Path) -> str:
+    """The licences of the packages that files below `packages` are of. Raises BuildError for a package without a text:
+    nobody may pass it on so."""
+    found = {}
+    for file in files:
+        bundled = packages / f"{file}.LICENSE.txt"  # of what a package has in itself already
+        folder = (packages / file).parent
+        while not (folder / "package.json").is_file():
+            folder = folder.parent
+        told = json.loads((folder / "package.json").read_text("utf-8"))
+        texts = sorted(path for path in folder.iterdir() if path.name.lower().startswith(LICENCE_NAMES))
+        if not texts:
+            raise BuildError(f"{told['name']}: its package has no text of its licence, which the page must have")
+        own = found.setdefault(f"{told['name']} {told['version']} ({told.get('license', 'see below')})", {})
+        own.update({path: path.read_text("utf-8").strip() for path in (*texts, bundled) if path.is_file()})
+    line = "The page of MA2000 DAQ has parts of these packages, which are passed on under their own licences."
+    return "\n\n".join([line, *(f"==== {name}\n\n" + "\n\n".join(own.values()) for name, own in sorted(found.items()))])
 
 
 def run(task: str) -> None:

@@ -192,12 +192,16 @@ class Traces:
 
     def upload_unless_there(self, file: Path, number: str) -> CatalogueEntry:
         """The same, for a trace whose number is known: one that the service has is not sent again."""
+        return self.known(number) or self.upload(file)
+
+    def known(self, number: str) -> CatalogueEntry | None:
+        """The entry of a trace; None if the robot has none of this number."""
         try:
             return self.get(number).entry
         except ServiceError as error:
             if error.status != 404:
                 raise
-        return self.upload(file)
+            return None
 
     def change(self, trace: str, *, tags: Sequence[str] | None = None, notes: str | None = None) -> CatalogueEntry:
         """New tags or notes; what is None stays."""

@@ -25,6 +25,9 @@ _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_
 """Matches only where a key can begin, so that the search takes time in proportion to the text."""
 
 
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")
+
+
 class _Short(reprlib.Repr):
     """As `reprlib.Repr`, except for whole numbers that Python does not write in decimal digits (those from TOML's
     0x…)."""
@@ -84,6 +87,11 @@ def parse_json(text: str, what: str) -> Any:
         raise _too_deep(what) from None
     except ValueError as error:  # also a whole number of thousands of digits
         raise SpecError(f"{what}: not JSON: {_plain(error)}") from error
+    if _HALF.search(text):  # \ud83d\ude00 is one character, \ud83d alone is none, and can never be written again
+        try:
+            json.dumps(data, ensure_ascii=False).encode()
+        except (UnicodeEncodeError, RecursionError):
+            raise SpecError(f"{what}: not JSON: a text in it has half a character (\\ud800 to \\udfff)") from None
     return _bounded(data, what)
 
 

@@ -92,7 +92,7 @@ class Program(FrozenRecord):
     name: Annotated[str, Field(pattern=f"^{NAME}$")]
     machine: str = "ma2000"
     notes: str = ""
-    instructions: Annotated[tuple[Instruction, ...], Field(min_length=1, max_length=10000)]
+    instructions: Annotated[tuple[Instruction, ...], Field(min_length=1, max_length=10000, fail_fast=True)]
 
 
 def parse_program(text: str, origin: str = "program") -> Program:

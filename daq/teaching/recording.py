@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, FiniteFloat, model_validator
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import Angle, ExperimentSpec, JointNumber, Path
+from daq.contracts.experiment import JOINTS, ExperimentSpec, JointNumber, Path, Row
 from daq.contracts.frozen import FrozenRecord
 from daq.teaching.files import write_whole
 
@@ -22,9 +22,9 @@ FASTEST_RATE = 10.0
 class RecordedPath(FrozenRecord):
     """Measured angles (rad), one row per control period, one column per joint; times (s) from the first row."""
 
-    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)]
-    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
-    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2)]
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)]
+    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2, fail_fast=True)]
+    positions: Annotated[tuple[Row, ...], Field(min_length=2, fail_fast=True)]
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -215,7 +215,12 @@ class ServiceJobs:
             return MACHINE
         with tempfile.TemporaryDirectory() as folder, self.robot.service("jobs") as robot:
             file = Path(folder) / "model.json"
-            save_model(model, file)
+            there = tuple(trace for trace in dict.fromkeys(model.lineage.traces) if robot.traces.known(trace))
+            if missing := len(set(model.lineage.traces)) - len(there):
+                console().print(
+                    f"model {model.identity}: sent without {missing} traces of its lineage (not at the server)"
+                )
+            save_model(model.with_lineage(model.lineage.model_copy(update={"traces": there})), file)
             return robot.models.upload(file, model_name(name)).id
 
     def _done(

@@ -19,6 +19,7 @@ from pydantic import (
     model_validator,
 )
 
+from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
@@ -83,20 +84,26 @@ class Model(FrozenRecord):
     machine: Machine
     effects: tuple[EffectUse, ...] = ()
     values: dict[str, FiniteFloat] = {}
-    ties: dict[str, tuple[str, ...]] = {}
+    ties: dict[str, Annotated[tuple[str, ...], Field(min_length=2)]] = {}
     published_inertia: bool = False
     """Inertia of link 3 with its load as published (7.28) instead of exactly."""
     lineage: Lineage = Lineage()
 
     @model_validator(mode="after")
     def _known(self) -> Self:
+        taken: set[tuple[str, int]] = set()
         for use in self.effects:
             _check_use(self.machine, use)
-        if repeated := [u.name for i, u in enumerate(self.effects) for v in self.effects[:i] if _overlap(u, v)]:
-            raise SpecError(f"effect {repeated[0]}: in the model twice for the same joint")
+            own = {(use.name, joint) for joint in use.joints or (0,)}
+            if len(own) < len(use.joints) or not taken.isdisjoint(own):
+                raise SpecError(f"effect {use.name}: in the model twice for the same joint")
+            taken |= own
         _check_own(self.effects)
         if unknown := sorted(set(self.values) - set(self.by_name)):
-            raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
+            raise SpecError(f"parameter {shown(unknown[0])}: this model has {', '.join(self.by_name)}")
+        for p in self.parameters:
+            if not p.low <= p.value <= p.high:
+                raise SpecError(f"{p.name} = {p.value} {p.unit}: allowed are {p.low} to {p.high}")
         return self
 
     @property
@@ -110,11 +117,13 @@ class Model(FrozenRecord):
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter of the model: the machine's own, then those of its effects, with the model's values."""
         found = [*base_parameters(self.machine)]
+        taken: set[int] = set()
         for use in self.effects:
             beyond = self.own_columns.get(use.name, 0)
-            found.extend(_not_taken(effect_parameters(self.machine, use.name, use.joints, use.shared, beyond), found))
-        for name, members in self.ties.items():
-            found = _tied(found, name, members)
+            own = _not_taken(effect_parameters(self.machine, use.name, use.joints, use.shared, beyond), taken)
+            taken.update(slot for p in own for slot in p.slots)
+            found.extend(own)
+        found = _tied(found, self.ties)
         return tuple(p if p.name not in self.values else replace(p, value=self.values[p.name]) for p in found)
 
     @cached_property
@@ -167,15 +176,14 @@ class Model(FrozenRecord):
 
     @cached_property
     def identity(self) -> str:
-        """Twelve hexadecimal digits that stand for everything that decides the model's motion."""
-        text = self.model_dump_json(exclude={"lineage", "format"})
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        """Twelve hexadecimal digits that stand for everything in the model's file, its lineage included."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with other values. Raises SpecError for an unknown name, or a value outside its bounds."""
         for name, value in values.items():
             p = self.parameter(name)
-            if not p.low <= value <= p.high or not math.isfinite(value):
+            if not math.isfinite(value):
                 raise SpecError(f"{name} = {value} {p.unit}: allowed are {p.low} to {p.high}")
         return self._changed(values={**self.values, **{n: float(v) for n, v in values.items()}})
 
@@ -225,7 +233,7 @@ class Model(FrozenRecord):
 
     def with_lineage(self, lineage: Lineage) -> Model:
         """The model with another lineage."""
-        return self.model_copy(update={"lineage": lineage})
+        return self._changed(lineage=lineage)
 
     def _changed(self, **changes: Any) -> Model:
         fields = {name: getattr(self, name) for name in type(self).model_fields}
@@ -265,36 +273,40 @@ def _check_use(machine: Machine, use: EffectUse) -> None:
     if not kind.whole_machine and not use.joints:
         raise SpecError(f"effect {use.name}: name the joints it acts on, of {list(machine.modelled_joints)}")
     for joint in use.joints:
-        if joint not in machine.modelled_joints:
+        if not 1 <= joint <= len(machine.modelled_joints):
             raise SpecError(f"effect {use.name} on joint {joint}: modelled are joints {list(machine.modelled_joints)}")
         if kind.joints and joint not in kind.joints:
             raise SpecError(f"effect {use.name} on joint {joint}: its file has it on joints {list(kind.joints)} alone")
 
 
-def _overlap(one: EffectUse, other: EffectUse) -> bool:
-    return one.name == other.name and (not one.joints or bool(set(one.joints) & set(other.joints)))
-
-
-def _not_taken(own: tuple[Parameter, ...], before: list[Parameter]) -> list[Parameter]:
+def _not_taken(own: tuple[Parameter, ...], taken: set[int]) -> list[Parameter]:
     """Leaves out parameters whose place an earlier effect fills: backlash and compliance of a joint share a damping."""
-    taken = {slot for p in before if p.effect is not None for slot in p.slots}
     left = [replace(p, slots=tuple(s for s in p.slots if s not in taken)) for p in own]
     return [p for p in left if p.slots]
 
 
-def _tied(found: list[Parameter], name: str, members: tuple[str, ...]) -> list[Parameter]:
-    tied = [p for p in found if p.name in members]
-    if len(tied) != len(members):
-        raise SpecError(
-            f"tie {name!r}: {sorted(set(members) - {p.name for p in tied})} are not parameters of the model"
+def _tied(found: list[Parameter], ties: Mapping[str, tuple[str, ...]]) -> list[Parameter]:
+    """Puts one parameter in the place of the first of those that share its value, tie by tie."""
+    left: list[Parameter | None] = [*found]
+    places = {p.name: place for place, p in enumerate(found)}
+    for name, members in ties.items():
+        if unknown := sorted(set(members) - places.keys()):
+            raise SpecError(f"tie {shown(name)}: {shown(unknown)} are not parameters of the model")
+        if len(set(members)) < len(members):
+            raise SpecError(f"tie {shown(name)}: names a parameter twice")
+        own = sorted(places.pop(member) for member in members)
+        if name in places:
+            raise SpecError(f"tie {shown(name)}: the model has a parameter of this name")
+        tied = [p for place in own if (p := left[place]) is not None]
+        for place in own:
+            left[place] = None
+        places[name] = own[0]
+        left[own[0]] = replace(
+            tied[0],
+            name=name,
+            slots=tuple(s for p in tied for s in p.slots),
+            low=max(p.low for p in tied),
+            high=min(p.high for p in tied),
+            joints=tuple(sorted({j for p in tied for j in p.joints})),
         )
-    first = tied[0]
-    one = replace(
-        first,
-        name=name,
-        slots=tuple(s for p in tied for s in p.slots),
-        low=max(p.low for p in tied),
-        high=min(p.high for p in tied),
-        joints=tuple(sorted({j for p in tied for j in p.joints})),
-    )
-    return [one if p is first else p for p in found if p is first or p not in tied]
+    return [p for p in left if p is not None]

@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
+from daq.contracts.frozen import FrozenRecord
 from daq.contracts.refused import refused_words
 from model.machine_model.model import MODEL_FORMAT, Model
+
+
+class ModelFile(FrozenRecord):
+    """What is kept of a model: its number, its file's text, and the model and the traces that it is made from."""
+
+    identity: Annotated[str, Field(pattern=r"^[0-9a-f]{12}$")]
+    text: str
+    parent: str | None
+    traces: tuple[str, ...]
+
+
+def file_of(model: Model) -> ModelFile:
+    """The file of a model."""
+    lineage = model.lineage
+    return ModelFile(identity=model.identity, text=_text(model), parent=lineage.parent, traces=lineage.traces)
 
 
 def save_model(model: Model, path: Path) -> Path:
     """Writes a model. Returns `path`. Raises SpecError when the file cannot be written."""
     try:
-        path.write_text(model.model_dump_json(indent=1) + "\n", "utf-8")
+        path.write_text(_text(model), "utf-8")
     except OSError as error:
         raise SpecError(f"{path}: cannot be written: {error.strerror}") from error
     return path
@@ -41,6 +57,10 @@ def model_of(data: Any, called: str) -> Model:
         return Model.model_validate(data)
     except ValidationError as error:
         raise SpecError(f"model {called}: {refused_words(error, Model, 'model')}") from error
+
+
+def _text(model: Model) -> str:
+    return model.model_dump_json(indent=1) + "\n"
 
 
 def _check_version(called: str, version: Any) -> None:

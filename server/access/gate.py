@@ -22,7 +22,7 @@ from starlette.websockets import WebSocketClose
 from server import logs
 from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
-from server.access.limits import LARGEST_BODY, Buckets, counted
+from server.access.limits import LARGEST_BODY, MOST_FIELDS, MOST_OF_A_PROGRAM, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
 from server.access.session_cookie import says_where_it_is_from, session_cookie, session_of
 from server.access.tickets import Tickets
@@ -36,6 +36,7 @@ STOP = re.compile(r"/api/v1/(robots/[^/]+|fleet)/stop")
 """Addresses of the stop, which no rate limit delays."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
 """Addresses whose POST takes a file. Their routes limit its size themselves."""
+PROGRAMS = re.compile(r"/api/v1/robots/[^/]+/(programs/[^/]+|teaching/program)")
 NOT_ALLOWED, TRY_LATER = 1008, 1013
 MOST_SOCKETS = 100
 """Largest number of WebSockets of one caller, out of 500 connections."""
@@ -117,7 +118,8 @@ class Gate:
                 return
             state["turn"] = turn = await self.turns.taken(scope, answer)
             try:
-                body = receive if uploads else counted(receive, LARGEST_BODY)
+                most = MOST_OF_A_PROGRAM if PROGRAMS.fullmatch(scope["path"]) else MOST_FIELDS
+                body = receive if uploads else counted(receive, LARGEST_BODY, most)
                 await app(scope, body if asked is None else asked.receive(body), turn.send)
             finally:
                 turn.end()

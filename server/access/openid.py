@@ -8,9 +8,7 @@ has signed in, and no token, waits for it.
 from __future__ import annotations
 
 import logging
-import secrets
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import httpx
@@ -28,6 +26,7 @@ from daq.config.oidc import OidcSettings
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import ROLES
 from server.access.sessions import Person
+from server.access.sign_in import Asked
 from server.problems import ProblemError
 
 ANSWER_WITHIN = 10.0
@@ -40,15 +39,6 @@ DISCOVERY_FOR = 3600.0
 """Time (s) after which the provider's endpoints are asked for again."""
 CALLBACK = "/api/v1/login/callback"
 log = logging.getLogger("server.access")
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What was asked of the provider, to compare its answer with."""
-
-    state: str
-    nonce: str
-    verifier: str
 
 
 class Provider:
@@ -66,18 +56,17 @@ class Provider:
         self._found_at = 0.0
         self._keys: KeySet | None = None
 
-    async def ask(self, now: float) -> tuple[str, Asked]:
-        """Returns the address at the provider where a person signs in, and what was asked. Raises a 503.
+    async def ask(self, asked: Asked, now: float) -> str:
+        """Returns the address at the provider where a person signs in. Raises a 503.
 
         now: s, monotonic
         """
-        asked = Asked(secrets.token_urlsafe(32), secrets.token_urlsafe(32), secrets.token_urlsafe(48))
         endpoint = await self._endpoint("authorization_endpoint", now)
         async with self._client() as client:
             address, _ = client.create_authorization_url(
                 endpoint, state=asked.state, nonce=asked.nonce, code_verifier=asked.verifier
             )
-        return str(address), asked
+        return str(address)
 
     async def answered(self, asked: Asked, answer: Mapping[str, str], now: float) -> Person:
         """Returns who has signed in, from the parameters with which the provider sent them back.

@@ -21,12 +21,12 @@ that they must sign in again. A session that somebody has left stops nothing."""
 def session_cookie(address: str | None) -> str:
     """Returns the name of the session's cookie. `address`: where people reach the service (`server.oidc.address`);
     None where nobody signs in."""
-    return f"{TLS_PREFIX if is_over_tls(address) else ''}{SESSION}{_port(address)}"
+    return _name(SESSION, address)
 
 
 def sign_in_cookie(address: str | None) -> str:
     """Returns the name of the cookie that ties an answer of the provider to the browser that asked."""
-    return f"{SIGN_IN}{_port(address)}"
+    return _name(SIGN_IN, address)
 
 
 def is_over_tls(address: str | None) -> bool:
@@ -47,8 +47,9 @@ def says_where_it_is_from(headers: Mapping[str, str]) -> bool:
     return "origin" in headers or "sec-fetch-site" in headers
 
 
-def _port(address: str | None) -> str:
+def _name(name: str, address: str | None) -> str:
     if address is None:
-        return ""
+        return name
     parts = urlsplit(address)
-    return f"-{parts.port or DEFAULT_PORTS[parts.scheme]}"
+    prefix = TLS_PREFIX if is_over_tls(address) else ""
+    return f"{prefix}{name}-{parts.port or DEFAULT_PORTS[parts.scheme]}"

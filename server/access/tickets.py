@@ -11,8 +11,8 @@ from server.clock import Clock
 
 GOOD_FOR = 30.0
 """Time (s) for which a ticket is valid; a page opens its WebSocket at once."""
-MOST = 1000
-"""Largest number of tickets that are kept."""
+MOST = 100
+"""Largest number of tickets that are kept of a caller, who may have as many WebSockets."""
 
 
 class Tickets:
@@ -24,13 +24,14 @@ class Tickets:
         self._given: dict[str, tuple[Caller, float]] = {}
 
     def give(self, caller: Caller) -> Ticket:
-        """Issues a new ticket for `caller`. The oldest are dropped if there are too many."""
+        """Issues a new ticket for `caller`. Their own oldest are dropped if they have too many."""
         ticket = secrets.token_urlsafe(24)
         with self._lock:
             now = self._clock.monotonic()
             self._given = {key: value for key, value in self._given.items() if value[1] > now}
-            while len(self._given) >= MOST:
-                del self._given[next(iter(self._given))]
+            own = [key for key, (holder, _) in self._given.items() if holder == caller]
+            for key in own[: max(0, len(own) - MOST + 1)]:
+                del self._given[key]
             self._given[ticket] = (caller, now + GOOD_FOR)
         return Ticket(ticket=ticket, seconds=GOOD_FOR)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from daq.contracts.service.base import Page
@@ -35,15 +34,14 @@ from server.api.dependencies import (
     Turn,
     Viewer,
 )
+from server.api.upload import store_model
 from server.batches.folder import CSV, PARQUET
 from server.jobs.effects import known_effects
 from server.jobs.mailbox import BATCH
-from server.jobs.models import LARGEST_MODEL
 from server.jobs.results import JobResult
 from server.jobs.service import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
-from server.problems import PROBLEMS, ProblemError
-from server.services import RobotServices, Services
+from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
@@ -165,6 +163,7 @@ def list_models(
     "/models",
     tags=["models"],
     status_code=201,
+    responses={200: {"model": ModelEntry}},
     openapi_extra={"requestBody": {"required": True, "content": _JSON_FILE}},
 )
 async def upload_model(
@@ -172,16 +171,17 @@ async def upload_model(
     rig: RobotDep,
     services: ServicesDep,
     caller: Operator,
+    response: Response,
     name: Annotated[ModelName, Query()],
 ) -> ModelEntry:
-    """Imports a model file as written by `daq fit`. Models with user-defined effects are refused."""
-    text = bytearray()
-    async for piece in request.stream():
-        text += piece
-        if len(text) > LARGEST_MODEL:
-            raise ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
-    async with services.lanes.turn(caller.name):
-        return await run_in_threadpool(_import_model, bytes(text), name, rig, services, caller.name)
+    """Imports a model file as written by `daq fit`.
+
+    The same file again is the same entry (200). Refused are models with user-defined effects, and models that name
+    traces which the service does not have.
+    """
+    entry, new = await store_model(request, name, rig, services, caller)
+    response.status_code = 201 if new else 200
+    return entry
 
 
 @router.get("/models/machine/parameters", tags=["models"])
@@ -239,11 +239,3 @@ def delete_model(model: Identity, rig: RobotDep, services: ServicesDep, caller: 
     rig.models.remove(model)
     services.record_event(rig.robot.name, "model", f"model {name!r} was deleted", actor=caller.name)
     return Response(status_code=204)
-
-
-def _import_model(text: bytes, name: str, rig: RobotServices, services: Services, by: str) -> ModelEntry:
-    try:
-        return services.models.get(rig.robot.name, rig.models.take_in_text(text, name, by))
-    except RecursionError:
-        line, advice = "the body is nested too deeply", "send a file as `daq fit` writes it"
-        raise ProblemError(422, "not-a-model", line, advice) from None

@@ -42,14 +42,14 @@ async def start_login(
     provider = services.provider
     if provider is None:
         raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
+    asked, cookie = services.sign_ins.begin(robot)
     try:
-        address, asked = await provider.ask(services.clock.monotonic())
+        address = await provider.ask(asked, services.clock.monotonic())
     except ProblemError as problem:
         return _told(request, services, problem)
     answer = RedirectResponse(address, 303)
-    word = services.sign_ins.begin(asked, robot)
     # It must come with a link from the provider's page, so it is `lax`; the session's cookie is `strict`.
-    _set_cookie(answer, services, sign_in_cookie(_address(services)), word, int(GOOD_FOR), "lax", "/api/v1/login")
+    _set_cookie(answer, services, sign_in_cookie(_address(services)), cookie, GOOD_FOR, "lax")
     return answer
 
 
@@ -73,12 +73,13 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
         secret, caller = await run_in_threadpool(services.sessions.begin, person, services.clock.utc(), lasts)
     except ProblemError as problem:
         return _told(request, services, problem)
+    services.sign_ins.done(way)
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))
     answer = RedirectResponse(f"/?robot={way.robot}" if way.robot else "/", 303)
-    _forget_cookie(answer, services, sign_in_cookie(_address(services)), "/api/v1/login")
-    _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict", "/")
+    _forget_cookie(answer, services, sign_in_cookie(_address(services)))
+    _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict")
     return answer
 
 
@@ -92,7 +93,7 @@ async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> 
         log.info("%s has signed out", caller.name)
         if services.provider is not None:
             address = await services.provider.sign_out_address(services.clock.monotonic())
-    _forget_cookie(response, services, session_cookie(_address(services)), "/")
+    _forget_cookie(response, services, session_cookie(_address(services)))
     return SignedOut(provider=address)
 
 
@@ -114,22 +115,21 @@ def _address(services: Services) -> str | None:
     return services.settings.server.oidc.address
 
 
-def _set_cookie(
-    answer: Response, services: Services, name: str, value: str, seconds: int, same_site: str, path: str
-) -> None:
+def _set_cookie(answer: Response, services: Services, name: str, value: str, seconds: int, same_site: str) -> None:
+    """Both cookies are for the whole service: the prefix of their names (`__Host-`) demands it."""
     answer.set_cookie(
         name,
         value,
         max_age=seconds,
-        path=path,
+        path="/",
         secure=is_over_tls(_address(services)),
         httponly=True,
         samesite=same_site,  # type: ignore[arg-type]
     )
 
 
-def _forget_cookie(answer: Response, services: Services, name: str, path: str) -> None:
-    answer.delete_cookie(name, path=path, secure=is_over_tls(_address(services)), httponly=True)
+def _forget_cookie(answer: Response, services: Services, name: str) -> None:
+    answer.delete_cookie(name, path="/", secure=is_over_tls(_address(services)), httponly=True)
 
 
 def _told(request: Request, services: Services, problem: ProblemError) -> Response:

@@ -219,7 +219,13 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
     ),
     _met("post .*/traces$", 422, "not-a-trace", "the body is empty", "send a trace"),
     _met("post .*/jobs$", 422, "batch-size", "filter: finds no trace", "a batch has 1 to 2000 traces"),
-    _met("post .*/models$", 422, "not-a-model", "the body is not JSON", "send a file as `daq fit` writes it"),
+    _met(
+        "post .*/models$",
+        422,
+        "not-a-model",
+        "upload: not JSON: Expecting value: line 1 column 1 (char 0)",
+        "send a file as `daq fit` writes it",
+    ),
     _met(".*", 429, "too-many", "too many requests", "ask less often"),
     _met(".*", 503, "database", "the database: database is locked", "try again"),
     _met(

@@ -1,17 +1,20 @@
-"""Taking in a trace from elsewhere. What is uploaded is read by a process with limits before it gets a name in the
-folder."""
+"""Taking in traces and models from elsewhere. What is uploaded is read by a process with limits before it gets a name
+in a folder."""
 
 from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from fastapi import Request
 from fastapi.concurrency import run_in_threadpool
 
+from daq.contracts.service.jobs import ModelEntry
 from daq.contracts.service.traces import CatalogueEntry
+from model.machine_model.model_file import ModelFile
 from server.access.caller import Caller
-from server.bounded.messages import ReadUpload, UploadedTrace
+from server.bounded.messages import Order, ReadModel, ReadUpload, UploadedTrace
 from server.bounded.workers import ExhaustedError
 from server.catalogue.catalogue import UPLOAD
 from server.catalogue.room import require_room
@@ -22,42 +25,64 @@ from server.store.labels import trace_label
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
 LOOK_EVERY = 4 << 20
 """Number of bytes after which the free disk space is checked again."""
-ADVICE = "docs/traces.md tells what a trace looks like"
+LARGEST_MODEL = 16 << 20
+"""Largest size of a model's file in bytes: a saved fit has its curves, too."""
+ADVICE = {
+    "not-a-trace": "docs/traces.md tells what a trace looks like",
+    "not-a-model": "send a file as `daq fit` writes it",
+}
 
 
 async def store_upload(request: Request, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
-    """Writes the body to a temporary file, then takes it in. Raises a 413, 415, 422, 409, 507."""
+    """Writes the body to a temporary file, then takes it in as a trace. Raises a 413, 415, 422, 409, 507."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
         raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r:.100} is not supported", f"send {allowed}")
+    most = services.settings.server.upload_size
+    line = f"an upload may have {most} MB (server.upload_size)"
+    too_large = ProblemError(413, "too-large", line, "copy the file into the folder of traces instead")
     rig.catalogue.folder.mkdir(parents=True, exist_ok=True)
     await run_in_threadpool(require_room, rig.catalogue.folder)
     with tempfile.TemporaryDirectory(prefix=UPLOAD, dir=rig.catalogue.folder) as folder:
         path = Path(folder) / f"upload{KINDS[kind]}"
-        await _write_body(request, path, services.settings.server.upload_size << 20)
+        if await _write_body(request, path, most << 20, too_large) == 0:
+            raise ProblemError(422, "not-a-trace", "the body is empty", "send a trace")
         async with services.lanes.turn(caller.name):  # not before: a body that never ends would keep it
             return await run_in_threadpool(_take_in, path, rig, services, caller)
 
 
-async def _write_body(request: Request, path: Path, largest: int) -> None:
+async def store_model(
+    request: Request, name: str, rig: RobotServices, services: Services, caller: Caller
+) -> tuple[ModelEntry, bool]:
+    """Does the same with a model. Returns its entry, and whether it is new. Raises a 413, 422, 507."""
+    too_large = ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.json"
+        await _write_body(request, path, LARGEST_MODEL, too_large)
+        async with services.lanes.turn(caller.name):
+            return await run_in_threadpool(_keep, path, name, rig, services, caller)
+
+
+async def _write_body(request: Request, path: Path, largest: int, too_large: ProblemError) -> int:
     size, looked = 0, 0
     with path.open("wb") as stream:
         async for piece in request.stream():
             size += len(piece)
             if size > largest:
-                line = f"an upload may have {largest >> 20} MB (server.upload_size)"
-                raise ProblemError(413, "too-large", line, "copy the file into the folder of traces instead")
+                raise too_large
             await run_in_threadpool(stream.write, piece)
             if size - looked > LOOK_EVERY:  # others may upload, too
                 looked = size
                 await run_in_threadpool(require_room, path.parent)
-    if size == 0:
-        raise ProblemError(422, "not-a-trace", "the body is empty", "send a trace")
+    return size
 
 
 def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
-    made = _read(path, rig, services)
+    order = ReadUpload(path=path, folder=rig.catalogue.folder, limits=services.settings.traces.limits)
+    made = UploadedTrace.model_validate(_read(order, services, "not-a-trace"))
+    if made.path.parent != path.parent:
+        raise ProblemError(422, "not-a-trace", "upload: its reader gave an impossible answer", ADVICE["not-a-trace"])
     summary = made.summary
     assert summary.trace_id is not None
     assert summary.created is not None
@@ -68,11 +93,19 @@ def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller)
     return services.traces.get(rig.robot.name, summary.trace_id)
 
 
-def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
-    """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is not a trace."""
+def _keep(path: Path, name: str, rig: RobotServices, services: Services, caller: Caller) -> tuple[ModelEntry, bool]:
+    made = ModelFile.model_validate(_read(ReadModel(path=path), services, "not-a-model"))
+    # Everybody who may call the service sees the traces of all its robots, and of no other.
+    new = rig.models.keep(made, name, caller.name, robots=[one.robot.name for one in services.robots()])
+    if new:
+        services.record_event(rig.robot.name, "model", f"model {name!r} was uploaded", actor=caller.name)
+    return services.models.get(rig.robot.name, made.identity), new
+
+
+def _read(order: Order, services: Services, kind: str) -> dict[str, Any]:
+    """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is not valid."""
     try:
-        limits = services.settings.traces.limits
-        answer = services.uploads.ask(ReadUpload(path=path, folder=rig.catalogue.folder, limits=limits))
+        answer = services.uploads.ask(order)
     except ExhaustedError as error:
         raise _too_much(str(error)) from error
     if answer.exhausted:
@@ -80,11 +113,8 @@ def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
     if answer.no_room:
         raise ProblemError(507, "no-room", f"upload: {answer.problem}", "make room on the disk of the traces")
     if answer.problem:
-        raise ProblemError(422, "not-a-trace", f"upload: {answer.problem}", ADVICE)
-    made = UploadedTrace.model_validate(answer.data)
-    if made.path.parent != path.parent:
-        raise ProblemError(422, "not-a-trace", "upload: its reader gave an impossible answer", ADVICE)
-    return made
+        raise ProblemError(422, kind, f"upload: {answer.problem}", ADVICE[kind])
+    return answer.data
 
 
 def _too_much(line: str) -> ProblemError:

@@ -55,7 +55,8 @@ class Audit:
         self.utc = utc
 
     def watched(self, scope: Scope, *, with_content: bool) -> AskedRequest | None:
-        """Returns a watch over a request; None for one that only asks. `with_content`: whether its body is kept."""
+        """Returns a watch over a request; None for one that only asks. `with_content`: whether its body is kept; a file
+        has its digest alone."""
         return None if scope["method"] in SAFE_METHODS else AskedRequest(self, scope, with_content=with_content)
 
 
@@ -76,9 +77,10 @@ class AskedRequest:
         async def heard() -> Message:
             message = await receive()
             piece = message.get("body", b"") if message["type"] == "http.request" else b""
-            if piece and self._with_content:
+            if piece:
                 self._size += len(piece)
                 self._sha256.update(piece)
+            if piece and self._with_content:
                 self._body = (self._body + piece)[: LONGEST_CONTENT + 1]
             return message
 
@@ -144,7 +146,7 @@ class AskedRequest:
     def _content(self) -> str | None:
         if not self._size:
             return None
-        said = content_of(self._body) if self._size <= LONGEST_CONTENT else None
+        said = content_of(self._body) if self._with_content and self._size <= LONGEST_CONTENT else None
         if said is not None:
             return said
         return json.dumps({"sha256": self._sha256.hexdigest(), "size": self._size}, separators=(",", ":"))

@@ -31,6 +31,13 @@ class ReadUpload(FrozenRecord):
     limits: TraceLimits = DEFAULT_TRACE_LIMITS
 
 
+class ReadModel(FrozenRecord):
+    """Reads an uploaded file as a model."""
+
+    kind: Literal["model"] = "model"
+    path: Path
+
+
 class WorkOutMotion(FrozenRecord):
     """Plans an experiment and checks it against the machine's limits. `most_shown`: the number of set points in the
     answer, at most."""
@@ -41,8 +48,8 @@ class WorkOutMotion(FrozenRecord):
     most_shown: int
 
 
-Order = Annotated[ReadUpload | WorkOutMotion, Field(discriminator="kind")]
-ORDER: TypeAdapter[ReadUpload | WorkOutMotion] = TypeAdapter(Order)
+Order = ReadUpload | ReadModel | WorkOutMotion
+ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])
 
 
 class UploadedTrace(FrozenRecord):

@@ -12,7 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from daq.contracts.errors import DaqError
-from server.bounded.messages import ORDER, Answer, Limits, ReadUpload
+from daq.contracts.service.experiments import MotionPreview
+from model.machine_model.model_file import ModelFile
+from server.bounded.messages import ORDER, Answer, Limits, Order, ReadModel, ReadUpload, UploadedTrace
+from server.bounded.model import read_model
 from server.bounded.motion import preview_of
 from server.bounded.upload import read_upload
 from server.core_sharing import weigh_session
@@ -50,8 +53,7 @@ def main() -> int:
 def answer_order(line: str, limits: Limits) -> Answer:
     """Carries out one order. Whatever is wrong with the input becomes one line of the answer."""
     try:
-        order = ORDER.validate_json(line)
-        done = read_upload(order) if isinstance(order, ReadUpload) else preview_of(order)
+        done = _carry_out(ORDER.validate_json(line))
         return Answer(data=done.model_dump(mode="json"), spent=_has_grown())
     except DaqError as error:
         return Answer(problem=_short(str(error)), no_room=_is_of_the_disk(error), spent=_has_grown())
@@ -63,6 +65,16 @@ def answer_order(line: str, limits: Limits) -> Answer:
     except Exception as error:  # noqa: BLE001 - whatever its reader raises, the file is to blame
         line = f"cannot be read: {type(error).__name__}: {error}"
         return Answer(problem=_short(line), fault=traceback.format_exc()[-4000:], spent=True)
+
+
+def _carry_out(order: Order) -> UploadedTrace | ModelFile | MotionPreview:
+    match order:
+        case ReadUpload():
+            return read_upload(order)
+        case ReadModel():
+            return read_model(order)
+        case _:
+            return preview_of(order)
 
 
 def _is_of_the_disk(error: BaseException | None) -> bool:

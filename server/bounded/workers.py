@@ -12,7 +12,7 @@ import threading
 import time
 from contextlib import suppress
 
-from server.bounded.messages import Answer, Limits, ReadUpload, WorkOutMotion
+from server.bounded.messages import Answer, Limits, Order
 from server.problems import ProblemError
 
 LARGEST_ANSWER = 64 << 20
@@ -41,7 +41,7 @@ class Workers:
         self._busy: set[_Worker] = set()
         self._closed = False
 
-    def ask(self, order: ReadUpload | WorkOutMotion) -> Answer:
+    def ask(self, order: Order) -> Answer:
         """Has an order carried out, and returns the answer. Raises ExhaustedError if there is none, and a 503 once the
         service ends."""
         with self._room:
@@ -128,7 +128,7 @@ class _Worker:
         """Whether the process is still running."""
         return self._process.poll() is None
 
-    def ask(self, order: ReadUpload | WorkOutMotion) -> Answer:
+    def ask(self, order: Order) -> Answer:
         """Sends an order and waits for the answer. Raises ExhaustedError."""
         until = time.monotonic() + self._limits.seconds + self._allowance
         self._allowance = 0.0

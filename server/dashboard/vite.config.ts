@@ -30,8 +30,21 @@ function preloaded(program: string): Plugin {
   };
 }
 
+/** Lists the files of packages that the page is made from: programs, styles, fonts. hatch_build.py adds their licences. */
+function taken(fileName: string): Plugin {
+  return {
+    name: 'taken-files',
+    generateBundle(_, bundle) {
+      const styles = [...this.getModuleIds()].filter((id) => /\.css(\?|$)/.test(id));
+      const parts = Object.values(bundle).flatMap((one) => (one.type === 'chunk' ? one.moduleIds : one.originalFileNames));
+      const files = [...parts, ...styles].flatMap((id) => /node_modules\/([^?]+)/.exec(id)?.[1] ?? []);
+      this.emitFile({ type: 'asset', fileName, source: JSON.stringify([...new Set(files)].sort()) });
+    },
+  };
+}
+
 export default defineConfig({
-  plugins: [svelte(), preloaded('/src/app.ts')],
+  plugins: [svelte(), preloaded('/src/app.ts'), taken('taken.json')],
   build: {
     target: 'es2022',
     // The page's policy allows fonts and pictures as files of its own, not inside style sheets.

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
 
-from daq.contracts.documents import parse_json
-from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
 from model.effects.names import placed
 from model.machine_model.model import EffectUse, Model, base_model
-from model.machine_model.model_file import load_model, model_of, save_model
+from model.machine_model.model_file import ModelFile, file_of, load_model
 from model.machine_model.parameter_words import words_of
 from server.clock import Clock
-from server.problems import ProblemError
 from server.store.models import ModelStore, NewModel
-
-AS_FITTED = "send a file as `daq fit` writes it"
-LARGEST_MODEL = 16 << 20
-"""Largest size of a model's file in bytes."""
 
 
 class Models:
@@ -33,49 +26,42 @@ class Models:
         self._machine = machine
         self._clock = clock
 
-    def take_in(self, path: Path, name: str, by: str, job: str | None) -> str:
-        """Adds a model from its file, and returns its number. Adding it again changes nothing. Raises SpecError."""
-        return self._keep(load_model(path), name, by, job)
+    def take_in(self, path: Path, name: str, by: str, job: str) -> str:
+        """Adds a job's model, and returns its number. Adding it again changes nothing. Raises SpecError."""
+        made = file_of(load_model(path))
+        self.keep(made, name, by, job)
+        return made.identity
 
-    def _keep(self, model: Model, name: str, by: str, job: str | None) -> str:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        file = f"{model.identity}.json"
-        part = self.folder / f"{file}.part"
-        save_model(model, part)
-        with part.open("rb") as stream:
-            os.fsync(stream.fileno())
-        part.replace(self.folder / file)
-        lineage = model.lineage
-        self.store.insert(
-            NewModel(
-                id=model.identity,
-                robot=self._robot,
-                name=name[:64],
-                file=file,
-                created=self._clock.utc(),
-                created_by=by,
-                parent=lineage.parent,
-                job=job,
-                traces=lineage.traces,
-            )
+    def keep(
+        self, made: ModelFile, name: str, by: str, job: str | None = None, robots: Collection[str] | None = None
+    ) -> bool:
+        """Adds a model; returns False if the robot has it already. A number stands for one text, so its file is written
+        once. `robots`: those whose traces it may name; None for any. Raises a 422 for a trace that none of them has."""
+        new = NewModel(
+            id=made.identity,
+            robot=self._robot,
+            name=name[:64],
+            file=f"{made.identity}.json",
+            created=self._clock.utc(),
+            created_by=by,
+            parent=made.parent,
+            job=job,
+            traces=made.traces,
         )
-        return model.identity
 
-    def take_in_text(self, text: bytes, name: str, by: str) -> str:
-        """Adds an uploaded model. Raises a 422, also if the model has effects that are programs."""
-        try:
-            data = parse_json(text.decode("utf-8"), "upload")
-        except UnicodeDecodeError as error:
-            raise ProblemError(422, "not-a-model", "the body is not text in UTF-8", AS_FITTED) from error
-        except SpecError as error:
-            raise ProblemError(422, "not-a-model", str(error), AS_FITTED) from error
-        if _has_program(data):
-            line = "this model has effects that are programs of a user: a service does not run those"
-            raise ProblemError(422, "not-a-model", line, "use it with the command line")
-        try:
-            return self._keep(model_of(data, "upload"), name, by, None)
-        except SpecError as error:
-            raise ProblemError(422, "not-a-model", str(error), AS_FITTED) from error
+        def write() -> None:
+            path = self.folder / new.file
+            if path.exists():
+                return
+            self.folder.mkdir(parents=True, exist_ok=True)
+            part = path.with_name(f"{new.file}.part")
+            with part.open("w", encoding="utf-8") as stream:
+                stream.write(made.text)
+                stream.flush()
+                os.fsync(stream.fileno())
+            part.replace(path)
+
+        return self.store.insert(new, write, robots)
 
     def path_of(self, identity: str) -> Path:
         """Returns a model's file. Raises a 404."""
@@ -106,9 +92,7 @@ class Models:
 
     def remove(self, identity: str) -> None:
         """Deletes a model's row and file. Raises a 404, 409."""
-        file = self.store.remove(self._robot, identity)
-        if file is not None:
-            (self.folder / file).unlink(missing_ok=True)
+        self.store.remove(self._robot, identity, lambda file: (self.folder / file).unlink(missing_ok=True))
 
 
 def _effect(use: EffectUse) -> EffectInModel:
@@ -132,12 +116,3 @@ def _parameters(model: Model) -> tuple[ModelParameter, ...]:
 
 def _finite(value: float | None) -> float | None:
     return None if value is None or abs(value) == float("inf") else value
-
-
-def _has_program(data: Any) -> bool:
-    """Whether any effect in the data has a program file."""
-    if isinstance(data, dict):
-        effects = data.get("effects")
-        own = isinstance(effects, list) and any(isinstance(use, dict) and use.get("file") for use in effects)
-        return own or any(_has_program(value) for value in data.values())
-    return isinstance(data, list) and any(_has_program(value) for value in data)

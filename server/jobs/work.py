@@ -227,7 +227,8 @@ class _Worker:
             comparison = self._compared(models, [*traces, *held], found.holdout, DIAGNOSIS_SHARE, MAP_SHARE)
             self.mailbox.tell(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
             given = where_given(begin, [t for t in (*traces, *held) if t.record.trace_id in found.traces])
-        changed = found.model_after.identity != found.model_before.identity
+        before = found.model_before
+        changed = found.model_after.with_lineage(before.lineage).identity != before.identity
         if changed:
             self._keep_model(found.model_after)
         efforts = recorded_and_predicted(found, [*traces, *held], found.holdout)

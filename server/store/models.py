@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy import select, tuple_
 from sqlalchemy.orm import Session
 
+from daq.contracts.documents import shown
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import ModelChange, ModelEntry
-from server.problems import conflict, not_found
+from server.problems import ProblemError, conflict, not_found
 from server.store.engine import Store
 from server.store.pages import Cursor, page_of
-from server.store.tables import ModelRow, TraceUseRow
+from server.store.tables import ModelRow, TraceRow, TraceUseRow
 
 MOST_ANCESTORS = 100
+AT_ONCE = 500
+"""Number of traces in one query; SQLite takes 32 766 values in one."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +43,26 @@ class ModelStore:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def insert(self, new: NewModel) -> bool:
-        """Adds a model; returns False if the robot has it already. Equal models have equal numbers."""
+    def insert(self, new: NewModel, also: Callable[[], None], robots: Collection[str] | None = None) -> bool:
+        """Adds a model; returns False if the robot has it already. Equal models have equal numbers.
+
+        Args:
+            also: keeps the file. It is called last before the transaction is written: if it raises, there is no row.
+            robots: those whose traces may be named; None for a model that the service has made itself. Raises a 422 for
+                a trace that none of them has.
+        """
         with self._store.writing() as session:
             if session.get(ModelRow, (new.id, new.robot)) is not None:
                 return False
+            traces = tuple(dict.fromkeys(new.traces))
+            if robots is not None:
+                _require_traces(session, traces, robots)
             fields = {name: value for name, value in vars(new).items() if name != "traces"}
             session.add(ModelRow(**fields, notes=""))
-            for trace in new.traces:
+            for trace in traces:
                 session.merge(TraceUseRow(trace=trace, used_by=f"model {new.id}"))
+            session.flush()
+            also()
             return True
 
     def get(self, robot: str, identity: str) -> ModelEntry:
@@ -100,9 +115,12 @@ class ModelStore:
             session.flush()
             return _entry(session, row)
 
-    def remove(self, robot: str, identity: str) -> str | None:
-        """Deletes a model, and returns its file's name; None if another robot has the model, too, and needs the file.
-        Raises a 404, and a 409 if another model was made from it."""
+    def remove(self, robot: str, identity: str, also: Callable[[str], None]) -> None:
+        """Deletes a model. Raises a 404, and a 409 if another model was made from it.
+
+        `also` deletes the file of the name that it is given, last before the transaction is written. It is not called
+        if another robot has the model, too, and needs the file.
+        """
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             child = session.scalar(select(ModelRow.name).filter_by(robot=robot, parent=identity))
@@ -110,10 +128,22 @@ class ModelStore:
                 raise conflict("model-in-use", f"model {child!r} was made from {row.name!r}", "delete that one first")
             session.delete(row)
             if session.scalar(select(ModelRow.robot).where(ModelRow.id == identity, ModelRow.robot != robot)):
-                return None
+                return
             for use in session.scalars(select(TraceUseRow).filter_by(used_by=f"model {identity}")):
                 session.delete(use)
-            return row.file
+            session.flush()
+            also(row.file)
+
+
+def _require_traces(session: Session, traces: Sequence[str], robots: Collection[str]) -> None:
+    """Raises a 422 unless each trace is one of these robots'."""
+    seen: set[str] = set()
+    for part in range(0, len(traces), AT_ONCE):
+        asked = traces[part : part + AT_ONCE]
+        seen.update(session.scalars(select(TraceRow.id).where(TraceRow.id.in_(asked), TraceRow.robot.in_(robots))))
+    if unseen := [trace for trace in traces if trace not in seen]:
+        line = f"lineage.traces: {shown(unseen[0])} is no trace of this service"
+        raise ProblemError(422, "not-a-model", line, "upload these traces first, or take them out of the lineage")
 
 
 def _entry(session: Session, row: ModelRow) -> ModelEntry:

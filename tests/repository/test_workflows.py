@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.repository.fresh import installed, run
 from tests.repository.tracked import ROOT
@@ -85,10 +86,22 @@ def test_files_and_commands_that_a_workflow_names_are_there(name: str) -> None:
         assert (ROOT / module.replace(".", "/")).with_suffix(".py").is_file()
 
 
+def test_newer_versions_are_proposed_of_all_that_is_pinned() -> None:
+    bot = FOLDER.parent / "dependabot.yml"
+    done = run([Path(sys.executable).with_name("check-jsonschema"), "--builtin-schema", "vendor.dependabot", bot], ROOT)
+    assert done.returncode == 0, done.stdout
+    asked = {
+        one["package-ecosystem"]: ROOT / one["directory"][1:] for one in yaml.safe_load(bot.read_text())["updates"]
+    }
+    assert list(asked["pip"].glob("requirements*.txt"))
+    assert (asked["npm"] / "package-lock.json").is_file()
+    assert asked["github-actions"] == ROOT
+
+
 @pytest.mark.slow
 def test_an_auditor_of_workflows_finds_nothing(tmp_path: Path) -> None:
     programs = installed(Path(sys.executable), "zizmor", tmp_path / "environment", "requirements-release.txt")
-    done = run([programs / "zizmor", "--offline", "--pedantic", FOLDER], tmp_path)
+    done = run([programs / "zizmor", "--offline", "--pedantic", FOLDER.parent], tmp_path)
     assert done.returncode == 0, done.stdout
     unpinned = re.sub(r"@[0-9a-f]{40}", "@main", WORKFLOWS["release.yml"])
     (tmp_path / "bad.yml").write_text(unpinned, "utf-8")

@@ -20,7 +20,7 @@ JobFailure = Literal["refused", "program-fault", "lost"]
 MACHINE = "machine"
 """Used instead of a model's number for the model that the robot's machine file describes."""
 TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
-TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200)]
+TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200, fail_fast=True)]
 ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
 Pattern = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.*+?\[\]-]{1,100}$")]
 """Name of a parameter, or a pattern such as `*.mass` and `joint2.*`."""
@@ -148,7 +148,7 @@ class BatchRequest(Wire):
 
     kind: Literal["batch"] = "batch"
     study: Study
-    traces: Annotated[tuple[TraceNumber, ...], Field(max_length=2000)] = ()
+    traces: Annotated[tuple[TraceNumber, ...], Field(max_length=2000, fail_fast=True)] = ()
     """The traces; a job whose request had a filter instead has those that were found when it was submitted."""
     filter: TraceFilter | None = None
     """Finds the traces in the catalogue, 2000 at most."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,6 +20,12 @@ def model() -> Model:
     return base_model(load_machine("ma2000"))
 
 
+def _with(**changes: Any) -> str:
+    """A model's file with other fields."""
+    data = json.loads(base_model(load_machine("ma2000")).model_dump_json())
+    return json.dumps(data | changes)
+
+
 def test_a_model_file_gives_the_same_model_back(model: Model, tmp_path: Path) -> None:
     changed = (
         model.with_effect("backlash", (2,), {"gap": 0.01})
@@ -30,6 +37,7 @@ def test_a_model_file_gives_the_same_model_back(model: Model, tmp_path: Path) ->
     again = load_model(tmp_path / "m.json")
     assert again == changed
     assert again.identity == changed.identity != model.identity
+    assert changed.with_lineage(Lineage()).identity not in (changed.identity, model.identity)
     assert (again.vector == changed.vector).all()
 
 
@@ -48,6 +56,13 @@ def test_a_newer_model_file_is_refused_in_one_line(model: Model, tmp_path: Path)
         ("[]", "neither a model nor"),
         ('{"machine": {}}', "says no version"),
         ('{"machine": {}, "format": 1}', "machine.version"),
+        (_with(values={"link1.mass": -1e9}), "link1.mass = -1000000000.0 kg: allowed are 0.0 to inf"),
+        (_with(effects=[{"name": "backlash", "joints": [1, 2]}, {"name": "backlash", "joints": [2]}]), "twice for the"),
+        (_with(effects=[{"name": "backlash", "joints": [1, 1]}]), "backlash: in the model twice for the same joint"),
+        (_with(ties={"load.mass": ["link1.mass", "link2.mass"]}), "tie 'load.mass': the model has a parameter of this"),
+        (_with(ties={"x": ["link1.mass"]}), "ties.x: has 1 entries, must have at least 2"),
+        (_with(ties={"x": ["link1.mass", "link1.mass"]}), "names a parameter twice"),
+        (_with(ties={"x": ["link1.mass", "link9.mass"]}), "are not parameters of the model"),
     ],
 )
 def test_what_is_not_a_model_is_refused(text: str, says: str, tmp_path: Path) -> None:

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
+from fastapi import Response
 
 from server.access.session_cookie import session_cookie, session_of, sign_in_cookie
+from server.access.sign_in import GOOD_FOR, SignIns
+from server.api.login import _set_cookie
+from tests.server.clocks import HandClock
+from tests.server.dashboard.browser import WITHOUT_3D, chromium, playwright
+from tests.server.notifications.receivers import Authority
 
 
 @pytest.mark.parametrize(
@@ -19,7 +31,7 @@ from server.access.session_cookie import session_cookie, session_of, sign_in_coo
 )
 def test_a_cookie_has_the_port_at_which_people_reach_the_service(address: str | None, name: str) -> None:
     assert session_cookie(address) == name
-    assert sign_in_cookie(address) == name.removeprefix("__Host-").replace("session", "sign-in")
+    assert sign_in_cookie(address) == name.replace("session", "sign-in")
 
 
 def test_a_service_takes_no_other_service_s_session() -> None:
@@ -27,3 +39,58 @@ def test_a_service_takes_no_other_service_s_session() -> None:
     assert session_of(headers, "daq-session-8301") == "two"
     assert session_of(headers, "__Host-daq-session-8301") == ""
     assert session_of({}, "daq-session-8301") == ""
+
+
+def test_nobody_on_their_way_is_lost_however_many_begin() -> None:
+    clock = HandClock()
+    sign_ins = SignIns(clock)
+    asked, cookie = sign_ins.begin("arm-2")
+    others = [sign_ins.begin("") for _ in range(10_001)]
+    assert sign_ins.back(asked.state, others[0][1]) is None  # another browser
+    assert sign_ins.back(asked.state, cookie.replace("arm-2", "arm-3")) is None
+    assert sign_ins.back("é\ud800", "..") is None
+    found = sign_ins.back(asked.state, cookie)
+    assert found is not None
+    assert (found.asked, found.robot) == (asked, "arm-2")
+    sign_ins.done(found)
+    assert sign_ins.back(asked.state, cookie) is None  # each answer once
+    assert sign_ins.back(others[0][0].state, others[0][1]) is not None
+    clock.turn(GOOD_FOR)
+    assert sign_ins.back(others[1][0].state, others[1][1]) is None
+    assert len({asked.state, asked.nonce, asked.verifier}) == 3
+
+
+@pytest.mark.browser
+def test_a_browser_takes_both_cookies_over_tls_and_a_page_of_another_path_or_host_sets_neither(tmp_path: Path) -> None:
+    """Chromium is the witness of what `__Host-` demands."""
+    set_cookies: list[str] = []
+
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            for one in set_cookies:
+                self.send_header("Set-Cookie", one)
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            """Quiet."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Page)
+    server.socket = Authority(tmp_path, "localhost").server().wrap_socket(server.socket, server_side=True)
+    address = f"https://localhost:{server.server_port}"
+    oidc = SimpleNamespace(address=address)
+    services: Any = SimpleNamespace(settings=SimpleNamespace(server=SimpleNamespace(oidc=oidc)))
+    names = (session_cookie(address), sign_in_cookie(address))
+    with server, playwright() as driver, chromium(driver, *WITHOUT_3D) as browser:
+        Thread(target=server.serve_forever, daemon=True).start()
+        for spoilt in ("", "; Domain=localhost", "; Path=/api"):
+            answer = Response()
+            for name in names:
+                _set_cookie(answer, services, name, "secret", GOOD_FOR, "lax")
+            set_cookies[:] = [one + spoilt for one in answer.headers.getlist("set-cookie")]
+            context = browser.new_context(ignore_https_errors=True)
+            context.new_page().goto(f"{address}/")
+            kept = {one["name"] for one in context.cookies()}
+            assert kept == (set() if spoilt else set(names)), (spoilt, kept)
+            context.close()
+        server.shutdown()

@@ -22,7 +22,7 @@ from server.access.caller import Caller
 from server.access.gate import NOT_ALLOWED, TRY_LATER, Gate
 from server.access.limits import Bucket, Buckets
 from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, is_this_computers_user
-from server.access.tickets import GOOD_FOR, Tickets
+from server.access.tickets import GOOD_FOR, MOST, Tickets
 from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, TokenStore, digest_of
 from server.database_errors import DamagedError
 from server.store.tables import TokenRow
@@ -132,6 +132,10 @@ def test_a_ticket_is_good_once_and_for_a_moment() -> None:
     clock.turn(GOOD_FOR)
     assert tickets.take(late) is None
     assert tickets.take("never given") is None
+    kept = tickets.give(anna).ticket
+    for _ in range(2 * MOST):
+        tickets.give(Caller("greedy", "viewer"))
+    assert tickets.take(kept) == anna
 
 
 def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: Path) -> None:

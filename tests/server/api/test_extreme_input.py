@@ -6,7 +6,10 @@ import base64
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
+from daq.contracts.service.experiments import ExperimentRequest
+from server.access.limits import MOST_FIELDS
 from tests.server.service import Service
 
 NO_MOMENTS = ["9999-12-31T23:59:59-12:00", "0001-01-01T00:00:00+12:00"]
@@ -74,3 +77,29 @@ def test_a_field_is_named_as_its_client_writes_it(service: Service, path: str, b
     answer = service.robot.post(path, content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 422
     assert sorted({one["field"] for one in answer.json()["fields"]}) == fields
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "field"),
+    [
+        ({"kind": "path", "times": [0.0], "positions": ["x"] * 100_000}, "spec.trajectory.path.positions.0"),
+        ({"kind": "via", "times": [1.0], "points": ["x"] * 100_000}, "spec.trajectory.via.points.0"),
+        (
+            {"kind": "sequence", "segments": [{"move": {"kind": "via", "points": ["x"] * 900}}] * 9},
+            "segments.0.move.via",
+        ),
+    ],
+)
+def test_of_a_long_list_the_first_error_is_told_and_no_other_collected(trajectory: dict[str, Any], field: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        ExperimentRequest.model_validate({"spec": {"trajectory": trajectory}})
+    assert refused.value.error_count() < 10
+    assert any(field in ".".join(map(str, error["loc"])) for error in refused.value.errors())
+
+
+def test_a_body_of_too_many_fields_is_refused_before_it_is_read(service: Service) -> None:
+    body = {str(number): 0 for number in range(MOST_FIELDS + 1)}
+    answer = service.robot.post("/experiments", json=body)
+    assert answer.status_code == 413, answer.text
+    assert f"a body may have {MOST_FIELDS} fields" in answer.json()["detail"]
+    assert service.robot.put("/programs/x", json=body).status_code == 422  # a program has more

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+import json
 from pathlib import Path
 
 import httpx
 import pytest
 from fastapi import FastAPI
 
+import hatch_build
 from server.page import FOLDER, NOT_BUILT, is_built, page_router
 
 LATER_ON_LIVE = ("Arm3d", "scene")
@@ -27,7 +29,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / SCRIPT).write_text("let live;")
     (tmp_path / f"{SCRIPT}.gz").write_bytes(gzip.compress(b"let live;"))
     (tmp_path / f"{SCRIPT}.br").write_bytes(BROTLI)
-    (tmp_path / "built-from.txt").write_text("digest")
+    (tmp_path / "built-from").write_text("digest")
     return tmp_path
 
 
@@ -64,7 +66,7 @@ def test_a_browser_gets_the_smallest_form_that_it_takes(folder: Path) -> None:
     assert packed.text == plain.text == "let live;"
 
 
-@pytest.mark.parametrize("name", ["built-from.txt", f"{SCRIPT}.gz", f"{SCRIPT}.br", "nothing.js", "assets"])
+@pytest.mark.parametrize("name", ["built-from", f"{SCRIPT}.gz", f"{SCRIPT}.br", "nothing.js", "assets"])
 def test_nothing_else_is_served(folder: Path, name: str) -> None:
     assert get(folder, f"/{name}").status_code == 404
 
@@ -90,3 +92,27 @@ def test_the_first_load_is_small() -> None:
     font = next(FOLDER.glob("assets/inter-latin-wght-normal-*.woff2")).stat().st_size
     assert len(first) >= 4
     assert sent + font < 300_000
+
+
+def test_the_page_has_the_licence_of_every_package_of_which_it_has_a_part() -> None:
+    if not is_built():
+        pytest.skip("needs the page: make page")
+    notice = (FOLDER / hatch_build.LICENCES).read_text("utf-8")
+    wanted = json.loads((hatch_build.DASHBOARD / "package.json").read_text("utf-8"))["dependencies"]
+    parts = {part.partition(" ")[0]: part for part in notice.split("\n\n==== ")[1:]}
+    assert parts.keys() >= {*wanted, "svelte", "swagger-ui-dist"}
+    assert "SIL OPEN FONT LICENSE Version 1.1" in parts["@fontsource-variable/inter"]
+    assert "Jed Watson" in parts["swagger-ui-dist"]  # of what that package has in itself
+    assert all("Copyright" in part for part in parts.values())
+    assert get(FOLDER, f"/{hatch_build.LICENCES}").text == notice
+
+
+def test_a_package_without_the_text_of_its_licence_ends_the_build(tmp_path: Path) -> None:
+    own = tmp_path / "@scope" / "own"
+    (own / "dist").mkdir(parents=True)
+    (own / "package.json").write_text('{"name": "@scope/own", "version": "1.0.0", "license": "MIT"}')
+    with pytest.raises(hatch_build.BuildError, match=r"^@scope/own: its package has no text of its licence"):
+        hatch_build.licences_of(["@scope/own/dist/own.js"], tmp_path)
+    (own / "LICENCE.md").write_text("Anybody may.")
+    made = hatch_build.licences_of(["@scope/own/dist/own.js", "@scope/own/dist/own.css"], tmp_path)
+    assert made.endswith("\n\n==== @scope/own 1.0.0 (MIT)\n\nAnybody may.")

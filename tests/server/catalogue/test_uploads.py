@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import resource
 import signal
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
+import httpx
 import pytest
 
 from benchmarks.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
-from server.bounded.messages import Limits, ReadUpload
-from server.bounded.process import answer_order
+from daq.contracts.machine import load_machine
+from model.machine_model.model import Model, base_model
+from server.bounded.messages import Limits, ReadModel, ReadUpload
+from server.bounded.process import LONGEST_LINE, answer_order
 from server.bounded.workers import ExhaustedError, Workers
 from server.problems import ProblemError
 from tests.daq.traces.test_formats import FORMAT_1
@@ -120,3 +126,87 @@ def test_an_error_that_nobody_has_foreseen_is_a_line_and_a_traceback_for_the_log
     assert answer.problem.startswith("cannot be read: ValidationError")
     assert "Traceback" in answer.fault
     assert answer.spent
+
+
+# ---- models
+
+
+def _model() -> dict[str, Any]:
+    made: dict[str, Any] = json.loads(base_model(load_machine("ma2000")).model_dump_json())
+    return made
+
+
+def _send(service: Service, model: dict[str, Any], name: str) -> httpx.Response:
+    return service.robot.post("/models", json=model, params={"name": name})
+
+
+def test_no_upload_changes_the_model_of_somebody_else(service: Service) -> None:
+    """The same numbers with another lineage are another model; who sent which is in the audit log."""
+    plain = _model()
+    first = _send(service, plain, "theirs")
+    kept = service.robot.get(f"/models/{first.json()['id']}/model.json").content
+    other = _send(service, plain | {"lineage": {"note": "fitted by me", "parent": "0123456789ab"}}, "mine")
+    again = _send(service, plain, "mine as well")
+    assert (first.status_code, other.status_code, again.status_code) == (201, 201, 200), other.text
+    assert again.json() == first.json()
+    assert other.json()["id"] != first.json()["id"]
+    assert service.robot.get(f"/models/{first.json()['id']}/model.json").content == kept
+    details = service.robot.get(f"/models/{first.json()['id']}").json()
+    assert {one["name"] for one in details["parameters"]} == set(Model.model_validate(plain).by_name)
+    rows = service.client.get(f"{service.url}/api/v1/audit", params={"action": "upload_model"}).json()["items"]
+    assert [row["subject"] for row in rows[:3]] == [one.json()["id"] for one in (again, other, first)]
+    assert json.loads(rows[0]["content"]) == {
+        "sha256": hashlib.sha256(first.request.content).hexdigest(),
+        "size": len(first.request.content),
+    }
+    for one in (first, other):
+        assert service.robot.delete(f"/models/{one.json()['id']}").status_code == 204
+
+
+def test_a_model_names_only_traces_that_its_sender_can_see(service: Service) -> None:
+    trace = service.robot.post("/traces", content=SOUND, headers=MCAP).json()["id"]
+    refused = _send(service, _model() | {"lineage": {"traces": [trace, "no-such-trace"]}}, "x")
+    assert (refused.status_code, refused.json()["type"]) == (422, "docs/service.md#not-a-model")
+    assert refused.json()["detail"] == "lineage.traces: 'no-such-trace' is no trace of this service"
+    taken = _send(service, _model() | {"lineage": {"traces": [trace]}}, "x")
+    assert taken.json()["traces"] == [trace]
+    assert service.robot.delete(f"/traces/{trace}").status_code == 409
+    assert service.robot.delete(f"/models/{taken.json()['id']}").status_code == 204
+    assert service.robot.delete(f"/traces/{trace}").status_code == 204
+
+
+HARM: dict[str, bytes] = {
+    "nothing": b"",
+    "no-model": b"{}",
+    "a-list": b"[1]",
+    "no-text": b"\xff",
+    "brackets": b"[" * 100_000,
+    "nested": b'{"effects":' * 900 + b"1" + b"}" * 900,
+    "digits": b"9" * 6000,
+    "effects": json.dumps(_model() | {"effects": [{"name": "backlash", "joints": [1]}] * 20_000}).encode(),
+    "joints": json.dumps(_model() | {"effects": [{"name": "backlash", "joints": [1] * 100_000}]}).encode(),
+    "ties": json.dumps(
+        _model() | {"ties": {f"t{k}": [f"t{k - 1}" if k else "link1.mass"] for k in range(9999)}}
+    ).encode(),
+    "mass": json.dumps(_model() | {"values": {"link1.mass": -1e9}}).encode(),
+    "note": json.dumps(_model() | {"lineage": {"note": "x" * (1 << 20)}}).encode(),
+    "surrogate": json.dumps(_model() | {"lineage": {"note": "\ud800"}}).encode(),
+    "program": json.dumps(
+        _model() | {"effects": [{"name": "own", "joints": [1], "file": {"name": "own.py"}}]}
+    ).encode(),
+}
+
+
+@pytest.mark.parametrize("content", HARM.values(), ids=HARM)
+def test_a_model_made_to_do_harm_is_refused_in_one_line(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    path.write_bytes(content)
+    answer = answer_order(ReadModel(path=path).model_dump_json(), LIMITS)
+    assert 0 < len(answer.problem) <= LONGEST_LINE + 2, answer
+    assert (answer.fault, answer.exhausted, "\n" in answer.problem) == ("", False, False)
+
+
+def test_a_refused_model_is_told_so(service: Service) -> None:
+    refused = _send(service, json.loads(HARM["mass"]), "x")
+    assert (refused.status_code, refused.json()["type"]) == (422, "docs/service.md#not-a-model")
+    assert refused.json()["detail"] == "upload: link1.mass = -1000000000.0 kg: allowed are 0.0 to inf"

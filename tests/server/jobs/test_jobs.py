@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import pytest
@@ -121,26 +120,3 @@ def test_a_job_is_cancelled_before_and_while_it_runs(service: Service, trace: st
     ended = _ended(service, running["id"])
     assert (ended["state"], ended["reason"]) == ("cancelled", "cancelled while it ran")
     assert service.robot.post(f"/jobs/{running['id']}/cancel").status_code == 409
-
-
-def test_a_model_from_elsewhere_is_taken_in_once_and_one_with_a_program_is_refused(service: Service) -> None:
-    from daq.contracts.machine import load_machine
-    from model.machine_model.model import base_model
-
-    model = base_model(load_machine("ma2000"))
-    mass = next(one for one in model.parameters if one.name.endswith("mass"))
-    model = model.with_values({mass.name: 1.01 * mass.value})  # one that no job has begun from
-    for _ in range(2):
-        answer = service.robot.post("/models", content=model.model_dump_json(), params={"name": "nominal"})
-        assert answer.status_code == 201, answer.text
-        assert answer.json()["id"] == model.identity
-    details = service.robot.get(f"/models/{model.identity}").json()
-    assert {one["name"] for one in details["parameters"]} == set(model.by_name)
-    with_program = json.loads(model.model_dump_json())
-    with_program["effects"] = [{"name": "own", "joints": [1], "file": {"name": "own.py", "text": "import os"}}]
-    answer = service.robot.post("/models", content=json.dumps(with_program), params={"name": "own"})
-    assert (answer.status_code, answer.json()["type"]) == (422, "docs/service.md#not-a-model")
-    for text in (b"", b"{}", b"[1]", b'"a"', b"\xff"):
-        assert service.robot.post("/models", content=text, params={"name": "x"}).status_code == 422
-    assert service.robot.delete(f"/models/{model.identity}").status_code == 204
-    assert service.robot.get(f"/models/{model.identity}").status_code == 404

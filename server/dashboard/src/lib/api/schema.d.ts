@@ -1281,7 +1281,10 @@ export interface paths {
         put?: never;
         /**
          * Upload Model
-         * @description Imports a model file as written by `daq fit`. Models with user-defined effects are refused.
+         * @description Imports a model file as written by `daq fit`.
+         *
+         *     The same file again is the same entry (200). Refused are models with user-defined effects, and models that name
+         *     traces which the service does not have.
          */
         post: operations["upload_model"];
         delete?: never;
@@ -8765,6 +8768,15 @@ export interface operations {
             };
         };
         responses: {
+            /** @description OK */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ModelEntry"];
+                };
+            };
             /** @description Successful Response */
             201: {
                 headers: {
