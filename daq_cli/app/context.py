@@ -38,11 +38,13 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
-def print_table(table: Table, width: int | None = None) -> None:
-    """Prints a table of results on standard output; brackets in its text are no markup."""
+def print_table(table: Table) -> None:
+    """Prints a table of results on standard output, as wide as the terminal; brackets in its text are no markup."""
     from rich.console import Console
 
-    Console(highlight=False, markup=False, width=width).print(table)
+    from daq_cli.app.narrow_table import print_fitting
+
+    print_fitting(table, Console(highlight=False, markup=False))
 
 
 @dataclass

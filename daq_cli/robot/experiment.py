@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -112,9 +114,11 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
         print("  no limit is violated; nothing was sent")
 
 
-def print_result(finished: Finished) -> None:
-    """Prints the result of a run for people."""
+def print_result(finished: Finished, pictures: Sequence[Path] = ()) -> None:
+    """Prints the result of a run for people: how it ended, what was seen, its pictures, and what comes next."""
     from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line  # loads numpy: not for the tab key
+    from daq.traces.reader import read_trace
+    from daq_cli.robot.seen import print_figures
 
     counters = finished.counters
     why = f" — {finished.reason}" if finished.reason else ""
@@ -127,3 +131,11 @@ def print_result(finished: Finished) -> None:
         print(late_set_points_line(late))
     print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in shown))
     print(f"trace: {finished.trace}")
+    print_figures(read_trace(finished.trace))
+    trace = shlex.quote(str(finished.trace))
+    for picture in pictures:
+        print(f"picture: {picture}")
+    if not pictures:
+        print(f"picture: daq traces plot {trace}")
+    print(f"next:    daq fit {trace} -o model.json    # the numbers of a model, from this record")
+    print("         daq serve                       # the same in the browser: queue, charts, the arm, models")

@@ -30,12 +30,15 @@ class RunDisplay:
         self._bar.update(self._task, completed=fraction, text=escape(text))
 
     def event(self, kind: str, time: float, message: str) -> None:
-        """Shows an event of the trace; `time` is in s from the start of the record."""
+        """Shows an event of the trace; `time` is in s from the start of the record. What the result of every run says at
+        its end is left to that."""
         from rich.markup import escape
 
         from daq.contracts.limp import GAINS_UNKNOWN
-        from daq.contracts.trace import SLOW_LINE
+        from daq.contracts.trace import LATE_WORDS, SLOW_LINE
 
+        if LATE_WORDS in message:
+            return
         if kind not in self._quiet or message.startswith((SLOW_LINE, GAINS_UNKNOWN)):
             line = escape(f"{kind.replace('_', ' ')}: {message}")
             self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True, markup=True)
