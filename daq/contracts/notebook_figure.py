@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.backend_bases import RendererBase
 
 AS_WRITTEN = {"text.parse_math": False}
-"""Settings of matplotlib in which a text is never a formula: `$` in a robot's name is a dollar. They hold for texts that
-are made while they are set."""
+"""Settings of matplotlib in which a text is never a formula: `$` in a robot's name is a dollar. They hold for texts
+that are made while they are set."""
 
 
 class NotebookFigure(Figure):

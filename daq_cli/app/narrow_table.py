@@ -28,7 +28,7 @@ def print_fitting(table: Table, console: Console) -> None:
     texts = [column.justify == "left" for column in table.columns]
     widths = _shrunk(natural, [_least(column) for column in columns], texts, console.width - BESIDE * len(columns))
     if widths is None:
-        _print_rows(table, columns, console)
+        _print_rows(columns, console)
         return
     for column, width, wanted in zip(table.columns, widths, natural, strict=True):
         if width < wanted:
@@ -79,7 +79,7 @@ def _text(cell: object) -> str:
     return cell.plain if isinstance(cell, Text) else str(cell)
 
 
-def _print_rows(table: Table, columns: list[list[str]], console: Console) -> None:
+def _print_rows(columns: list[list[str]], console: Console) -> None:
     heads = [column[0] for column in columns]
     for row in zip(*(column[1:] for column in columns), strict=True):
         console.print(row[0], soft_wrap=True)

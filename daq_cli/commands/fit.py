@@ -253,7 +253,7 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     print_parameters(found.parameters)
     known = sum(p.verdict == "known" for p in found.parameters)
     print(f"\nknown: {known} of {len(found.parameters)}", end="")
-    print("; the model keeps one number of those that fit as well for the others" if known < len(found.parameters) else "")
+    print("; of the others, in brackets, the model has one value of many" if known < len(found.parameters) else "")
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")
     if base is not None:

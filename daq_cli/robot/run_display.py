@@ -30,8 +30,8 @@ class RunDisplay:
         self._bar.update(self._task, completed=fraction, text=escape(text))
 
     def event(self, kind: str, time: float, message: str) -> None:
-        """Shows an event of the trace; `time` is in s from the start of the record. What the result of every run says at
-        its end is left to that."""
+        """Shows an event of the trace; `time` is in s from the start of the record. What every run's result says at its
+        end is left to that."""
         from rich.markup import escape
 
         from daq.contracts.limp import GAINS_UNKNOWN

@@ -6,6 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import math
+
 import numpy as np
 
 from daq.contracts.errors import SpecError
@@ -149,7 +151,7 @@ def _agreement(
                 largest=float(np.abs(left[:, column]).max()),
                 floor=float(floor[column]),
                 count=resolution(sensor) if sensor is not None and signal == "position" else None,
-                share=square / motion if motion > 9 * floor[column] ** 2 else None,
+                share=math.sqrt(square / motion) if motion > 9 * floor[column] ** 2 else None,
             )
         )
     return TraceAgreement(trace=record.name, held_out=held_out, samples=record.samples, joints=tuple(joints))

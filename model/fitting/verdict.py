@@ -16,8 +16,8 @@ SCATTER = 4.0
 
 
 class JointLeft(FrozenRecord):
-    """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left of
-    records that the model itself had made; both in `unit`."""
+    """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
+    of records that the model itself had made; both in `unit`."""
 
     joint: int
     unit: str

@@ -9,7 +9,7 @@ from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
-from model.reports.page import Cell, Report, Section, Table, Text, effect_list, listed, trace_names
+from model.reports.page import Cell, Report, Section, Table, effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 

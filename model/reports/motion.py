@@ -138,10 +138,10 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
         for kind, joints in ((in_sample(model), model.in_sample), (ROLES[True], model.held_out)):
             rows += [_row(model.label, kind, one) for one in joints or ()]
     return Table(
-        ("model", "traces", "joint", "rms", "in counts", "largest", "noise floor", "floor in counts", "left of motion"),
+        ("model", "traces", "joint", "rms", "in counts", "largest", "noise floor", "floor in counts", "of the motion"),
         tuple(rows),
         "Measured − simulated over all samples of these traces. The noise floor is what rounding and noise of the "
-        "sensor alone would leave. Left of motion: mean square of the residual over that of the motion about its mean.",
+        "sensor alone would leave. Of the motion: rms of the residual over that of the motion about its mean.",
     )
 
 
