@@ -76,6 +76,11 @@ def _style() -> AbstractContextManager[None]:
     return mpl.rc_context({**mpl.rc_params_from_file(_STYLE, use_default_template=False), **_INKS, **AS_WRITTEN})
 
 
+def as_label(text: str) -> str:
+    """A text for a legend as it is: matplotlib leaves out what begins with an underline."""
+    return f"\N{NO-BREAK SPACE}{text}" if text.startswith("_") else text
+
+
 def _plain_powers(figure: Figure) -> None:
     """Labels logarithmic axes with plain numbers: matplotlib writes powers as formulas, which no text here is."""
     from matplotlib.ticker import FuncFormatter, NullFormatter

@@ -15,6 +15,7 @@ from model.reports.figures import (
     INK,
     MODEL_COLOURS,
     QUIET,
+    as_label,
     band,
     baseline,
     drawn,
@@ -119,7 +120,7 @@ def _joint(
         shade = colour if len(labels) == 1 else MODEL_COLOURS[place % len(MODEL_COLOURS)]
         time, own = thinned(one.time, simulated[:, column] * factor)
         style = "-" if len(labels) == 1 else ("-", "--", "-.", ":")[place % 4]
-        above.plot(time, own, color=shade, lw=1.4, ls=style, label=label)
+        above.plot(time, own, color=shade, lw=1.4, ls=style, label=as_label(label))
         band(below, one.time, (one.measured - simulated)[:, column] * factor, shade)
     time, measured = thinned(one.time, one.measured[:, column] * factor)
     above.plot(time, measured, color=INK, lw=0.6, label=one.words[0])  # thin and on top: neither hides the other
