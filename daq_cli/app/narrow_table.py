@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 BESIDE = 2
 """Columns between two cells: rich's padding of one on either side."""
 INDENT = "  "
-_JOINTS = re.compile(r"(?<=[./_])(?=[^\W\d])")
+_JOINTS = re.compile(r"(?<=[./_-])(?=[^\W\d])")
 """Where a name may go on in the next line: after a dot, a slash or an underline."""
 
 

@@ -58,7 +58,7 @@ def validation() -> None:
         change_up=0.0001,
         required=None,
         expected=0.0123,
-        basis="range",
+        basis="stated",
         contribution=0.0,
     )
     fidelity = Fidelity(
