@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.fitting.result import FittedParameter
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import SINGLE_AXIS
 

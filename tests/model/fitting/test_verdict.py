@@ -21,8 +21,8 @@ def test_joints_with_more_than_noise_are_named_the_worst_first() -> None:
     assert not found.explains
     assert [one.joint for one in found.left] == [2, 3]
     assert found.text == (
-        "The model does not explain the records: joint 2 is left with 2.1 times its noise (0.12°); joint 3 is left with "
-        "1.5 times its noise (0.0859°). `daq diagnose` names what is missing."
+        "The model does not explain the records: joint 2 is left with 2.1 times its noise (0.12°); "
+        "joint 3 is left with 1.5 times its noise (0.0859°). `daq diagnose` names what is missing."
     )
     assert found.headline == "does not explain the records (joints 2, 3)"
 
@@ -46,7 +46,7 @@ def test_a_number_far_from_its_file_is_shown_beside_it_although_the_model_explai
 
 def test_a_hidden_friction_is_not_explained_by_numbers_that_its_fit_has_moved() -> None:
     """Whatever the fit does with its numbers, its verdict is not that all is well."""
-    rubbing = arm().with_effect("stribeck_friction", (2,), {"excess": 20.0})
+    rubbing = arm().with_effect("stribeck_friction", (2,), {"torque": 20.0})
     found = fit(arm(), [trace(rubbing, 0), trace(rubbing, 1)], FitOptions(rounds=1)).verdict
     assert found is not None
     assert found.text != "The model explains the records within their noise."
