@@ -67,7 +67,7 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
     if options.json:
         print_json(finished.model_dump(mode="json"))
     else:
-        print_result(finished)
+        print_result(finished, server=robot.call.server)
     if finished.outcome != "complete":
         raise typer.Exit(exit_codes.OF_OUTCOME[finished.outcome])
 
@@ -114,8 +114,12 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
         print("  no limit is violated; nothing was sent")
 
 
-def print_result(finished: Finished, pictures: Sequence[Path] = ()) -> None:
-    """Prints the result of a run for people: how it ended, what was seen, its pictures, and what comes next."""
+def print_result(finished: Finished, pictures: Sequence[Path] = (), server: str | None = None) -> None:
+    """Prints the result of a run for people: how it ended, what was seen, its pictures, and what comes next.
+
+    Args:
+        server: URL of the service that made the run; None for a robot at this computer.
+    """
     from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line  # loads numpy: not for the tab key
     from daq.traces.reader import read_trace
     from daq_cli.robot.seen import print_figures
@@ -137,5 +141,5 @@ def print_result(finished: Finished, pictures: Sequence[Path] = ()) -> None:
         print(f"picture: {picture}")
     if not pictures:
         print(f"picture: daq traces plot {trace}")
-    print(f"next:    daq fit {trace} -o model.json    # the numbers of a model, from this record")
-    print("         daq serve                       # the same in the browser: queue, charts, the arm, models")
+    print(f"next:    daq fit {trace} -o model.json")
+    print("         daq serve    # the same in a browser" if server is None else f"         {server}/#/traces")

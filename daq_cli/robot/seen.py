@@ -34,4 +34,4 @@ def print_figures(trace: Trace) -> None:
 
 
 def _angle(value: float | None, unit: str) -> str:
-    return "–" if value is None else f"{value:.2f}{'' if unit == '°' else ' '}{unit}"
+    return "–" if value is None else f"{round(value, 2) + 0.0:.2f}{'' if unit == '°' else ' '}{unit}"

@@ -55,7 +55,7 @@ class Fidelity(FrozenRecord):
     `verdict`: whether there is more left than noise; None in results of older versions.
     """
 
-    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "sum_of_contributions", "explains")
+    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "sum_of_contributions", "said")
     model: str
     traces: tuple[str, ...]
     outputs: tuple[int, ...]
