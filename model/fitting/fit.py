@@ -28,10 +28,10 @@ from model.fitting.result import FitResult, FittedParameter, JointError
 from model.fitting.robust import influence
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
-from model.fitting.verdict import JointLeft, RecordVerdict
 from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""

@@ -16,8 +16,8 @@ from firmware_protocol.invalid import first_invalid
 from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
 from model.fitting.shown import doubt_of, html_of, known_of, text_of
-from model.fitting.verdict import RecordVerdict
 from model.machine_model.model import Model
+from model.machine_model.record_verdict import RecordVerdict
 
 RESULT_FORMAT = 1
 """Version of the file; a reader refuses newer ones."""

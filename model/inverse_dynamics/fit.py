@@ -25,7 +25,6 @@ from model.fitting.result import FittedParameter
 from model.fitting.robust import influence
 from model.fitting.shown import html_of, known_of, text_of
 from model.fitting.unknowns import prior_precision, scales
-from model.fitting.verdict import JointLeft, RecordVerdict
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.problem import TorqueProblem
@@ -35,6 +34,7 @@ from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.units import joint_unit
 
 CUTOFF = 12.0

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
-from model.fitting.verdict import RecordVerdict
+from model.machine_model.record_verdict import RecordVerdict
 from model.validation.expected_deviation import Basis, Convention
 
 DAMPING_RATIO = 0.5

@@ -12,9 +12,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.fitting.verdict import JointLeft, RecordVerdict
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.simulation.prepared import Options
 from model.units import joint_unit
 from model.validation.criterion import (

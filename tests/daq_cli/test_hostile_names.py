@@ -115,11 +115,12 @@ def test_in_an_e_mail(name: str) -> None:
     from server.notifications.service import message_of
 
     now = datetime(2026, 3, 1, 8, tzinfo=UTC)
-    told = Notification(kind="fault", topic="arm.fault", at=now, text=name, robot="arm")
+    told = Notification(kind="fault", topic="arm.fault", at=now, text=name, robot=name)
     mail = Mail(EmailSettings(to="anna@lab.example"), SmtpSettings(host="localhost", port=25, sender="daq@lab.example"))
     written = mail._written(message_of(told, now))
     read = message_from_bytes(written.as_bytes(policy=policy.SMTP), policy=policy.default)
     assert read["Bcc"] is None
+    assert str(read["Subject"]).endswith(": FAULT (arm.fault)")
     assert read.get_content().splitlines()[: name.count("\n") + 1] == name.splitlines()
     assert read.get_content_type() == "text/plain"
 

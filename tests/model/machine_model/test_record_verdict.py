@@ -6,7 +6,7 @@ import pytest
 
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions
-from model.fitting.verdict import JointLeft, RecordVerdict, far_numbers
+from model.machine_model.record_verdict import JointLeft, RecordVerdict, far_numbers
 from tests.model.fitting.imagined import arm, trace
 
 MANY = 10**6
