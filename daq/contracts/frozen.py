@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -24,7 +24,13 @@ class FrozenRecord(BaseModel):
         return iter(super().__repr_args__())
 
 
-class _OneLine(type(FrozenRecord)):  # type: ignore[misc]
+if TYPE_CHECKING:  # pydantic gives its metaclass no public name
+    from pydantic._internal._model_construction import ModelMetaclass as _OfPydantic
+else:
+    _OfPydantic = type(FrozenRecord)
+
+
+class _OneLine(_OfPydantic):
     """Turns what pydantic refuses of a direct call into one line. Data that are read or sent are checked as before, by
     whoever reads them."""
 
