@@ -34,7 +34,7 @@ class _OneLine(_OfPydantic):
     """Turns what pydantic refuses of a direct call into one line. Data that are read or sent are checked as before, by
     whoever reads them."""
 
-    def __call__(cls, *given: Any, **named: Any) -> Any:
+    def __call__(cls, *given: Any, **named: Any) -> Any:  # noqa: N805 - of a metaclass
         try:
             return super().__call__(*given, **named)
         except ValidationError as error:
