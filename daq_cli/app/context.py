@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -45,6 +47,12 @@ def print_table(table: Table) -> None:
     from daq_cli.app.narrow_table import print_fitting
 
     print_fitting(table, Console(highlight=False, markup=False))
+
+
+def print_prose(text: str) -> None:
+    """Prints a sentence of a result on standard output, broken at words to the terminal's width."""
+    width = shutil.get_terminal_size().columns
+    print("\n".join(wrap(text, width, break_long_words=False, break_on_hyphens=False)))
 
 
 @dataclass

@@ -10,7 +10,7 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app import completion
-from daq_cli.app.context import JsonOption, console, print_json
+from daq_cli.app.context import JsonOption, console, print_json, print_prose
 from daq_cli.app.output_file import replacing
 from daq_cli.models.effect_choice import bounds, patterns, with_effects
 from daq_cli.models.model_input import (
@@ -265,4 +265,6 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     if not found.converged:
         print(f"the search did not converge: {found.message}")
     print_on_the_edge(found.on_the_edge)
-    print("\n".join(["", *found.said]))
+    print()
+    for line in found.said:
+        print_prose(line)

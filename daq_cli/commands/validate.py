@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq_cli.app.context import JsonOption, console, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_prose, print_table
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
     MODEL_HELP,
@@ -129,8 +129,9 @@ def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], m
     for one in in_time:
         print(f"\n{one.trace}, variation with time (accelerations smoothed over {1e3 * one.smoothing:.0f} ms):")
         _print_in_time(one, machine)
-    print(f"\n{fidelity.said}")
-    print(f"Σλ² with τ′ = â/3 instead of the source's â/(3√2): {three.sum_of_contributions:.4f}")
+    print()
+    print_prose(fidelity.said)
+    print_prose(f"Σλ² with τ′ = â/3 instead of the source's â/(3√2): {three.sum_of_contributions:.4f}")
 
 
 def _print_in_time(one: TimeDomain, machine: Machine) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_cli.app.context import console, print_json, print_table
+from daq_cli.app.context import console, print_json, print_prose, print_table
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import files_of
 from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
@@ -52,7 +52,7 @@ def fit_recorded_torques(
         _print(found, files)
         print(headline(base))
         if found.verdict is not None:
-            print(found.verdict.text)
+            print_prose(found.verdict.text)
         console().print(f"model {found.model.identity}: {out}")
     if report is not None:
         from model.inverse_dynamics.fit import torque_curves

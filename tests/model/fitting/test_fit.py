@@ -49,7 +49,10 @@ def test_what_is_left_is_the_noise_of_the_sensor(result: FitResult) -> None:
         assert 0.8 < error.after / (error.noise or 0.0) < 1.15
     assert result.errors[1].before > 4 * result.errors[1].floor
     assert result.verdict is not None
-    assert result.verdict.text == "The model explains the records within their noise."
+    assert result.verdict.explains
+    assert [n.name for n in result.verdict.far] == ["joint2.motor.back_emf_constant"], (
+        "which the records were made with"
+    )
     assert result.verdict.text in str(result)
 
 

@@ -132,7 +132,7 @@ def test_each_stage_has_the_root_mean_square_of_its_own_point(
 
 def test_within_what_the_file_states_no_number_is_further_off_than_one_deviation() -> None:
     """The record is of a heavier arm: numbers that are free go far from the file, and these do not."""
-    heavy = imagined.arm().with_values({"link2.mass": 1.8 * imagined.arm().parameter("link2.mass").value})
+    heavy = imagined.arm().with_values({"link2.mass": 4.0 * imagined.arm().parameter("link2.mass").value})
     observation, given = observe(imagined.arm(), [imagined.trace(heavy, seconds=3.0)])
     free = converge(point_at(observation, given.at(np.array([u.start for u in given.unknowns]))), 4)
     bounded = within_file(free)
