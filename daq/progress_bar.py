@@ -100,12 +100,11 @@ def _notebook_place() -> Iterator[Callable[[str], None]]:
 def _bar(console: Console, *, disable: bool = False) -> Progress:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+    what, text = (TextColumn(field, markup=False) for field in ("{task.description}", "{task.fields[text]}"))
+    columns = (what, BarColumn(), text, TimeElapsedColumn())
     return Progress(*columns, console=console, transient=True, disable=disable)
 
 
 def _teller(bar: Progress, what: str) -> Told:
-    from rich.markup import escape
-
     task = bar.add_task(what, total=1.0, text="")
-    return lambda fraction, text: bar.update(task, completed=fraction, text=escape(text))
+    return lambda fraction, text: bar.update(task, completed=fraction, text=text)

@@ -1,7 +1,6 @@
 """A paddle in the air at the end of an arm: a torque against the motion, with the square of the speed."""
 
-from model.effects.own import OwnEffect, OwnParameter
-from model.effects.own_math import magnitude
+from ma2000.own_effects import OwnEffect, OwnParameter, magnitude
 
 
 def torque(speed, coefficient):

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError,
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import FrozenRecord, SpokenRecord
 from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
@@ -203,7 +203,7 @@ Trajectory = Annotated[
 ]
 
 
-class PlainExperiment(FrozenRecord):
+class PlainExperiment(SpokenRecord):
     """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
 
     trajectory: Trajectory = Ramp()
@@ -217,6 +217,11 @@ class PlainExperiment(FrozenRecord):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")] | None = None
     operator: Annotated[str, Field(max_length=100)] | None = None
     notes: Annotated[str, Field(max_length=10000)] = ""
+
+    @classmethod
+    def words_of(cls, error: ValidationError) -> str:
+        """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
+        return _one_line(error)
 
     @model_validator(mode="after")
     def _joints_agree(self) -> Self:
@@ -323,7 +328,8 @@ def _one_line(error: ValidationError) -> str:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
     bound = next((first.bounds[key] for key in ("le", "ge") if key in first.bounds), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and _fits_a_float(value):
-        message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
+        message = "must lie between -360° and 360°, that is ±6.283 rad"
+        value = f"{value:g} rad, {math.degrees(value):g}°"
     elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
         value = shown(value)
     given = "" if isinstance(first.value, dict | BaseModel) else f" (got {value})"

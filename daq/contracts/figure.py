@@ -65,6 +65,15 @@ class _Row:
 
 def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None) -> Figure:
     """The figure: one row per signal, one column per joint, marks at events."""
+    import matplotlib as mpl
+
+    from daq.contracts.notebook_figure import AS_WRITTEN
+
+    with mpl.rc_context(AS_WRITTEN):
+        return _figure(trace, joints)
+
+
+def _figure(trace: Recorded, joints: tuple[int, ...] | None) -> Figure:
     from daq.contracts.notebook_figure import NotebookFigure
 
     recorded = trace.joints

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 
 
 class FrozenRecord(BaseModel):
@@ -19,3 +22,31 @@ class FrozenRecord(BaseModel):
         if self.shown:
             return ((name, getattr(self, name)) for name in self.shown)
         return iter(super().__repr_args__())
+
+
+if TYPE_CHECKING:  # pydantic gives its metaclass no public name
+    from pydantic._internal._model_construction import ModelMetaclass as _OfPydantic
+else:
+    _OfPydantic = type(FrozenRecord)
+
+
+class _OneLine(_OfPydantic):
+    """Turns what pydantic refuses of a direct call into one line. Data that are read or sent are checked as before, by
+    whoever reads them."""
+
+    def __call__(cls, *given: Any, **named: Any) -> Any:  # noqa: N805 - of a metaclass
+        try:
+            return super().__call__(*given, **named)
+        except ValidationError as error:
+            words = cast("type[SpokenRecord]", cls).words_of(error)
+            raise SpecError(f"{cls.__name__}: {words}") from None
+
+
+class SpokenRecord(FrozenRecord, metaclass=_OneLine):
+    """A record that people make in their programs. Raises SpecError, in one line, for values that are refused."""
+
+    @classmethod
+    def words_of(cls, error: ValidationError) -> str:
+        """What is wrong, where, and what is allowed."""
+        first = first_invalid(error)
+        return f"{first.where('arguments')}: {first.message} (got {first.value!r:.80})"

@@ -60,10 +60,13 @@ LATE_SET_POINTS = "late_set_points"
 where that is not known."""
 
 
+LATE_WORDS = "set points taken a period late, or not at all"
+
+
 def late_set_points_line(count: float) -> str:
     """What set points that were sent late mean, for people; `count` of them."""
     return (
-        f"{count:.0f} set points taken a period late, or not at all: they were sent late, so the motion was "
+        f"{count:.0f} {LATE_WORDS}: they were sent late, so the motion was "
         "played with a jolt there; is the computer busy?"
     )
 

@@ -40,6 +40,9 @@ class TraceSummary(FrozenRecord):
     """Kind of trajectory, where the trace is of an experiment."""
     name: str | None = None
     joints: tuple[int, ...] = ()
+    """Joints that were recorded."""
+    moved: tuple[int, ...] | None = None
+    """Joints that the experiment moves; None where that is not known."""
     outcome: Outcome | None = None
     samples: int | None = None
     duration: float | None = None
@@ -141,6 +144,7 @@ def _summary(
 ) -> TraceSummary:
     spec = record.spec
     return TraceSummary(
+        moved=None if spec is None else tuple(spec.joints),
         path=path,
         state=state,
         size=size,

@@ -10,7 +10,7 @@ drives saturate at 63.5 ADC counts (4.2°) of error, and its set points pause at
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import (
@@ -35,7 +35,7 @@ class Preset:
     """A named experiment, with one line that says what it is for."""
 
     description: str
-    spec: ExperimentSpec
+    spec: ExperimentSpec = field(repr=False)
 
 
 def preset(name: str) -> Preset:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -38,11 +40,19 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
-def print_table(table: Table, width: int | None = None) -> None:
-    """Prints a table of results on standard output; brackets in its text are no markup."""
+def print_table(table: Table) -> None:
+    """Prints a table of results on standard output, as wide as the terminal; brackets in its text are no markup."""
     from rich.console import Console
 
-    Console(highlight=False, markup=False, width=width).print(table)
+    from daq_cli.app.narrow_table import print_fitting
+
+    print_fitting(table, Console(highlight=False, markup=False))
+
+
+def print_prose(text: str) -> None:
+    """Prints a sentence of a result on standard output, broken at words to the terminal's width."""
+    width = shutil.get_terminal_size().columns
+    print("\n".join(wrap(text, width, break_long_words=False, break_on_hyphens=False)))
 
 
 @dataclass

@@ -118,4 +118,4 @@ def _print_differences(differing: Sequence[ParameterDifference], labels: Sequenc
     for d in differing:
         values = ("–" if v is None else f"{v:.5g} {d.unit}" for v in d.values)
         table.add_row(d.name, *values, "–" if d.deviations is None else f"{d.deviations:.2f}")
-    print_table(table, 120)
+    print_table(table)

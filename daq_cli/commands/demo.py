@@ -9,7 +9,6 @@ import typer
 
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
-from daq_cli.commands.traces import print_figures
 
 app = typer.Typer(add_completion=False)
 
@@ -35,8 +34,5 @@ def demo(
     spec = ExperimentSpec(name="demo-ramp", notes="made by `daq demo`")
     robot = robot_access(Invocation(port_option=url))
     finished = acquire_complete(robot, spec, load_machine("ma2000"), folder, ConsentPrompt(False))
-    trace = read_trace(finished.trace)
-    print_figures(trace)
-    print_result(finished)
-    for suffix in (".png", ".html"):
-        print(f"plot:  {plot_trace(trace, finished.trace.with_suffix(suffix))}")
+    pictures = [plot_trace(read_trace(finished.trace), finished.trace.with_suffix(end)) for end in (".png", ".html")]
+    print_result(finished, pictures)

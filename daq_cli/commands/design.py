@@ -154,5 +154,5 @@ def _print_gain(gain: InformationGain) -> None:
         table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
     for p in gain.parameters:
         table.add_row(p.name, f"{p.before:.3g}", f"{p.after:.3g}", p.unit, f"{100 * p.share:.0f} %")
-    print_table(table, 120)
+    print_table(table)
     print(f"together: {gain.nats:.1f} more nats of information")

@@ -10,7 +10,7 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app import completion
-from daq_cli.app.context import JsonOption, console, print_json
+from daq_cli.app.context import JsonOption, console, print_json, print_prose
 from daq_cli.app.output_file import replacing
 from daq_cli.models.effect_choice import bounds, patterns, with_effects
 from daq_cli.models.model_input import (
@@ -27,7 +27,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_far_numbers, print_on_the_edge, print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -235,6 +235,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "file": out,
             "parameters": [p.model_dump(mode="json") for p in found.parameters],
             "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
+            "verdict": None if found.verdict is None else found.verdict.model_dump(mode="json"),
             "base_parameters": None if base is None else base.model_dump(mode="json"),
             "agreement": agreement_data(agreement),
             "whitened_mean_square": found.whitened_mean_square,
@@ -252,7 +253,7 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     print_parameters(found.parameters)
     known = sum(p.verdict == "known" for p in found.parameters)
     print(f"\nknown: {known} of {len(found.parameters)}", end="")
-    print("; no number is given for the others" if known < len(found.parameters) else "")
+    print("; of the others, in brackets, the model has one value of many" if known < len(found.parameters) else "")
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")
     if base is not None:
@@ -263,7 +264,7 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     print_agreement(agreement)
     if not found.converged:
         print(f"the search did not converge: {found.message}")
-    if found.doubt:
-        print(f"WARNING {found.doubt}")
-    print_far_numbers(found.parameters)
     print_on_the_edge(found.on_the_edge)
+    print()
+    for line in found.said:
+        print_prose(line)

@@ -158,7 +158,7 @@ def _print(found: Sequence[Profile]) -> None:
     for one in found:
         ends = ("–" if end is None else f"{end:.4g}" for end in (one.low, one.high))
         table.add_row(one.name, f"{one.value:.5g}", *ends, one.unit)
-    print_table(table, 120)
+    print_table(table)
     if any(None in (one.low, one.high) for one in found):
         print("– these traces do not bound it on this side, as far as the profile reaches")
     if better := [one.name for one in found if one.better]:

@@ -108,7 +108,7 @@ def _print(found: SensitivityCurves, machine: Machine) -> None:
     for curve in found.curves:
         moved = [largest_change(found, curve, k, machine) for k in range(len(found.joints))]
         table.add_row(curve.name, f"{curve.expected:.3g} {curve.unit}", *moved)
-    print_table(table, 160)
+    print_table(table)
 
 
 def _write(found: SensitivityCurves, machine: Machine, path: Path) -> None:

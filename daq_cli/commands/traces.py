@@ -46,20 +46,32 @@ def _read(context: typer.Context, wanted: str, folder: Path | None) -> tuple[Pat
 
 
 @app.command("ls")
-def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
+def list_all(
+    context: typer.Context,
+    place: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Folder of traces, as --folder.")] = None,
+    folder: FolderOption = None,
+    json: JsonOption = False,
+) -> None:
     """List traces, the oldest first."""
-    summaries, place = robot_of(context).list_traces(folder)
+    if place is not None and folder is not None:
+        raise SpecError("--folder: the folder is named already; leave one of them out")
+    robot = robot_of(context)
+    if place is not None:
+        robot.require_local(f"{place}: a service lists its own traces; leave the folder or --server out")
+        if not place.is_dir():
+            raise SpecError(f"{place}: is no folder; `daq traces show` takes a trace")
+    summaries, where = robot.list_traces(place or folder)
     if json:
         print_json([summary.model_dump(mode="json") for summary in summaries])
         return
     if not summaries:
-        print(f"no traces in {place}")
+        print(printable(f"no traces in {where}"))
         return
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, header_style="bold")
-    for title in ("number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome"):
+    for title in ("number", "recorded (UTC)", "what", "moved", "samples", "s", "outcome"):
         table.add_column(title, no_wrap=True)
     for one in summaries:
         moment = one.created.strftime("%Y-%m-%d %H:%M") if one.created else "?"
@@ -68,7 +80,7 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
             printable((one.trace_id or one.path.name)[:SHOWN_DIGITS]),
             moment,
             printable(f"{one.name or one.kind or one.source or one.problem}"),
-            joints_text(one.joints),
+            "–" if one.moved is None else joints_text(one.moved),
             "?" if one.samples is None else str(one.samples),
             "?" if one.duration is None else f"{one.duration:.2f}",
             Text(ended, "green" if ended == "complete" else "bold red"),
@@ -90,6 +102,7 @@ def show(
     """Show a trace's record, and its figures by joint."""
     from daq.traces.summary import joint_figures
     from daq_cli.models.feedforward import print_tracking, tracking_data
+    from daq_cli.robot.seen import print_figures
 
     path, found = _read(context, trace, folder)
     figures = joint_figures(found)
@@ -119,40 +132,6 @@ def show(
     for event in found.events:
         print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
     print(printable(f"file: {path}"))
-
-
-def print_figures(trace: Trace) -> None:
-    """The figures of every joint that moved, as a table on standard output."""
-    from rich.table import Table
-
-    from daq.traces.summary import joint_figures
-
-    table = Table(box=None, header_style="bold")
-    for title in (
-        "joint",
-        "from",
-        "to",
-        "overshoot",
-        "rise time",
-        "largest error",
-        "error at the end",
-        "largest drive",
-    ):
-        table.add_column(title, justify="right")
-    for one in joint_figures(trace):
-        if not one.moved:
-            continue
-        rise = "–" if one.rise_time is None else f"{one.rise_time:.2f} s"
-        drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.record.drive_unit or ''}"
-        cells = (one.start, one.end, one.overshoot)
-        errors = (one.largest_error, one.final_error)
-        start, end, overshoot, largest, final = (_angle(value, one.unit) for value in (*cells, *errors))
-        table.add_row(str(one.joint), start, end, overshoot, rise, largest, final, drive)
-    print_table(table)
-
-
-def _angle(value: float | None, unit: str) -> str:
-    return "–" if value is None else f"{value:.2f}{'' if unit == '°' else ' '}{unit}"
 
 
 def _ended(record: TraceRecord) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq_cli.app.context import JsonOption, console, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_prose, print_table
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
     MODEL_HELP,
@@ -123,17 +123,15 @@ def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], m
         table.add_row(
             p.name, f"{p.value:.5g}", f"{down} / {up}", needed, f"{p.expected:.3g}", f"{p.contribution:.4f}", p.unit
         )
-    print_table(table, 140)
-    verdict = "no more than" if fidelity.explains else "more than"
-    print(
-        f"\nΣλ² = {fidelity.sum_of_contributions:.4f} (τ′ = â/(3√2), the source's), "
-        f"{three.sum_of_contributions:.4f} (τ′ = â/3); at 1 what is left is explained: it is {verdict} what is expected"
-    )
+    print_table(table)
     for note in fidelity.notes:
         print(f"  {note}")
     for one in in_time:
         print(f"\n{one.trace}, variation with time (accelerations smoothed over {1e3 * one.smoothing:.0f} ms):")
         _print_in_time(one, machine)
+    print()
+    print_prose(fidelity.said)
+    print_prose(f"Σλ² with τ′ = â/3 instead of the source's â/(3√2): {three.sum_of_contributions:.4f}")
 
 
 def _print_in_time(one: TimeDomain, machine: Machine) -> None:
@@ -148,7 +146,7 @@ def _print_in_time(one: TimeDomain, machine: Machine) -> None:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
         shares = (f"{100 * share:.0f} %" for share in (v.significant, v.alone_constant, v.alone_varying))
         table.add_row(v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", *shares, ", ".join(strongest))
-    print_table(table, 160)
+    print_table(table)
     for j in one.joints:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]
         unit = f"{joint_unit(machine, j.joint)}/s²"

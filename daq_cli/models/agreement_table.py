@@ -19,14 +19,14 @@ def print_agreement(models: Sequence[ModelAgreement]) -> None:
     table = Table(box=None, header_style="bold", title_justify="left")
     for name in ("model", "traces"):
         table.add_column(name)
-    for name in ("joint", "rms", "in counts", "largest", "noise floor", "floor in counts"):
+    for name in ("joint", "rms", "in counts", "largest", "noise"):
         table.add_column(name, justify="right")
     for model in models:
         fitted = any(t.held_out is not None for t in model.traces)
         for kind, joints in (("in sample", model.in_sample), ("held out", model.held_out)):
             for one in joints or ():
                 table.add_row(model.label, kind if fitted else "all", *_figures(one))
-    print_table(table, 120)
+    print_table(table)
 
 
 def agreement_data(models: Sequence[ModelAgreement]) -> list[dict[str, Any]]:
@@ -37,5 +37,5 @@ def agreement_data(models: Sequence[ModelAgreement]) -> list[dict[str, Any]]:
 def _figures(one: JointAgreement) -> tuple[str, ...]:
     factor, unit = shown_unit(one.unit)
     rmse, largest, least = (with_unit(f"{v * factor:.4f}", unit) for v in (one.rmse, one.largest, one.floor))
-    counts, floor = ("–" if value is None else f"{value:.2f}" for value in (one.counts, one.floor_counts))
-    return str(one.joint), rmse, counts, largest, least, floor
+    counts = "–" if one.counts is None else f"{one.counts:.2f}"
+    return str(one.joint), rmse, counts, largest, least

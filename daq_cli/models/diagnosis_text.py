@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
     from model.machine_model.parameter import Parameter
 
-WIDTH = 100
+WIDTH = 80
 INDENT = 9
 FITTED = 5
 """Fitted candidates that are listed; those that the step names always are."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_cli.app.context import console, print_json, print_table
+from daq_cli.app.context import console, print_json, print_prose, print_table
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import files_of
-from daq_cli.models.parameter_table import print_far_numbers, print_on_the_edge, print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,6 +51,8 @@ def fit_recorded_torques(
     else:
         _print(found, files)
         print(headline(base))
+        if found.verdict is not None:
+            print_prose(found.verdict.text)
         console().print(f"model {found.model.identity}: {out}")
     if report is not None:
         from model.inverse_dynamics.fit import torque_curves
@@ -76,10 +78,9 @@ def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
     for one, name in zip(found.errors, trace_names([e.trace for e in found.errors], files), strict=True):
         rms = ", ".join(f"{left:.3f} of {torque:.3f}" for left, torque in zip(one.rms, one.torque, strict=True))
         errors.add_row(name, "held out" if one.held_out else "in sample", f"{100 * one.share:.1f} %", rms)
-    print_table(errors, 120)
+    print_table(errors)
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")
     for note in on_drives_at_limit(found.at_limit, found.unknown_joints):
         print(sentence(note_words(note)))
-    print_far_numbers(found.parameters)
     print_on_the_edge(found.on_the_edge)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from model.reports.gap import MEASURES
@@ -13,10 +14,20 @@ if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Gap
 
 COLUMN = 13
+WIDTH = 71
+"""Columns of text: 80 less the label that stands before it."""
 
 
 def gap_lines(gap: Gap) -> list[str]:
-    """A row a model, first on the traces fitted to, then on the held-out ones, and the noise; a column a joint."""
+    """A row a model, first on the traces fitted to, then on the held-out ones, and the noise; a column a joint, so many
+    side by side as fit; then what the numbers would have had to become without the effects."""
+    lines = _table(gap)
+    if gap.without is not None:
+        lines += ["", *wrap(gap.without.text, WIDTH, break_long_words=False, break_on_hyphens=False)]
+    return lines
+
+
+def _table(gap: Gap) -> list[str]:
     shown = [shown_unit(unit) for unit in gap.units]
     heads = [f"joint {joint}, {unit}" for joint, (_, unit) in zip(gap.joints, shown, strict=True)]
     held = any(stage.held_out for stage in gap.stages)
@@ -26,11 +37,16 @@ def gap_lines(gap: Gap) -> list[str]:
     names = [stage.name for stage in gap.stages]
     label = max(len(MEASURES[gap.measure]), *(len(name) + 2 for name in names), len("noise")) + 1
     texts = _texts([*(row for _, rows in blocks for row in rows), gap.noise], [factor for factor, _ in shown])
-    lines = [_row(MEASURES[gap.measure], heads, label)]
-    for title, rows in blocks:
-        lines.append(f"on traces {title}")
-        lines += [_row(f"  {name}", texts.pop(0), label) for name, _ in zip(names, rows, strict=True)]
-    return [*lines, _row("noise", texts.pop(0), label)]
+    abreast = max(1, (WIDTH - label) // COLUMN)
+    lines: list[str] = []
+    for first in range(0, len(heads), abreast):
+        part, rest = slice(first, first + abreast), iter(texts)
+        lines.append(_row(MEASURES[gap.measure], heads[part], label))
+        for title, rows in blocks:
+            lines.append(f"on traces {title}")
+            lines += [_row(f"  {name}", next(rest)[part], label) for name, _ in zip(names, rows, strict=True)]
+        lines.append(_row("noise", next(rest)[part], label))
+    return lines
 
 
 def _texts(rows: Sequence[Sequence[float | None]], factors: Sequence[float]) -> list[list[str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from daq_cli.app.context import print_table
 
@@ -23,29 +23,7 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
         table.add_column(name, justify="right" if number else "left", overflow="fold")
     for p in parameters:
         table.add_row(*row_of(p))
-    print_table(table, 140)
-
-
-def print_far_numbers(parameters: Sequence[FittedParameter]) -> None:
-    """Prints a warning about the numbers that came out far from what the machine file states of them, if any did; of an
-    effect that it does not state, nothing is expected but that it is not there."""
-    from model.discrepancy.explanation.note_words import note_words
-    from model.discrepancy.explanation.notes import on_stated_numbers
-    from model.discrepancy.explanation.renderer import sentence
-
-    numbers = [_Expected(p.name, p.unit, p.expected, p.expected_deviation) for p in parameters if p.expected]
-    known = {p.name: p.value for p in parameters if p.value is not None}
-    for note in on_stated_numbers([n for n in numbers if n.name in known], known):
-        print(f"WARNING {sentence(note_words(note))}")
-
-
-class _Expected(NamedTuple):
-    """What is expected of a number."""
-
-    name: str
-    unit: str
-    expected: float
-    deviation: float | None
+    print_table(table)
 
 
 def print_on_the_edge(links: Sequence[str]) -> None:

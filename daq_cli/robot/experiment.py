@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,7 +67,7 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
     if options.json:
         print_json(finished.model_dump(mode="json"))
     else:
-        print_result(finished)
+        print_result(finished, server=robot.call.server)
     if finished.outcome != "complete":
         raise typer.Exit(exit_codes.OF_OUTCOME[finished.outcome])
 
@@ -112,9 +114,15 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
         print("  no limit is violated; nothing was sent")
 
 
-def print_result(finished: Finished) -> None:
-    """Prints the result of a run for people."""
+def print_result(finished: Finished, pictures: Sequence[Path] = (), server: str | None = None) -> None:
+    """Prints the result of a run for people: how it ended, what was seen, its pictures, and what comes next.
+
+    Args:
+        server: URL of the service that made the run; None for a robot at this computer.
+    """
     from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line  # loads numpy: not for the tab key
+    from daq.traces.reader import read_trace
+    from daq_cli.robot.seen import print_figures
 
     counters = finished.counters
     why = f" — {finished.reason}" if finished.reason else ""
@@ -127,3 +135,11 @@ def print_result(finished: Finished) -> None:
         print(late_set_points_line(late))
     print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in shown))
     print(f"trace: {finished.trace}")
+    print_figures(read_trace(finished.trace))
+    trace = shlex.quote(str(finished.trace))
+    for picture in pictures:
+        print(f"picture: {picture}")
+    if not pictures:
+        print(f"picture: daq traces plot {trace}")
+    print(f"next:    daq fit {trace} -o model.json")
+    print("         daq serve    # the same in a browser" if server is None else f"         {server}/#/traces")

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from daq.progress_bar import terminal_bar
-from daq_cli.app.context import console
+from daq_cli.app.context import console, printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -25,20 +25,21 @@ class RunDisplay:
 
     def progress(self, fraction: float, text: str) -> None:
         """Shows how far the run is."""
-        from rich.markup import escape
-
-        self._bar.update(self._task, completed=fraction, text=escape(text))
+        self._bar.update(self._task, completed=fraction, text=text)
 
     def event(self, kind: str, time: float, message: str) -> None:
-        """Shows an event of the trace; `time` is in s from the start of the record."""
-        from rich.markup import escape
+        """Shows an event of the trace; `time` is in s from the start of the record. What every run's result says at its
+        end is left to that."""
+        from rich.text import Text
 
         from daq.contracts.limp import GAINS_UNKNOWN
-        from daq.contracts.trace import SLOW_LINE
+        from daq.contracts.trace import LATE_WORDS, SLOW_LINE
 
+        if LATE_WORDS in message:
+            return
         if kind not in self._quiet or message.startswith((SLOW_LINE, GAINS_UNKNOWN)):
-            line = escape(f"{kind.replace('_', ' ')}: {message}")
-            self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True, markup=True)
+            line = printable(f"  {kind.replace('_', ' ')}: {message}")
+            self._bar.console.print(Text.assemble((f"{time:8.2f} s", "dim"), line), soft_wrap=True)
 
 
 @contextmanager

@@ -13,8 +13,8 @@ class JointAgreement(FrozenRecord):
     """One joint over one or more traces.
 
     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-    count of the sensor (None where it has none), all in `unit`. `share` is the mean square of the residual divided by
-    that of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+    count of the sensor (None where it has none), all in `unit`. `share` is `rmse` divided by the root mean
+    square of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
     """
 
     joint: int
@@ -75,13 +75,13 @@ def pooled(traces: Sequence[TraceAgreement]) -> tuple[JointAgreement, ...] | Non
     for column, first in enumerate(traces[0].joints):
         own = [t.joints[column] for t in traces]
         square = sum(j.rmse**2 * t.samples for j, t in zip(own, traces, strict=True)) / total
-        motion = sum(j.rmse**2 / j.share * t.samples for j, t in zip(own, traces, strict=True) if j.share)
+        motion = sum((j.rmse / j.share) ** 2 * t.samples for j, t in zip(own, traces, strict=True) if j.share)
         found.append(
             first.model_copy(
                 update={
                     "rmse": math.sqrt(square),
                     "largest": max(j.largest for j in own),
-                    "share": square * total / motion if motion > 0 else None,
+                    "share": math.sqrt(square * total / motion) if motion > 0 else None,
                 }
             )
         )

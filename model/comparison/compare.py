@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -149,7 +150,7 @@ def _agreement(
                 largest=float(np.abs(left[:, column]).max()),
                 floor=float(floor[column]),
                 count=resolution(sensor) if sensor is not None and signal == "position" else None,
-                share=square / motion if motion > 9 * floor[column] ** 2 else None,
+                share=math.sqrt(square / motion) if motion > 9 * floor[column] ** 2 else None,
             )
         )
     return TraceAgreement(trace=record.name, held_out=held_out, samples=record.samples, joints=tuple(joints))

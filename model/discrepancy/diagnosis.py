@@ -91,11 +91,12 @@ class GapStage(FrozenRecord):
     """The error of one model on the way from the given to the resulting one: root mean square by joint of the `Gap`, on
     traces fitted to and on held-out ones (empty without any); None where it is not finite.
 
-    `kind`: the model as given; with its tolerance parameters fitted; or with `effect` on `joints` added to the stage
-    before.
+    `kind`: the model as given; with `effect` on `joints` added to the stage before, and its numbers fitted within one
+    stated deviation of the machine file; with everything refitted. Without an effect: with its numbers `fitted`, which
+    in older answers comes before the effects, too.
     """
 
-    kind: Literal["given", "fitted", "effect"]
+    kind: Literal["given", "fitted", "effect", "refitted"]
     name: str = UNWRITTEN
     """For a list, in words."""
     effect: str | None = None
@@ -104,11 +105,35 @@ class GapStage(FrozenRecord):
     held_out: tuple[float | None, ...] = ()
 
 
+class GapNumber(FrozenRecord):
+    """A number of the machine file: as `stated`, with its `deviation`; what it would have had to become `without` the
+    effects; and with them (`fitted`). All in `unit`."""
+
+    name: str
+    unit: str
+    stated: float
+    deviation: float
+    without: float
+    fitted: float
+
+
+class GapWithout(FrozenRecord):
+    """What the numbers alone would make of the records, without any effect: errors as in a stage, and the numbers that
+    would have had to move by more than a stated deviation, the furthest first."""
+
+    fitted: tuple[float | None, ...]
+    held_out: tuple[float | None, ...] = ()
+    numbers: tuple[GapNumber, ...] = ()
+    text: str = UNWRITTEN
+    """The same in words."""
+
+
 class Gap(FrozenRecord):
     """The gap between simulation and measurement, and how it shrinks from stage to stage.
 
     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
-    `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance.
+    `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance. `without`: the
+    alternative to the effects; None where none was added, and in older answers.
     """
 
     measure: Literal["closed-loop", "torques"]
@@ -116,6 +141,7 @@ class Gap(FrozenRecord):
     units: tuple[str, ...]
     noise: tuple[float, ...]
     stages: tuple[GapStage, ...]
+    without: GapWithout | None = None
 
 
 class PhaseCell(FrozenRecord):

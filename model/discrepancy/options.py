@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Protocol
 from pydantic import Field
 
 from daq.contracts.errors import SpecError
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import SpokenRecord
 from model.discrepancy.grounds import Method
 from model.effects.library import effect
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 
-class DiagnosisOptions(FrozenRecord):
+class DiagnosisOptions(SpokenRecord):
     """Options of a diagnosis; the defaults suit traces of a machine with a known controller.
 
     effects: candidates by name; None for the whole library and loaded effects of the user's own.

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from model.machine_model.record_verdict import MORE_THAN_NOISE
+
 FEEDBACK_SHARE = 0.8
 """Share of the way from the simulated to the recorded reading that the simulated controller is given, where models are
 fitted and compared (docs/decisions/0020). More finds less: the laws of an arm are never exactly a model's, and a torque
 that is a little wrong adds up. With less, what noise has moved looks like a torque."""
 FEEDBACK_SHARE_FOR_ERRORS = 0.5
 """The same where errors are reported and judged, held-out ones above all: nearer to what the model alone would do."""
-
-FAR_OFF = 4.0
-"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Thresholds:
     distant_echo: float = 0.005
     kin: float = 0.5
     margin: float = 4.0
-    unexplained: float = 0.3
+    unexplained: float = MORE_THAN_NOISE
     unnamed: float = 0.12
     place: float = 0.001
     least_share: float = 0.8

@@ -8,13 +8,12 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import SignalError, Step, Verdict
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds
+from model.machine_model.record_verdict import SCATTER
 
 LEAST_EXCESS = 0.25
 """Least relative excess variance for which a removed share is reported; a 17 s record resolves it to ±0.06."""
 GROWN = 1.1
 """Ratio of a joint's mean square errors on held-out traces, above which a fit has made them worse beyond noise."""
-SCATTER = 4.0
-"""Standard deviations of an estimated variance, within which it may exceed its floor by chance."""
 
 
 def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False) -> Verdict:

@@ -20,7 +20,7 @@ from model.fitting.covariance import sandwich
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
 from model.fitting.least_squares import Search, Solution, solve
 from model.fitting.nelder_mead import climb
-from model.fitting.noise import expected_residual
+from model.fitting.noise import NoiseEffect, noise_effect
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import Signal, noise_floor, records_of
@@ -31,6 +31,7 @@ from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
@@ -69,12 +70,13 @@ def fit(
     solution = _first_search(problem, coordinates, options, progress, cancel)
     evaluations = solution.evaluations
     whiteners: list[Whitener] = [white(d) for d in problem.floor]
+    noise: NoiseEffect | None = None
     for number in range(options.rounds):
         last, most = solution, options.most_evaluations or LEAST_SQUARES_EVALUATIONS
         if number + 1 < options.rounds:
             most = min(most, ROUND_EVALUATIONS)
         progress(0.5 + 0.4 * number / options.rounds, f"round {number + 1}: noise and whitening")
-        problem, whiteners = with_noise(problem, solution.values, options)
+        problem, whiteners, noise = with_noise(problem, solution.values, options)
         if options.method == "nelder_mead":
             break
         search = Search(options.robust, options.tolerance, most)
@@ -87,7 +89,8 @@ def fit(
     estimate = _estimate(problem, whiteners, solution.values, options)
     progress(1.0, "done")
     solution = replace(solution, evaluations=evaluations)
-    return _result(model, problem, solution, estimate, before, options, time.perf_counter() - begun)
+    size = problem.floor if noise is None else np.maximum(noise.size, problem.floor)
+    return _result(model, problem, solution, estimate, before, size, options, time.perf_counter() - begun)
 
 
 def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> SimulatedProblem:
@@ -168,10 +171,13 @@ def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
 
 def with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
-) -> tuple[SimulatedProblem, list[Whitener]]:
-    """The problem with the mean effect of the noise subtracted, and whiteners fitted to its residual."""
+) -> tuple[SimulatedProblem, list[Whitener], NoiseEffect | None]:
+    """The problem with the mean effect of the noise subtracted, whiteners fitted to its residual, and that effect where
+    noise goes round the loop."""
+    noise = None
     if options.replicas and problem.loop == "closed" and problem.signal == "position":
-        problem = problem.with_offset(expected_residual(problem, values, options.replicas, options.seed))
+        noise = noise_effect(problem, values, options.replicas, options.seed)
+        problem = problem.with_offset(noise.mean)
     evaluations = problem.evaluate(values, derivatives=False)
     whiteners = []
     for column, floor in enumerate(problem.floor):
@@ -180,7 +186,7 @@ def with_noise(
             whiteners.append(fitted_whitener(runs, options.longest_memory, floor))
         else:
             whiteners.append(white(max(floor, float(np.sqrt(np.mean(np.concatenate(runs) ** 2))))))
-    return problem, whiteners
+    return problem, whiteners, noise
 
 
 @dataclass(frozen=True)
@@ -232,13 +238,14 @@ def _result(
     solution: Solution,
     estimate: _Estimate,
     before: Sequence[Evaluation],
+    noise: Floats,
     options: FitOptions,
     seconds: float,
 ) -> FitResult:
     names = tuple(u.name for u in problem.unknowns)
     own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
     identities = tuple(record.name for record in problem.records)
-    errors = _errors(model, problem, before, estimate.after)
+    errors = _errors(model, problem, before, estimate.after, noise)
     deviations = np.sqrt(np.diag(estimate.covariance))
     parameters = tuple(
         fitted_parameter(u, float(v), float(d), estimate.report.verdict(u.name))
@@ -259,6 +266,11 @@ def _result(
         parameters=parameters,
         identifiability=estimate.report,
         errors=errors,
+        verdict=RecordVerdict.of(
+            fitted,
+            [JointLeft(joint=e.joint, unit=e.unit, rms=e.after, noise=e.noise or e.floor) for e in errors],
+            sum(r.samples for r in problem.records),
+        ),
         whitened_mean_square=estimate.mean_square,
         names=names,
         values=tuple(map(float, solution.values)),
@@ -297,7 +309,7 @@ def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: Parame
 
 
 def _errors(
-    model: Model, problem: SimulatedProblem, before: Sequence[Evaluation], after: Sequence[Evaluation]
+    model: Model, problem: SimulatedProblem, before: Sequence[Evaluation], after: Sequence[Evaluation], noise: Floats
 ) -> tuple[JointError, ...]:
     found = []
     for column, joint in enumerate(model.machine.modelled_joints):
@@ -306,7 +318,8 @@ def _errors(
         )
         unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
         unit += "/s" if problem.signal == "velocity" else ""
-        found.append(JointError(joint=joint, unit=unit, before=first, after=last, floor=float(problem.floor[column])))
+        sizes = {"floor": float(problem.floor[column]), "noise": float(noise[column])}
+        found.append(JointError(joint=joint, unit=unit, before=first, after=last, **sizes))
     return tuple(found)
 
 

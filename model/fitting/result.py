@@ -17,6 +17,7 @@ from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
 from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
+from model.machine_model.record_verdict import RecordVerdict
 
 RESULT_FORMAT = 1
 """Version of the file; a reader refuses newer ones."""
@@ -46,13 +47,14 @@ class FittedParameter(FrozenRecord):
 
 class JointError(FrozenRecord):
     """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
-    itself."""
+    itself. `noise`: what a right model would leave, where noise goes round the loop; None in older results."""
 
     joint: int
     unit: str
     before: float
     after: float
     floor: float
+    noise: float | None = None
 
 
 class FitResult(FrozenRecord):
@@ -64,6 +66,8 @@ class FitResult(FrozenRecord):
     parameters: tuple[FittedParameter, ...]
     identifiability: IdentifiabilityReport
     errors: tuple[JointError, ...]
+    verdict: RecordVerdict | None = None
+    """Whether the model explains the records; None in results of older versions."""
     whitened_mean_square: float
     """Mean square of the whitened residual: 1 where the noise model describes what is left."""
     names: tuple[str, ...]
@@ -88,13 +92,18 @@ class FitResult(FrozenRecord):
         )
 
     def __str__(self) -> str:
-        """The line of `repr`, the parameters as a table, what is not determined, and a doubt about the whole."""
-        doubt = f"\nWARNING {self.doubt}" if self.doubt else ""
-        return f"{self!r}\n{text_of(self.parameters, self.identifiability)}{doubt}"
+        """The line of `repr`, the parameters as a table, what is not determined, and the verdict."""
+        return "\n".join([repr(self), text_of(self.parameters, self.identifiability), *self.said])
 
     def _repr_html_(self) -> str:
         """The same, for a notebook."""
-        return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self.doubt)
+        return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self.said)
+
+    @property
+    def said(self) -> list[str]:
+        """The verdict in words, and a doubt where there is one."""
+        verdict = [] if self.verdict is None else [self.verdict.text]
+        return [*verdict, *([f"WARNING {self.doubt}"] if self.doubt else [])]
 
     @property
     def doubt(self) -> str:

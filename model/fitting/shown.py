@@ -43,6 +43,10 @@ class ShownParameter(Protocol):
         """Upper end."""
 
     @property
+    def model_value(self) -> float:
+        """What the fitted model carries, whether or not the data determine it."""
+
+    @property
     def before(self) -> float:
         """Value before the fit."""
 
@@ -75,26 +79,21 @@ WORSE = 1.5
 """By which factor a joint's error must have grown to be doubted: a little is given away for other joints."""
 ABOVE_NOISE = 30.0
 """How many times the noise it must be, too."""
-COLUMNS = ("parameter", "value", "95 % interval", "unit", "before", "")
-NUMBERS = (False, True, True, False, True, False)
+COLUMNS = ("parameter", "value", "95 % interval", "unit", "before")
+NUMBERS = (False, True, True, False, True)
 """Which columns hold numbers, which are set flush right."""
 
 
 def row_of(p: ShownParameter) -> tuple[str, ...]:
-    """The cells of COLUMNS for one parameter; no number where the data do not determine one."""
-    bound = "" if p.at_bound is None else f"at its {'lower' if p.at_bound == 'low' else 'upper'} bound"
+    """The cells of COLUMNS for one parameter; in brackets what the model carries where the data do not determine it."""
+    before = f"{p.before:.5g}"
     if p.value is None or p.low is None or p.high is None or p.deviation is None:
         what = {"combination": "only in combination", "unknown": "not determined"}.get(p.verdict, p.verdict)
-        return p.name, "–", "–", p.unit, f"{p.before:.5g}", what
+        return p.name, f"({p.model_value:.4g})", what, p.unit, before
     digits = significant(p.value, p.deviation)
-    return (
-        p.name,
-        f"{p.value:.{digits}g}",
-        f"{p.low:.{digits}g} to {p.high:.{digits}g}",
-        p.unit,
-        f"{p.before:.5g}",
-        bound,
-    )
+    bound = "" if p.at_bound is None else f", at its {'lower' if p.at_bound == 'low' else 'upper'} bound"
+    interval = f"{p.low:.{digits}g} to {p.high:.{digits}g}{bound}"
+    return p.name, f"{p.value:.{digits}g}", interval, p.unit, before
 
 
 def significant(value: float, deviation: float) -> int:
@@ -136,13 +135,14 @@ def text_of(parameters: Sequence[ShownParameter], report: IdentifiabilityReport)
     return "\n".join(line.rstrip() for line in [*lines, *_undetermined(report)])
 
 
-def html_of(title: str, parameters: Sequence[ShownParameter], report: IdentifiabilityReport, doubt: str = "") -> str:
-    """The same for a notebook, under a title, with a doubt below. Every text is escaped."""
+def html_of(
+    title: str, parameters: Sequence[ShownParameter], report: IdentifiabilityReport, below: Sequence[str] = ()
+) -> str:
+    """The same for a notebook, under a title, with further lines below. Every text is escaped."""
     head = _cells(COLUMNS, "th")
     body = "".join(f"<tr>{_cells(row_of(p), 'td')}</tr>" for p in parameters)
-    warning = [f"WARNING {doubt}"] if doubt else []
-    below = "<br/>".join(map(escape, [*_undetermined(report), *warning]))
-    return f"<div><b>{escape(title)}</b><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{below}</div>"
+    lines = "<br/>".join(map(escape, [*_undetermined(report), *below]))
+    return f"<div><b>{escape(title)}</b><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{lines}</div>"
 
 
 def _cells(row: Sequence[str], tag: str) -> str:

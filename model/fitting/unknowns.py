@@ -55,6 +55,15 @@ class Unknown:
         return replace(self, deviation=stated)
 
     @property
+    def within_stated(self) -> Unknown:
+        """The same, to be found within one stated deviation of what is expected; itself where none is stated."""
+        spread = self.as_stated.deviation
+        if spread is None:
+            return self
+        low, high = max(self.low, self.expected - spread), min(self.high, self.expected + spread)
+        return replace(self, low=low, high=high, start=min(max(self.start, low), high)) if low < high else self
+
+    @property
     def name(self) -> str:
         """Full name of the parameter, for people and files. Code reads `parameter` instead."""
         return self.parameter.name

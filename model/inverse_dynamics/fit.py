@@ -28,11 +28,14 @@ from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.problem import TorqueProblem
+from model.inverse_dynamics.readings import torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
+from model.units import joint_unit
 
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
@@ -62,6 +65,8 @@ class TorqueFit(FrozenRecord):
     parameters: tuple[FittedParameter, ...]
     identifiability: IdentifiabilityReport
     errors: tuple[TorqueError, ...]
+    verdict: RecordVerdict | None = None
+    """Whether the model explains the records fitted to; None in results of older versions."""
     in_sample: float
     held_out: float | None
     cutoff: float
@@ -82,12 +87,16 @@ class TorqueFit(FrozenRecord):
         return f"<TorqueFit {self.model.identity}: {known_of(self.parameters)}, {left}>"
 
     def __str__(self) -> str:
-        """The line of `repr`, the parameters as a table, and what is not determined."""
-        return f"{self!r}\n{text_of(self.parameters, self.identifiability)}"
+        """The line of `repr`, the parameters as a table, what is not determined, and the verdict."""
+        return "\n".join([repr(self), text_of(self.parameters, self.identifiability), *self._said])
 
     def _repr_html_(self) -> str:
         """The same, for a notebook."""
-        return html_of(repr(self)[1:-1], self.parameters, self.identifiability)
+        return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self._said)
+
+    @property
+    def _said(self) -> list[str]:
+        return [] if self.verdict is None else [self.verdict.text]
 
 
 @dataclass(frozen=True)
@@ -167,6 +176,7 @@ def fit_torques(
         parameters=parameters,
         identifiability=report,
         errors=tuple(error for error, _, _ in errors),
+        verdict=_verdict(fitted, traces, motions[: len(traces)], cutoff),
         in_sample=_share(errors[: len(traces)]),
         held_out=_share(errors[len(traces) :]) if held_out else None,
         cutoff=cutoff,
@@ -238,6 +248,23 @@ def _error(model: Model, motion: RecordedMotion, *, held_out: bool) -> tuple[Tor
     share = float(np.sqrt(squares / whole))
     error = TorqueError(trace=motion.name, held_out=held_out, rms=_rms(left), torque=_rms(torque), share=share)
     return error, squares, whole
+
+
+def _verdict(model: Model, traces: Sequence[Trace], motions: Sequence[RecordedMotion], cutoff: float) -> RecordVerdict:
+    """The verdict on the records that were fitted to; the noise is that of the readings."""
+    residual = np.concatenate(TorqueBalance(model, tuple(motions)).residual({}))
+    noise = torque_noise(model, traces, cutoff)
+    joints = model.machine.modelled_joints
+    left = [
+        JointLeft(
+            joint=joint,
+            unit="N·m" if joint_unit(model.machine, joint) == "rad" else "N",
+            rms=rms,
+            noise=float(noise[column]),
+        )
+        for column, (joint, rms) in enumerate(zip(joints, _rms(residual), strict=True))
+    ]
+    return RecordVerdict.of(model, left, len(residual))
 
 
 def _rms(signal: Floats) -> tuple[float, ...]:

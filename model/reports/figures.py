@@ -39,11 +39,12 @@ _INKS |= {"axes.edgecolor": QUIET, "grid.color": GRID}
 
 def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -> str:
     """SVG of what `draw` puts on a figure of that size (inches). Its colours are variables of the page's style."""
-    from matplotlib.figure import Figure
+    from daq.contracts.notebook_figure import NotebookFigure
 
     with _style():
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = NotebookFigure(figsize=(width, height), layout="constrained")
         draw(figure)
+        _plain_powers(figure)
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
     text = stream.getvalue()
@@ -57,11 +58,12 @@ def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -
 
 def saved(draw: Callable[[Figure], None], height: float, path: Path, kind: str, width: float = WIDTH) -> None:
     """The same as a file of that kind (png, svg, pdf), on white. Raises OSError."""
-    from matplotlib.figure import Figure
+    from daq.contracts.notebook_figure import NotebookFigure
 
     with _style():
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = NotebookFigure(figsize=(width, height), layout="constrained")
         draw(figure)
+        _plain_powers(figure)
         dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
         figure.savefig(path, format=kind, dpi=200, facecolor="white", metadata=dates.get(kind))
 
@@ -69,7 +71,25 @@ def saved(draw: Callable[[Figure], None], height: float, path: Path, kind: str, 
 def _style() -> AbstractContextManager[None]:
     import matplotlib as mpl
 
-    return mpl.rc_context({**mpl.rc_params_from_file(_STYLE, use_default_template=False), **_INKS})
+    from daq.contracts.notebook_figure import AS_WRITTEN
+
+    return mpl.rc_context({**mpl.rc_params_from_file(_STYLE, use_default_template=False), **_INKS, **AS_WRITTEN})
+
+
+def as_label(text: str) -> str:
+    """A text for a legend as it is: matplotlib leaves out what begins with an underline."""
+    return f"\N{NO-BREAK SPACE}{text}" if text.startswith("_") else text
+
+
+def _plain_powers(figure: Figure) -> None:
+    """Labels logarithmic axes with plain numbers: matplotlib writes powers as formulas, which no text here is."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() == "log":
+                axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                axis.set_minor_formatter(NullFormatter())
 
 
 def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, ...]:

@@ -9,7 +9,7 @@ from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
-from model.reports.page import Cell, Report, Section, Table, Text, effect_list, listed, trace_names
+from model.reports.page import Cell, Report, Section, Table, effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
 
 
@@ -29,7 +29,7 @@ def fit_report(
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
         *(() if base is None else (base_parameter_section(base),)),
-        Section("How large the error is", (agreement_table(comparison.models), *_floor_remark(comparison))),
+        Section("How large the error is", (agreement_table(comparison.models),)),
         motion_section(comparison.signals, [m.label for m in comparison.models], files=files),
         Section("How it was done", (_how(found),)),
     ]
@@ -60,19 +60,8 @@ def _answer(found: FitResult, comparison: Comparison) -> str:
     ]
     left = f" Root mean square error on the traces {kind}: {', '.join(parts)}." if parts else ""
     scale = " The scale of torque is not among what they determine." if found.identifiability.torque_scale_free else ""
-    return f"The traces determine {known} of {len(found.parameters)} parameters.{scale}{left}"
-
-
-def _floor_remark(comparison: Comparison) -> tuple[Text, ...]:
-    after = comparison.models[-1]
-    joints = after.held_out or after.in_sample or ()
-    above = [j for j in joints if j.rmse > 2 * j.floor]
-    if not above:
-        return (Text("On no joint is the error more than twice the noise floor.", "good"),)
-    told = ", ".join(f"joint {j.joint} ({j.rmse / j.floor:.1f} times)" for j in above)
-    return (
-        Text(f"More than twice the noise floor: {told}. Something is in the records that the model lacks.", "warning"),
-    )
+    verdict = "" if found.verdict is None else f"{found.verdict.text} "
+    return f"{verdict}The traces determine {known} of {len(found.parameters)} parameters.{scale}{left}"
 
 
 def _how(found: FitResult) -> Table:

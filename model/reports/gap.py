@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from model.discrepancy.diagnosis import Gap
 from model.reports.figures import COLOURS, INK, drawn, panels
 from model.reports.numbers import column
-from model.reports.page import Cell, Picture, Section, Table, cells
+from model.reports.page import Cell, Picture, Section, Table, Text, cells
 from model.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ MOST_COLUMNS = 3
 
 def gap_section(gap: Gap) -> Section:
     """Picture and table: how far each model is from the measurement."""
-    return Section("How the gap shrinks", (_picture(gap), _table(gap)))
+    without = () if gap.without is None else (Text(gap.without.text),)
+    return Section("How the gap shrinks", (_picture(gap), *without, _table(gap)))
 
 
 def _table(gap: Gap) -> Table:
@@ -63,7 +64,7 @@ def _picture(gap: Gap) -> Picture:
         figure.supylabel(MEASURES[gap.measure], fontsize=8)
 
     caption = "Dots: traces fitted to; rings: held out; grey: noise. Stages: " + "; ".join(
-        f"{_short(k)}: {s.name}" for k, s in enumerate(gap.stages)
+        f"{_short(gap, k)}: {s.name}" for k, s in enumerate(gap.stages)
     )
     return Picture(drawn(draw, 0.5 + 1.5 * down), f"{caption}.")
 
@@ -85,9 +86,12 @@ def _joint(axes: Axes, gap: Gap, place: int) -> None:
             axes.plot(*zip(*known, strict=True), style, marker="o", color=colour, mfc=fill, ms=4.5, lw=1.2)
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(-0.3, len(gap.stages) - 0.7)
-    axes.set_xticks(list(turns), [_short(k) for k in turns])
+    axes.set_xticks(list(turns), [_short(gap, k) for k in turns])
     axes.set_title(f"joint {joint} / {unit}")
 
 
-def _short(stage: int) -> str:
-    return ("given", "fitted")[stage] if stage < 2 else f"+{stage - 1}"
+def _short(gap: Gap, place: int) -> str:
+    """Label of a stage in the picture: effects are counted."""
+    kinds = [stage.kind for stage in gap.stages]
+    kind = kinds[place]
+    return f"+{kinds[: place + 1].count(kind)}" if kind == "effect" else {"refitted": "all"}.get(kind, kind)

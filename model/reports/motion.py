@@ -15,6 +15,7 @@ from model.reports.figures import (
     INK,
     MODEL_COLOURS,
     QUIET,
+    as_label,
     band,
     baseline,
     drawn,
@@ -119,7 +120,7 @@ def _joint(
         shade = colour if len(labels) == 1 else MODEL_COLOURS[place % len(MODEL_COLOURS)]
         time, own = thinned(one.time, simulated[:, column] * factor)
         style = "-" if len(labels) == 1 else ("-", "--", "-.", ":")[place % 4]
-        above.plot(time, own, color=shade, lw=1.4, ls=style, label=label)
+        above.plot(time, own, color=shade, lw=1.4, ls=style, label=as_label(label))
         band(below, one.time, (one.measured - simulated)[:, column] * factor, shade)
     time, measured = thinned(one.time, one.measured[:, column] * factor)
     above.plot(time, measured, color=INK, lw=0.6, label=one.words[0])  # thin and on top: neither hides the other
@@ -138,10 +139,10 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
         for kind, joints in ((in_sample(model), model.in_sample), (ROLES[True], model.held_out)):
             rows += [_row(model.label, kind, one) for one in joints or ()]
     return Table(
-        ("model", "traces", "joint", "rms", "in counts", "largest", "noise floor", "floor in counts", "left of motion"),
+        ("model", "traces", "joint", "rms", "in counts", "largest", "noise floor", "floor in counts", "of the motion"),
         tuple(rows),
         "Measured − simulated over all samples of these traces. The noise floor is what rounding and noise of the "
-        "sensor alone would leave. Left of motion: mean square of the residual over that of the motion about its mean.",
+        "sensor alone would leave. Of the motion: rms of the residual over that of the motion about its mean.",
     )
 
 

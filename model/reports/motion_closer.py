@@ -9,7 +9,7 @@ import numpy as np
 
 from model.arrays import Floats
 from model.comparison.compare import TraceSignals
-from model.reports.figures import INK, MODEL_COLOURS, QUIET, baseline, drawn, panels
+from model.reports.figures import INK, MODEL_COLOURS, QUIET, as_label, baseline, drawn, panels
 from model.reports.page import Picture
 from model.units import shown_unit
 
@@ -56,7 +56,7 @@ def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
         baseline(below)
         for place, (label, simulated) in enumerate(zip(labels, one.simulated, strict=True)):
             colour = MODEL_COLOURS[place % len(MODEL_COLOURS)]
-            above.plot(time, simulated[window, column] * factor, color=colour, lw=1.3, label=label)
+            above.plot(time, simulated[window, column] * factor, color=colour, lw=1.3, label=as_label(label))
             below.plot(time, (one.measured - simulated)[window, column] * factor, color=colour, lw=0.8)
         above.plot(time, one.measured[window, column] * factor, color=INK, lw=0.7, label=one.words[0])
         for axes, what in ((above, one.quantity), (below, "residual")):

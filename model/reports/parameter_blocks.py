@@ -22,7 +22,7 @@ def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
     return Table(
         ("parameter", "value", "95 % interval", "unit", "before", "expected", "verdict"),
         tuple(_parameter_row(p) for p in parameters),
-        "A parameter that the traces do not determine gets no number; the model carries one of those that fit as well. "
+        "In brackets: the traces do not determine the number, and the model carries one of those that fit as well. "
         "Intervals take the correlation of the residual into account.",
     )
 
@@ -31,7 +31,7 @@ def _parameter_row(p: FittedParameter) -> tuple[Cell, ...]:
     expected = "–" if p.expected is None else f"{p.expected:.4g} ± {p.expected_deviation:.2g}"
     verdict = VERDICTS[p.verdict] + ("" if p.at_bound is None else f", at its {p.at_bound} bound")
     tone: Tone = "plain" if p.verdict == "known" else "warning"
-    value, interval = "–", "–"
+    value, interval = f"({p.model_value:.4g})", "–"
     if p.value is not None and p.low is not None and p.high is not None:
         value, interval = f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}"
     before, after = Cell(f"{p.before:.5g}", number=True), Cell(expected, number=True)

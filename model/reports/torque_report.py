@@ -58,8 +58,9 @@ def torque_report(
 def _answer(found: TorqueFit) -> str:
     known = sum(p.verdict == "known" for p in found.parameters)
     held = "" if found.held_out is None else f", {100 * found.held_out:.1f} % on those held out"
+    verdict = "" if found.verdict is None else f"{found.verdict.text} "
     return (
-        f"The traces determine {known} of {len(found.parameters)} parameters. Left of the torque: "
+        f"{verdict}The traces determine {known} of {len(found.parameters)} parameters. Left of the torque: "
         f"{100 * found.in_sample:.1f} % on the traces fitted to{held}."
     )
 

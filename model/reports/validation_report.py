@@ -51,22 +51,12 @@ def validation_report(
         ("Σλ²", f"{source.sum_of_contributions:.4f} with τ′ = â/(3√2), {three.sum_of_contributions:.4f} with τ′ = â/3"),
         ("damping ratio", f"{source.damping_ratio:g}, of the associate system"),
     )
-    return Report(f"Validation of {label} by distortion", _answer(source, three), facts, tuple(sections))
+    return Report(f"Validation of {label} by distortion", _answer(source), facts, tuple(sections))
 
 
-def _answer(source: Fidelity, three: Fidelity) -> str:
-    total = f"Σλ² = {source.sum_of_contributions:.3f} (the other convention of τ′: {three.sum_of_contributions:.3f})"
+def _answer(source: Fidelity) -> str:
     strongest = max(source.parameters, key=lambda p: p.contribution)
-    if source.explains:
-        return (
-            f"{total}: deviations of the parameters as large as expected explain all that the model misses. "
-            f"{strongest.name} alone contributes {strongest.contribution:.2g}."
-        )
-    return (
-        f"{total}, below 1: deviations as large as expected do not explain what the model misses. "
-        f"Something is not in the model. The largest contribution is that of {strongest.name}, "
-        f"{strongest.contribution:.2g}."
-    )
+    return f"{source.said} The largest contribution is that of {strongest.name}, {strongest.contribution:.2g}."
 
 
 def _distortion_table(source: Fidelity, three: Fidelity) -> Table:

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
+from model.machine_model.record_verdict import RecordVerdict
 from model.validation.expected_deviation import Basis, Convention
 
 DAMPING_RATIO = 0.5
@@ -50,10 +51,11 @@ class Fidelity(FrozenRecord):
     """The transfer-function form of the distortion method for one model and its traces.
 
     `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum.
-    The model explains the record when `sum_of_contributions` (Σλ²) is at least 1.
+    Expected deviations of the parameters explain what is left when `sum_of_contributions` (Σλ²) is at least 1.
+    `verdict`: whether there is more left than noise; None in results of older versions.
     """
 
-    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "sum_of_contributions", "explains")
+    shown: ClassVar[tuple[str, ...]] = ("model", "traces", "sum_of_contributions", "said")
     model: str
     traces: tuple[str, ...]
     outputs: tuple[int, ...]
@@ -65,6 +67,19 @@ class Fidelity(FrozenRecord):
     sum_of_contributions: float
     curves: tuple[Curve, ...] = ()
     notes: tuple[str, ...] = ()
+    verdict: RecordVerdict | None = None
+
+    @property
+    def said(self) -> str:
+        """The verdict in words, and what expected deviations of the parameters make of what is left."""
+        total = f"Σλ² = {self.sum_of_contributions:.3g}"
+        if self.explains:
+            share = f"{total}: deviations of its numbers as large as expected account for what is left (1 or more)."
+        else:
+            share = (
+                f"{total}: deviations of its numbers as large as expected do not account for what is left (below 1)."
+            )
+        return share if self.verdict is None else f"{self.verdict.text} {share}"
 
     @property
     def explains(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.simulation.prepared import Options
+from model.units import joint_unit
 from model.validation.criterion import (
     DAMPING_RATIO,
     Curve,
@@ -25,6 +27,7 @@ from model.validation.criterion import (
 )
 from model.validation.doubling import Doubling, doubling_changes
 from model.validation.expected_deviation import expected_deviation
+from model.validation.noise_floor import position_floor
 from model.validation.squared_error import SquaredError, squared_error
 
 SEARCH_DEVIATIONS = 50.0
@@ -85,6 +88,7 @@ def validate_by_distortion(
         lambda f, text: progress(share * f, text),
         cancel,
     )
+    errors = error.by_joint(varied.best[None])[0]
     distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
     return Fidelity(
         model=model.identity,
@@ -93,12 +97,27 @@ def validate_by_distortion(
         convention="source",
         damping_ratio=damping_ratio,
         error=least,
-        error_by_joint=tuple(float(e) for e in error.by_joint(varied.best[None])[0]),
+        error_by_joint=tuple(map(float, errors)),
+        verdict=_verdict(error, varied.best, errors),
         parameters=tuple(distortions),
         sum_of_contributions=math.fsum(d.contribution for d in distortions),
         curves=_curves(error, varied, distortions, curve_points, progress, cancel) if curve_points else (),
         notes=tuple(_notes(varied.parameters, doublings)),
     )
+
+
+def _verdict(error: SquaredError, best: Floats, errors: Floats) -> RecordVerdict | None:
+    """Whether more is left than noise; None where the model cannot be simulated along the records."""
+    noise = position_floor(
+        error.model, error.traces, lambda made: replace(error, traces=tuple(made)).by_joint(best[None])[0]
+    )
+    if noise is None:
+        return None
+    left = [
+        JointLeft(joint=j, unit=joint_unit(error.model.machine, j), rms=math.sqrt(e), noise=math.sqrt(n))
+        for j, e, n in zip(error.outputs, errors, noise, strict=True)
+    ]
+    return RecordVerdict.of(error.model, left, sum(map(len, error.traces)))
 
 
 def _varied(parameters: tuple[Parameter, ...]) -> _Varied:

@@ -9,6 +9,7 @@ anew and readings rounded, and the same differentiation is applied to the result
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -50,6 +51,24 @@ def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Fl
         return smoothed.noise, False
     median = np.median(sizes, axis=0)
     return np.where(median > 0, median, smoothed.noise), True
+
+
+def position_floor(
+    model: Model, traces: Sequence[Trace], error_of: Callable[[Sequence[Trace]], Floats]
+) -> Floats | None:
+    """Mean square of each joint's position residual if the model is right, rad² (m²); None where the model cannot be
+    simulated along the records.
+
+    Args:
+        error_of: mean squares of the joints that count, by this model, on traces.
+    """
+    rng = np.random.default_rng(SEED)
+    seconds = sum(float(t.time[-1] - t.time[0]) for t in traces)
+    replicas = int(np.clip(SECONDS / seconds, FEWEST, MOST)) // 2
+    try:
+        return np.mean([error_of([_made_by(model, t, rng) for t in traces]) for _ in range(replicas)], axis=0)
+    except DaqError:
+        return None
 
 
 def _made_by(model: Model, trace: Trace, rng: np.random.Generator) -> Trace:

@@ -460,7 +460,7 @@ def _models() -> list[BaseModel]:
 
 
 def _comparison() -> ComparisonJobResult:
-    joint = JointAgreement(joint=1, unit="rad", rmse=0.004, largest=0.011, floor=0.001, count=0.0046, share=0.0008)
+    joint = JointAgreement(joint=1, unit="rad", rmse=0.004, largest=0.011, floor=0.001, count=0.0046, share=0.028)
     agreement = ModelAgreement(
         label=f"with friction ({MODEL})",
         model=MODEL,

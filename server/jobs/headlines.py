@@ -21,13 +21,14 @@ def of_fit(found: FitResult, comparison: Comparison) -> str:
     held = before.held_out is not None and after.held_out is not None
     errors = (before.held_out, after.held_out) if held else (before.in_sample, after.in_sample)
     change = " → ".join("?" if joints is None else _error(joints) for joints in errors)
-    return f"{known} of {len(found.parameters)} parameters known; error {change}{', held out' if held else ''}"
+    told = f"{known} of {len(found.parameters)} parameters known; error {change}{', held out' if held else ''}"
+    return told if found.verdict is None else f"{found.verdict.headline}; {told}"
 
 
 def of_validation(found: Fidelity) -> str:
-    """Says whether expected deviations explain the residual."""
-    said = "expected deviations explain the residual" if found.explains else "the model lacks something"
-    return f"Σλ² = {found.sum_of_contributions:.3g}: {said}"
+    """Says whether the model explains the records."""
+    total = f"Σλ² = {found.sum_of_contributions:.3g}"
+    return total if found.verdict is None else f"{found.verdict.headline}; {total}"
 
 
 def of_comparison(found: Comparison) -> str:

@@ -69,7 +69,8 @@ class Mail:
         told = Notification.model_validate(json.loads(message.payload)["data"])
         mail = EmailMessage()
         mail["From"], mail["To"] = self._smtp.sender, self._to
-        mail["Subject"] = f"{told.robot or 'MA2000 DAQ'}: {SUBJECTS[told.kind]} ({told.topic})"
+        robot = "".join(sign if sign.isprintable() else " " for sign in told.robot or "MA2000 DAQ")
+        mail["Subject"] = f"{robot}: {SUBJECTS[told.kind]} ({told.topic})"
         mail["Date"] = format_datetime(message.created)
         mail["Message-ID"] = f"<{message.id}@{self._smtp.sender.rpartition('@')[2]}>"
         mail["Auto-Submitted"] = "auto-generated"  # RFC 3834: nobody's absence is answered

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -86,6 +87,32 @@ def test_what_a_notebook_shows_of_a_machine_or_model_is_short() -> None:
     )
     assert len(repr(model)) < 500
     assert model.identity in repr(model)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "words"),
+    [
+        (
+            "ExperimentSpec",
+            {"trajectory": {"kind": "ramp", "amplitude": 10}},
+            "trajectory.amplitude: must lie between -360° and 360°, that is ±6.283 rad (got 10 rad, 572.958°)",
+        ),
+        ("ExperimentSpec", {"amplitude": 0.1}, "amplitude: Extra inputs are not permitted"),
+        ("FitOptions", {"starts": 0}, "starts: "),
+        ("DesignOptions", {"duration": -1}, "duration: "),
+        ("DiagnosisOptions", {"joints": 3}, "joints: "),
+        ("FitRequest", {"traces": "all"}, "traces: "),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(name: str, given: dict[str, Any], words: str) -> None:
+    with pytest.raises(ma2000.DaqError) as refused:
+        getattr(ma2000, name)(**given)
+    assert str(refused.value).startswith(f"{name}: {words}")
+    assert str(refused.value).isprintable()
+
+
+def test_the_presets_are_printed_on_a_page() -> None:
+    assert len(str(ma2000.PRESETS)) < 2000
 
 
 @pytest.mark.slow

@@ -7,11 +7,15 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import AfterValidator, AwareDatetime, Field
 
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import FrozenRecord, SpokenRecord
 
 
 class Wire(FrozenRecord):
     """A message of the service. Unknown fields are refused, never ignored."""
+
+
+class SpokenWire(Wire, SpokenRecord):
+    """A message that people make in their programs."""
 
 
 def _has_utc(moment: datetime) -> datetime:

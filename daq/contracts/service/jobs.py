@@ -8,7 +8,7 @@ from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool, model_valida
 
 from daq.contracts.experiment import JointNumber
 from daq.contracts.labels import Outcome, Source, Tag
-from daq.contracts.service.base import Moment, Wire
+from daq.contracts.service.base import Moment, SpokenWire, Wire
 
 JobKind = Literal["fit", "validate", "compare", "diagnose", "batch"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
@@ -35,7 +35,7 @@ class EffectChoice(Wire):
     joints: tuple[JointNumber, ...] = ()
 
 
-class FitStudy(Wire):
+class FitStudy(SpokenWire):
     """How parameters are estimated with which a model best reproduces traces. The fields are the options of
     `daq fit`."""
 
@@ -55,7 +55,7 @@ class FitStudy(Wire):
     """Find only bodies that can exist."""
 
 
-class ValidateStudy(Wire):
+class ValidateStudy(SpokenWire):
     """How a model is validated against traces. The fields are the options of `daq validate`."""
 
     kind: Literal["validate"] = "validate"
@@ -73,7 +73,7 @@ class SimulateStudy(Wire):
     """Whether readings and drive are rounded, as those of a real board."""
 
 
-class DiagnoseStudy(Wire):
+class DiagnoseStudy(SpokenWire):
     """How a missing effect is looked for. The fields are the options of `daq diagnose`."""
 
     kind: Literal["diagnose"] = "diagnose"
@@ -109,7 +109,7 @@ class ValidateRequest(ValidateStudy):
     model: ModelNumber
 
 
-class CompareRequest(Wire):
+class CompareRequest(SpokenWire):
     """Compares one model or several with the same traces, by simulation."""
 
     kind: Literal["compare"] = "compare"
@@ -142,7 +142,7 @@ class TraceFilter(Wire):
     until: Moment | None = None
 
 
-class BatchRequest(Wire):
+class BatchRequest(SpokenWire):
     """Studies many traces, each by itself: a table with a row for each is the result. A trace that cannot be studied
     has its problem in its row, and keeps no other from being studied."""
 

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 from daq.contracts.trace import Trace
 from model.discrepancy.grounds import Note
-from model.discrepancy.thresholds import FAR_OFF
 from model.machine_model.parameter import Parameter
+from model.machine_model.record_verdict import FAR_OFF
 
 
 class _Expected(Protocol):

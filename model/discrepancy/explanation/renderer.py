@@ -83,16 +83,34 @@ def step_with_sentences(step: Step) -> Step:
 
 
 def _gap_with_names(gap: Gap) -> Gap:
-    """The gap with the names of its stages."""
-    named = {"given": "model as given", "fitted": "its numbers fitted"}
-    return gap.model_copy(
-        update={
-            "stages": tuple(
-                s.model_copy(update={"name": named.get(s.kind, f"+ {placed(s.effect or '', s.joints)}")})
-                for s in gap.stages
-            )
-        }
+    """The gap with the names of its stages, and the alternative in words."""
+    named = {"given": "model as given", "fitted": "its numbers fitted", "refitted": "everything refitted"}
+    stages = tuple(
+        s.model_copy(update={"name": named.get(s.kind, f"+ {placed(s.effect or '', s.joints)}")}) for s in gap.stages
     )
+    without = None if gap.without is None else gap.without.model_copy(update={"text": _without_words(gap)})
+    return gap.model_copy(update={"stages": stages, "without": without})
+
+
+def _without_words(gap: Gap) -> str:
+    """What the numbers would have had to become without the effects, and what that leaves."""
+    without = gap.without
+    assert without is not None
+    errors = []
+    for place, joint in enumerate(gap.joints):
+        factor, unit = shown_unit(gap.units[place])
+        sizes = (without.fitted[place], gap.stages[-1].fitted[place])
+        alone, whole = ("–" if v is None else with_unit(plain(v * factor), unit) for v in sizes)
+        errors.append(f"joint {joint} {alone} (with: {whole})")
+    left = f"Without the effect, fitted numbers alone leave {', '.join(errors)}"
+    if not without.numbers:
+        return f"{left}; no number would have to move by more than a stated deviation."
+    moved = [
+        f"{n.name} {plain(n.without, 3)}{'' if n.unit == '1' else f' {n.unit}'} for {plain(n.stated, 3)} ± "
+        f"{plain(n.deviation)} (with it: {plain(n.fitted, 3)})"
+        for n in without.numbers
+    ]
+    return f"{left}. The numbers would have had to become {'; '.join(moved)}."
 
 
 def where_with_summary(where: Where) -> Where:

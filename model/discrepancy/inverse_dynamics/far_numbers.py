@@ -5,7 +5,7 @@ from __future__ import annotations
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
-from model.discrepancy.thresholds import FAR_OFF
+from model.machine_model.record_verdict import FAR_OFF
 
 NEARLY_ALL = 0.9
 """Share of an effect's evidence from priors, above which stated numbers imitate it."""

@@ -18,8 +18,8 @@ from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
-from model.discrepancy.thresholds import FAR_OFF
 from model.inverse_dynamics.drive_timing import expected_timing
+from model.machine_model.record_verdict import FAR_OFF
 
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of

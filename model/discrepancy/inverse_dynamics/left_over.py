@@ -13,8 +13,8 @@ from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, bends_w
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.resolution import ends_at_bound
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.discrepancy.thresholds import FAR_OFF
 from model.effects.library import find_named_effect
+from model.machine_model.record_verdict import FAR_OFF
 
 FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:

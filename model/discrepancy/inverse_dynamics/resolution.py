@@ -16,12 +16,12 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.holdout import mean_squares
 from model.discrepancy.inverse_dynamics.likelihood import minus_twice_log_likelihood, noise_model
 from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
-from model.discrepancy.thresholds import FAR_OFF
 from model.inverse_dynamics.drive_timing import DELAY, MOST
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.machine_model.record_verdict import FAR_OFF
 
 OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_inductance"})
 """Effects whose torque follows how a torque changes in time: they cut short or shift what is fast, and noise of

@@ -21,10 +21,10 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, SignalError, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.sampled_controller import controller_numbers
-from model.discrepancy.thresholds import FAR_OFF
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
 from model.machine_model.nominal import gain_error
+from model.machine_model.record_verdict import FAR_OFF
 
 COUNTS_OF_ROUNDING = 1.5
 """Counts by which a recorded error may differ: set points are rounded to posture units, and those to counts."""

@@ -7,13 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.discrepancy.diagnosis import Gap, GapStage, Step
+from model.discrepancy.diagnosis import Gap, GapNumber, GapStage, GapWithout, Step
+from model.discrepancy.gap_numbers import gap_numbers
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.observation import Observation, Signals
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.output_error.search import Point, descend, point_at
+
+MOST_STEPS = 6
+"""Steps of the fit within what a file states: it begins near its end."""
 
 
-def closed_loop_gap(case: Case, first: Point, taken: Sequence[tuple[Step, Point]]) -> Gap:
+def closed_loop_gap(case: Case, first: Point, taken: Sequence[tuple[Step, Point]], end: Point) -> Gap:
     """The gap of the closed loop, simulated from set points and initial postures and from nothing else of the record.
 
     The search itself lets the simulation follow a share of the record, so that a simulation with a wrong effect stays
@@ -21,28 +26,37 @@ def closed_loop_gap(case: Case, first: Point, taken: Sequence[tuple[Step, Point]
 
     Args:
         first: the point before any effect was added. taken: the steps in the resulting model, each with the point after
-            it.
+            it, its numbers within what the file states. end: the point of the resulting model.
     """
     alone = _alone(case.scoring)
     held = None if case.held is None else replace(case.held, observation=_alone(case.held.observation))
 
-    def stage(begun: GapStage, point: Point) -> GapStage:
-        own = _errors(alone, alone.residuals(point))
+    def errors(point: Point) -> dict[str, tuple[float | None, ...]]:
         theirs = () if held is None else _errors(held.observation, held.residuals(point))
-        return begun.model_copy(update={"fitted": own, "held_out": theirs})
+        return {"fitted": _errors(alone, alone.residuals(point)), "held_out": theirs}
 
-    joints = case.scoring.machine.modelled_joints
+    effects = [GapStage(kind="effect", effect=s.effect, joints=s.joints, **errors(p)) for s, p in taken]
+    joints, last = case.scoring.machine.modelled_joints, GapStage(kind="refitted" if taken else "fitted", **errors(end))
     return Gap(
         measure="closed-loop",
         joints=joints,
         units=tuple(case.scoring.units),
         noise=tuple(float(d) for d in case.scoring.sizes),
-        stages=(
-            stage(GapStage(kind="given", fitted=()), case.given),
-            stage(GapStage(kind="fitted", fitted=()), first),
-            *(stage(GapStage(kind="effect", effect=s.effect, joints=s.joints, fitted=()), p) for s, p in taken),
-        ),
+        stages=(GapStage(kind="given", **errors(case.given)), *effects, last),
+        without=GapWithout(**errors(first), numbers=_numbers(first, end)) if taken else None,
     )
+
+
+def within_file(point: Point) -> Point:
+    """The point fitted again with its numbers within one deviation of what the machine file states."""
+    unknowns = tuple(u.within_stated for u in point.unknowns)
+    values = np.clip(point.values, [u.low for u in unknowns], [u.high for u in unknowns])
+    begun = point_at(point.observation, Calibration(point.model, unknowns, values), point.tangents)
+    return descend(begun, MOST_STEPS) if begun.is_finite else begun
+
+
+def _numbers(first: Point, end: Point) -> tuple[GapNumber, ...]:
+    return gap_numbers(end.model.machine, first.by_name, end.by_name)
 
 
 def _alone(observation: Observation) -> Observation:

@@ -35,7 +35,7 @@ from model.discrepancy.output_error.controller_evidence import (
     with_findings,
     with_used_set_points,
 )
-from model.discrepancy.output_error.gap import closed_loop_gap
+from model.discrepancy.output_error.gap import closed_loop_gap, within_file
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.recorded_power import with_power
@@ -304,7 +304,7 @@ def _answer(
         holdout=tuple(t.record.trace_id for t in case.held_traces),
         rmse_fit=case.fitted_errors(case.given, end),
         rmse_holdout=held,
-        gap=closed_loop_gap(case, found.first.point, found.taken),
+        gap=closed_loop_gap(case, found.first.point, [(s, within_file(p)) for s, p in found.taken], end),
         significant=case.thresholds.significant,
         seconds=0.0,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq_cli.models.parameter_table import print_far_numbers
-from model.fitting.result import FittedParameter
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import SINGLE_AXIS
 
@@ -74,20 +72,3 @@ def test_an_error_calls_a_trace_as_the_command_line_does(daq: CommandLine) -> No
     daq("diagnose", "swing.csv", "--model", SINGLE_AXIS, "--holdout", "swing.csv").complains(
         2, "daq: swing.csv: is both fitted to and held out"
     )
-
-
-@pytest.mark.parametrize(("value", "warned"), [(1.6, False), (2.5, True), (None, False)])
-def test_a_number_far_from_what_its_file_states_is_a_warning(
-    value: float | None, warned: bool, capsys: pytest.CaptureFixture[str]
-) -> None:
-    mass = FittedParameter(
-        **{"name": "link1.mass", "unit": "kg", "verdict": "known" if value else "unknown", "reason": ""},
-        **{"value": value, "deviation": 0.01, "low": 0.0, "high": 9.0, "model_value": value or 2.5, "before": 1.5},
-        **{"expected": 1.5, "expected_deviation": 0.1, "at_bound": None},
-    )
-    print_far_numbers([mass])
-    printed = capsys.readouterr().out
-    assert printed.startswith("WARNING This number came out more than 4 of its stated deviations") == warned
-    assert ("link1.mass 2.5 kg (10 deviations; 1.5 stated)" in printed) == warned
-    print_far_numbers([mass.model_copy(update={"name": "joint1.coulomb_friction.torque", "expected": 0.0})])
-    assert not capsys.readouterr().out, "nothing is stated of it"

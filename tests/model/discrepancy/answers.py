@@ -14,6 +14,7 @@ from model.discrepancy.diagnosis import (
     FoundValue,
     Gap,
     GapStage,
+    GapWithout,
     NextExperiment,
     SignalError,
 )
@@ -108,7 +109,7 @@ def residual(model: Model, trace: Trace) -> np.ndarray:
 
 
 def _gap(comparison: Comparison) -> Gap:
-    """No tolerance parameter was fitted: the first two stages are alike."""
+    """No number was fitted: the last two stages are alike."""
     fitted, held = _errors(comparison, "in_sample"), _errors(comparison, "held_out")
     before = {"fitted": tuple(e.before for e in fitted), "held_out": tuple(e.before for e in held)}
     after = {"fitted": tuple(e.after for e in fitted), "held_out": tuple(e.after for e in held)}
@@ -119,9 +120,10 @@ def _gap(comparison: Comparison) -> Gap:
         noise=tuple(e.floor for e in fitted),
         stages=(
             GapStage(kind="given", **before),
-            GapStage(kind="fitted", **before),
             GapStage(kind="effect", effect=EFFECT, joints=(2,), **after),
+            GapStage(kind="refitted", **after),
         ),
+        without=GapWithout(**before),
     )
 
 

@@ -46,7 +46,14 @@ def test_what_is_left_is_the_noise_of_the_sensor(result: FitResult) -> None:
     assert result.whitened_mean_square == pytest.approx(1.0, abs=0.1)
     for error in result.errors:
         assert error.after < 1.35 * error.floor
+        assert 0.8 < error.after / (error.noise or 0.0) < 1.15
     assert result.errors[1].before > 4 * result.errors[1].floor
+    assert result.verdict is not None
+    assert result.verdict.explains
+    assert [n.name for n in result.verdict.far] == ["joint2.motor.back_emf_constant"], (
+        "which the records were made with"
+    )
+    assert result.verdict.text in str(result)
 
 
 def test_the_fitted_model_says_where_it_comes_from(result: FitResult) -> None:

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, parse_machine
 from daq.contracts.trace import Trace
 from model.fitting.fit import fit, fit_problem
-from model.fitting.noise import expected_residual
+from model.fitting.noise import noise_effect
 from model.fitting.options import FitOptions
 from model.fitting.records import resolution
 from model.fitting.result import FitResult, is_result, load_result
@@ -124,15 +124,18 @@ def test_what_was_simulated_with_derivatives_is_not_simulated_again_without() ->
 
 def test_what_the_noise_does_on_average_is_the_mean_over_replicas_of_the_model_as_the_arm() -> None:
     problem, values = problem_of(NOISY), np.array([1.0])
-    (mean,) = expected_residual(problem, values, 3, seed=4)
-    rng, total = np.random.default_rng([4, 7]), 0.0
+    found = noise_effect(problem, values, 3, seed=4)
+    (mean,) = found.mean
+    rng, total, square = np.random.default_rng([4, 7]), 0.0, 0.0
     for _ in range(3):
         readings = problem.noisy_readings(values, rng)
-        total = total + problem.with_readings(readings).evaluate(values, False)[0].residual
+        own = problem.with_readings(readings).evaluate(values, False)[0].residual
+        total, square = total + own, square + (own**2).mean(axis=0)
     np.testing.assert_allclose(mean, total / 3)
-    (offset,) = expected_residual(problem.with_offset([np.ones_like(mean)]), values, 3, seed=4)
+    np.testing.assert_allclose(found.size, np.sqrt(square / 3))
+    (offset,) = noise_effect(problem.with_offset([np.ones_like(mean)]), values, 3, seed=4).mean
     np.testing.assert_array_equal(offset, mean)  # an offset of before takes no part
-    assert not np.array_equal(expected_residual(problem, values, 3, seed=5)[0], mean)
+    assert not np.array_equal(noise_effect(problem, values, 3, seed=5).mean[0], mean)
     assert np.abs(mean).max() < 3 * resolution_of(problem)
 
 

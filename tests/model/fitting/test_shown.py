@@ -1,4 +1,4 @@
-"""What a notebook and `print` show of a fit: the numbers that the data determine, and none for the others."""
+"""What a notebook and `print` show of a fit: the numbers, in brackets those that the data do not determine."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def test_the_table_in_a_terminal_has_numbers_where_the_data_determine_one() -> N
     assert head.split() == ["parameter", "value", "95", "%", "interval", "unit", "before"]
     assert [row.split() for row in rows] == [
         ["load.mass", "1.2504", "1.2368", "to", "1.2639", "kg", "1.25"],
-        ["<b>.back_emf", "–", "–", "V·s/rad", "0.0334", "only", "in", "combination"],
-        ["arm", "0", "0", "to", "0.0196", "m", "0.1", "at", "its", "lower", "bound"],
+        ["<b>.back_emf", "(1)", "only", "in", "combination", "V·s/rad", "0.0334"],
+        ["arm", "0", "0", "to", "0.0196,", "at", "its", "lower", "bound", "m", "0.1"],
     ]
     assert len({row.rindex(f" {unit} ") for row, unit in zip(rows, ("kg", "V·s/rad", "m"), strict=True)}) == 1
     assert below == "not determined: together a +1 %, <b> −1 %"
@@ -42,8 +42,8 @@ def test_the_table_of_a_notebook_has_the_same_and_names_are_no_html() -> None:
     page = ET.fromstring(html_of("FitResult <of it>", (LOAD, EMF, ARM), REPORT))
     rows = [["".join(cell.itertext()) for cell in row] for row in page.iter("tr")]
     assert rows[0][:4] == ["parameter", "value", "95 % interval", "unit"]
-    assert rows[1] == ["load.mass", "1.2504", "1.2368 to 1.2639", "kg", "1.25", ""]
-    assert rows[2][1:3] == ["–", "–"]
+    assert rows[1] == ["load.mass", "1.2504", "1.2368 to 1.2639", "kg", "1.25"]
+    assert rows[2][1:3] == ["(1)", "only in combination"]
     text = "".join(page.itertext())
     assert text.startswith("FitResult <of it>")
     assert text.endswith("not determined: together a +1 %, <b> −1 %")
@@ -57,5 +57,5 @@ def test_a_fit_that_ends_farther_from_its_records_than_it_began_is_doubted() -> 
     assert doubt_of((error(1, 0.1, 0.01), error(2, 0.010, 0.012), error(3, 0.0001, 0.002))) == ""
     line = doubt_of((error(1, 0.1, 0.01), error(2, 0.1, 0.7)))
     assert line.startswith("the fitted model is farther from the records than before (joint 2): do not use its values.")
-    page = ET.fromstring(html_of("fit", (LOAD,), REPORT, line))
+    page = ET.fromstring(html_of("fit", (LOAD,), REPORT, [f"WARNING {line}"]))
     assert "".join(page.itertext()).endswith(f"WARNING {line}")

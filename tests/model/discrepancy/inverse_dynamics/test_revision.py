@@ -74,10 +74,17 @@ def test_an_effect_with_several_sizes_a_joint_is_split_by_joint() -> None:
 
 def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() -> None:
     found = slide(("coulomb_friction", "periodic_disturbance"), coulomb=6.0, hum=8.5)
-    assert found.gap is not None
-    for errors in ([s.fitted[0] for s in found.gap.stages], [s.held_out[0] for s in found.gap.stages]):
-        _, fitted, first, second = [error or 0.0 for error in errors]
-        assert fitted > 1.2 * first > 1.2 * 1.2 * second > 0.0
+    gap = found.gap
+    assert gap is not None
+    assert gap.without is not None
+    assert [s.kind for s in gap.stages] == ["given", "effect", "effect", "refitted"]
+    for kind, noisier in (("fitted", 1.05), ("held_out", 1.2)):
+        given, first, second, whole = (getattr(s, kind)[0] or 0.0 for s in gap.stages)
+        alone = getattr(gap.without, kind)[0] or 0.0
+        assert given > 1.2 * first > 1.2 * 1.2 * second > 0.0
+        assert noisier * second > whole > 0.0, "the numbers as the file states them leave hardly more"
+        assert alone > 1.2 * first, "numbers alone do not do it"
+    assert "Without the effect, fitted numbers alone leave" in gap.without.text
     earlier, later = (s for s in found.steps if s.adopted)
     assert later.rmse_fit[0].before == pytest.approx(earlier.rmse_fit[0].after)
 

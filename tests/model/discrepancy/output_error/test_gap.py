@@ -12,9 +12,9 @@ from daq.contracts.machine import Machine
 from model.arrays import Floats
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.case import Case
-from model.discrepancy.output_error.gap import closed_loop_gap
+from model.discrepancy.output_error.gap import closed_loop_gap, within_file
 from model.discrepancy.output_error.observation import Signals, observe
-from model.discrepancy.output_error.search import Point, point_at
+from model.discrepancy.output_error.search import Point, converge, point_at
 from tests.model.discrepancy.steps import step
 from tests.model.fitting import imagined
 
@@ -42,7 +42,7 @@ def test_what_the_readings_say_beside_the_motion_is_the_gap_whatever_the_search_
         floor_held=np.zeros(0),
         options=DiagnosisOptions(),
     )
-    gap = closed_loop_gap(case, begin, [])
+    gap = closed_loop_gap(case, begin, [], begin)
     for stage in gap.stages:
         assert stage.fitted == pytest.approx((WAVE, 0.0, 2 * WAVE), rel=0.01, abs=5e-4)
         assert stage.held_out == ()
@@ -89,6 +89,7 @@ FITTED = {
     "given": of((3.0, 4.0), (5.0, -5.0), (0.0, 2.0)),
     "fitted": of((1.0, 1.0), (1.0, -1.0), (np.inf, 1.0)),
     "friction": of((0.6, 0.8), (0.0, 0.0), (7.0, 1.0)),
+    "end": of((0.3, 0.4), (0.0, 0.0), (7.0, 1.0)),
 }
 HELD = {name: (10.0 * signals[0],) for name, signals in FITTED.items()}
 
@@ -108,17 +109,34 @@ def case_of(held: Held | None) -> Case:
 
 
 @pytest.mark.parametrize("held", [Held(Readings(HELD)), None], ids=["held-out", "none"])
-def test_each_stage_has_the_root_mean_square_of_its_own_point(held: Held | None) -> None:
+def test_each_stage_has_the_root_mean_square_of_its_own_point(
+    held: Held | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     taken = [(step("coulomb_friction", (2,)), cast(Point, "friction"))]
-    gap = closed_loop_gap(case_of(held), cast(Point, "fitted"), taken)
-    rms = [(12.5**0.5, 5.0, 2.0**0.5), (1.0, 1.0, None), (0.5**0.5, 0.0, 5.0)]
+    monkeypatch.setattr("model.discrepancy.output_error.gap._numbers", lambda *_points: ())
+    gap = closed_loop_gap(case_of(held), cast(Point, "fitted"), taken, cast(Point, "end"))
+    rms = [(12.5**0.5, 5.0, 2.0**0.5), (0.5**0.5, 0.0, 5.0), (0.125**0.5, 0.0, 5.0)]
     assert [(s.kind, s.effect, s.joints) for s in gap.stages] == [
         ("given", None, ()),
-        ("fitted", None, ()),
         ("effect", "coulomb_friction", (2,)),
+        ("refitted", None, ()),
     ]
+    assert gap.without is not None
+    assert gap.without.fitted == (1.0, 1.0, None), "the numbers alone"
     for stage, numbers in zip(gap.stages, rms, strict=True):
         assert list(stage.fitted) == [n if n is None else pytest.approx(n) for n in numbers]
         theirs = [] if held is None else [n if n is None else pytest.approx(10 * n) for n in numbers]
         assert list(stage.held_out) == theirs
     assert gap.noise == (0.1, 0.2, 0.3)
+
+
+def test_within_what_the_file_states_no_number_is_further_off_than_one_deviation() -> None:
+    """The record is of a heavier arm: numbers that are free go far from the file, and these do not."""
+    heavy = imagined.arm().with_values({"link2.mass": 4.0 * imagined.arm().parameter("link2.mass").value})
+    observation, given = observe(imagined.arm(), [imagined.trace(heavy, seconds=3.0)])
+    free = converge(point_at(observation, given.at(np.array([u.start for u in given.unknowns]))), 4)
+    bounded = within_file(free)
+    distance = np.abs(bounded.values - bounded.expected) * np.sqrt(bounded.precision)
+    assert free.strain > 1.0
+    assert distance.max() <= 1.0 + 1e-9
+    assert bounded.cost <= free.at_expected().cost

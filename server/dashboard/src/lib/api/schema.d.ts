@@ -2862,6 +2862,23 @@ export interface components {
             feedforward?: components["schemas"]["Feedforward"] | null;
         };
         /**
+         * FarNumber
+         * @description A number of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
+         *     `deviation`: of the file; all in `unit`.
+         */
+        FarNumber: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number;
+            /** Stated */
+            stated: number;
+            /** Deviation */
+            deviation: number;
+        };
+        /**
          * Feedforward
          * @description Where a path's set points come from: they were computed so that the arm follows another experiment's motion.
          *
@@ -2889,7 +2906,8 @@ export interface components {
          * @description The transfer-function form of the distortion method for one model and its traces.
          *
          *     `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum.
-         *     The model explains the record when `sum_of_contributions` (Σλ²) is at least 1.
+         *     Expected deviations of the parameters explain what is left when `sum_of_contributions` (Σλ²) is at least 1.
+         *     `verdict`: whether there is more left than noise; None in results of older versions.
          */
         Fidelity: {
             /** Model */
@@ -2923,6 +2941,7 @@ export interface components {
              * @default []
              */
             notes?: string[];
+            verdict?: components["schemas"]["RecordVerdict"] | null;
         };
         /**
          * FieldProblem
@@ -2951,6 +2970,7 @@ export interface components {
             identifiability: components["schemas"]["IdentifiabilityReport"];
             /** Errors */
             errors: components["schemas"]["JointError"][];
+            verdict?: components["schemas"]["RecordVerdict"] | null;
             /** Whitened Mean Square */
             whitened_mean_square: number;
             /** Names */
@@ -3489,7 +3509,8 @@ export interface components {
          * @description The gap between simulation and measurement, and how it shrinks from stage to stage.
          *
          *     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
-         *     `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance.
+         *     `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance. `without`: the
+         *     alternative to the effects; None where none was added, and in older answers.
          */
         Gap: {
             /**
@@ -3505,21 +3526,42 @@ export interface components {
             noise: number[];
             /** Stages */
             stages: components["schemas"]["GapStage"][];
+            without?: components["schemas"]["GapWithout"] | null;
+        };
+        /**
+         * GapNumber
+         * @description A number of the machine file: as `stated`, with its `deviation`; what it would have had to become `without` the
+         *     effects; and with them (`fitted`). All in `unit`.
+         */
+        GapNumber: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /** Stated */
+            stated: number;
+            /** Deviation */
+            deviation: number;
+            /** Without */
+            without: number;
+            /** Fitted */
+            fitted: number;
         };
         /**
          * GapStage
          * @description The error of one model on the way from the given to the resulting one: root mean square by joint of the `Gap`, on
          *     traces fitted to and on held-out ones (empty without any); None where it is not finite.
          *
-         *     `kind`: the model as given; with its tolerance parameters fitted; or with `effect` on `joints` added to the stage
-         *     before.
+         *     `kind`: the model as given; with `effect` on `joints` added to the stage before, and its numbers fitted within one
+         *     stated deviation of the machine file; with everything refitted. Without an effect: with its numbers `fitted`, which
+         *     in older answers comes before the effects, too.
          */
         GapStage: {
             /**
              * Kind
              * @enum {string}
              */
-            kind: "given" | "fitted" | "effect";
+            kind: "given" | "fitted" | "effect" | "refitted";
             /**
              * Name
              * @default
@@ -3539,6 +3581,30 @@ export interface components {
              * @default []
              */
             held_out?: (number | null)[];
+        };
+        /**
+         * GapWithout
+         * @description What the numbers alone would make of the records, without any effect: errors as in a stage, and the numbers that
+         *     would have had to move by more than a stated deviation, the furthest first.
+         */
+        GapWithout: {
+            /** Fitted */
+            fitted: (number | null)[];
+            /**
+             * Held Out
+             * @default []
+             */
+            held_out?: (number | null)[];
+            /**
+             * Numbers
+             * @default []
+             */
+            numbers?: components["schemas"]["GapNumber"][];
+            /**
+             * Text
+             * @default
+             */
+            text?: string;
         };
         /**
          * Geometry
@@ -3779,8 +3845,8 @@ export interface components {
          * @description One joint over one or more traces.
          *
          *     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-         *     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of the residual divided by
-         *     that of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+         *     count of the sensor (None where it has none), all in `unit`. `share` is `rmse` divided by the root mean
+         *     square of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
          */
         JointAgreement: {
             /** Joint */
@@ -3801,7 +3867,7 @@ export interface components {
         /**
          * JointError
          * @description Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
-         *     itself.
+         *     itself. `noise`: what a right model would leave, where noise goes round the loop; None in older results.
          */
         JointError: {
             /** Joint */
@@ -3814,6 +3880,8 @@ export interface components {
             after: number;
             /** Floor */
             floor: number;
+            /** Noise */
+            noise?: number | null;
         };
         /**
          * JointFigureSet
@@ -3858,6 +3926,21 @@ export interface components {
                     number
                 ];
             };
+        };
+        /**
+         * JointLeft
+         * @description What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
+         *     of records that the model itself had made; both in `unit`.
+         */
+        JointLeft: {
+            /** Joint */
+            joint: number;
+            /** Unit */
+            unit: string;
+            /** Rms */
+            rms: number;
+            /** Noise */
+            noise: number;
         };
         /**
          * JointLimits
@@ -5211,6 +5294,23 @@ export interface components {
             time: number;
             /** Experiment */
             experiment: string | null;
+        };
+        /**
+         * RecordVerdict
+         * @description Whether a model explains records within their noise.
+         *
+         *     `left`: joints with more than noise, the worst first. `far`: numbers of the model far from the machine file, the
+         *     furthest first: they may have taken the place of an effect. `text`: the same in one to three sentences.
+         */
+        RecordVerdict: {
+            /** Explains */
+            explains: boolean;
+            /** Left */
+            left: components["schemas"]["JointLeft"][];
+            /** Far */
+            far: components["schemas"]["FarNumber"][];
+            /** Text */
+            text: string;
         };
         /**
          * RecordedPath

@@ -10,32 +10,35 @@ const gap = {
   stages: [
     { name: 'as given', kind: 'given', effect: null, joints: [], fitted: [4, 5], held_out: [6, 7] },
     {
-      name: 'tolerances fitted',
-      kind: 'fitted',
-      effect: null,
-      joints: [],
-      fitted: [3, 4],
-      held_out: [null, 5],
-    },
-    {
       name: '+ Coulomb friction, joint 2',
       kind: 'effect',
       effect: 'coulomb_friction',
       joints: [2],
+      fitted: [3, 4],
+      held_out: [null, 5],
+    },
+    {
+      name: 'everything refitted',
+      kind: 'refitted',
+      effect: null,
+      joints: [],
       fitted: [1, 1],
       held_out: [1, 2],
     },
   ],
+  without: { fitted: [3, 3], held_out: [], numbers: [], text: 'Without the effect, …' },
 };
 
 describe('the gap, step by step', () => {
-  it('goes from the model as given over its tolerances to every effect that was added', () => {
+  it('goes from the model as given over every effect that was added to everything refitted', () => {
     const found = gapOf({ gap } as unknown as DiagnosisData);
     expect(found.stages.map((one) => one.name)).toEqual([
       'as given',
-      'tolerances fitted',
       '+ Coulomb friction, joint 2',
+      'everything refitted',
     ]);
+    expect(found.stages.map((one) => one.label)).toEqual(['given', '+1', 'all']);
+    expect(found.without).toBe('Without the effect, …');
     expect(found.stages.map((one) => one.fit[0])).toEqual([4, 3, 1]);
     expect(found.stages.map((one) => one.held?.[0])).toEqual([6, null, 1]);
     expect(found.floor).toEqual([0.1, 0.2]);

@@ -4,6 +4,8 @@ import type { DiagnosisData } from '../api/types';
 
 export interface Stage {
   name: string;
+  /** Under a picture: effects are counted. */
+  label: string;
   /** Root mean square by joint, in the joint's unit, in the order of the joints; null where it is not finite. */
   fit: readonly (number | null)[];
   held: readonly (number | null)[] | null;
@@ -14,22 +16,35 @@ export interface Gap {
   units: readonly string[];
   floor: readonly number[];
   stages: readonly Stage[];
+  /** What the numbers would have had to become without the effects; empty where none was added. */
+  without: string;
 }
 
-/** The stages of a diagnosis: the model as given, its tolerances fitted, every effect that was added. */
+/** The stages of a diagnosis: the model as given, with every effect that was added, with everything refitted. */
 export function gapOf(found: DiagnosisData): Gap {
   const gap = found.gap;
-  if (!gap) return { joints: [], units: [], floor: [], stages: [] };
+  if (!gap) return { joints: [], units: [], floor: [], stages: [], without: '' };
   return {
     joints: gap.joints,
     units: gap.units,
     floor: gap.noise,
-    stages: gap.stages.map((stage) => ({
+    without: gap.without?.text ?? '',
+    stages: gap.stages.map((stage, place) => ({
       name: stage.name,
+      label: labelOf(
+        gap.stages.map((one) => one.kind),
+        place,
+      ),
       fit: stage.fitted,
       held: stage.held_out.length === 0 ? null : stage.held_out,
     })),
   };
+}
+
+function labelOf(kinds: readonly string[], place: number): string {
+  const kind = kinds[place]!;
+  if (kind === 'effect') return `+${kinds.slice(0, place + 1).filter((one) => one === 'effect').length}`;
+  return kind === 'refitted' ? 'all' : kind;
 }
 
 /** Share of the variance beyond noise that is gone; null where there was hardly any. */

@@ -1,0 +1,99 @@
+"""Tables of results that fit the terminal without cutting a word."""
+
+from __future__ import annotations
+
+import re
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+from rich.cells import cell_len
+from rich.text import Text
+
+from daq_cli.app.context import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+BESIDE = 2
+"""Columns between two cells: rich's padding of one on either side."""
+INDENT = "  "
+_JOINTS = re.compile(r"(?<=[./_-])(?=[^\W\d])")
+"""Where a name may go on in the next line: after a dot, a slash or an underline."""
+
+
+def print_fitting(table: Table, console: Console) -> None:
+    """Prints a table without a box as wide as the console. A name goes on in a second line after a dot or an underline,
+    prose after a word; a table that is wider still is printed row by row."""
+    for column in table.columns:
+        column._cells = [printable(cell) if isinstance(cell, str) else cell for cell in column.cells]
+    columns = [[str(column.header), *map(_text, column.cells)] for column in table.columns]
+    natural = [max(map(cell_len, column)) for column in columns]
+    texts = [column.justify == "left" for column in table.columns]
+    widths = _shrunk(natural, [_least(column) for column in columns], texts, console.width - BESIDE * len(columns))
+    if widths is None:
+        _print_rows(columns, console)
+        return
+    for column, width, wanted in zip(table.columns, widths, natural, strict=True):
+        if width < wanted:
+            column.width = width
+            column.no_wrap = False
+            column._cells = [_broken(cell, width) for cell in column.cells]
+    console.print(table)
+
+
+def _shrunk(natural: list[int], least: list[int], texts: list[bool], room: int) -> list[int] | None:
+    """Widths that fit together, the widest columns of text shrunk first; None where the least ones do not fit."""
+    if sum(least) > room:
+        return None
+    widths = list(natural)
+    while sum(widths) > room:
+        place = max((k for k, w in enumerate(widths) if w > least[k]), key=lambda k: (texts[k], widths[k]))
+        widths[place] -= 1
+    return widths
+
+
+def _least(column: list[str]) -> int:
+    """Width of the longest piece that is not broken."""
+    return max((cell_len(piece) for cell in column for word in cell.split() for piece in _pieces(word)), default=0)
+
+
+def _pieces(word: str) -> list[str]:
+    first, *others = _JOINTS.split(word)
+    return [first, *(INDENT + piece for piece in others)]
+
+
+def _broken(cell: object, width: int) -> object:
+    """The cell with line breaks after joints of its names, where a word is longer than the width."""
+    text = _text(cell)
+    if all(cell_len(word) <= width for word in text.split()):
+        return cell
+    lines = [""]
+    for word in text.split():
+        for number, piece in enumerate(_JOINTS.split(word)):
+            glue = " " if number == 0 and lines[-1].strip() else ""
+            if lines[-1].strip() and cell_len(lines[-1] + glue + piece) > width:
+                lines.append(INDENT)
+                glue = ""
+            lines[-1] += glue + piece
+    return Text("\n".join(lines), cell.style if isinstance(cell, Text) else "")
+
+
+def _text(cell: object) -> str:
+    return cell.plain if isinstance(cell, Text) else str(cell)
+
+
+def _print_rows(columns: list[list[str]], console: Console) -> None:
+    heads = [column[0] for column in columns]
+    for row in zip(*(column[1:] for column in columns), strict=True):
+        console.print(row[0], soft_wrap=True)
+        told = "; ".join(f"{head} {cell}".strip() for head, cell in list(zip(heads, row, strict=True))[1:] if cell)
+        for line in wrap(
+            told,
+            console.width,
+            initial_indent=INDENT,
+            subsequent_indent=INDENT,
+            break_long_words=False,
+            break_on_hyphens=False,
+        ):
+            console.print(line, soft_wrap=True)

@@ -1,0 +1,122 @@
+"""Whether a model explains records: what is left beside its noise, and numbers that went far from the file. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Self
+
+from daq.contracts.frozen import FrozenRecord
+from model.machine_model.model import Model, base_model
+from model.units import shown_unit, with_unit
+
+FAR_OFF = 4.0
+"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
+MORE_THAN_NOISE = 0.3
+"""Excess variance of a joint's error, relative to its noise, above which something is missing: what a nearly right law
+leaves stays below. Chosen on tuning arms, none of which is among those that report rates."""
+SCATTER = 4.0
+"""Standard deviations of an estimated variance, within which it may exceed its noise by chance."""
+
+
+class JointLeft(FrozenRecord):
+    """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
+    of records that the model itself had made; both in `unit`."""
+
+    joint: int
+    unit: str
+    rms: float
+    noise: float
+
+    @property
+    def in_noises(self) -> float:
+        """Residual over noise: about 1 where the model is right."""
+        return self.rms / self.noise if self.noise > 0.0 else math.inf
+
+
+class FarNumber(FrozenRecord):
+    """A number of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
+    `deviation`: of the file; all in `unit`."""
+
+    name: str
+    unit: str
+    value: float
+    stated: float
+    deviation: float
+
+    @property
+    def distance(self) -> float:
+        """Distance from the file in stated deviations."""
+        return abs(self.value - self.stated) / self.deviation
+
+    def __str__(self) -> str:
+        """The number beside that of the file."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.name} {self.value:.3g}{unit} (file: {self.stated:.3g} ± {self.deviation:.2g})"
+
+
+class RecordVerdict(FrozenRecord):
+    """Whether a model explains records within their noise.
+
+    `left`: joints with more than noise, the worst first. `far`: numbers of the model far from the machine file, the
+    furthest first: they may have taken the place of an effect. `text`: the same in one to three sentences.
+    """
+
+    explains: bool
+    left: tuple[JointLeft, ...]
+    far: tuple[FarNumber, ...]
+    text: str
+
+    @property
+    def headline(self) -> str:
+        """The verdict in a few words, for a list."""
+        if self.left:
+            return f"does not explain the records (joint{'s' if len(self.left) > 1 else ''} {self._joints})"
+        return "explains the records" + (", with numbers far from the file" if self.far else "")
+
+    @property
+    def _joints(self) -> str:
+        return ", ".join(str(one.joint) for one in self.left)
+
+    @classmethod
+    def of(cls, model: Model, errors: Sequence[JointLeft], samples: int) -> Self:
+        """The verdict on a model that leaves these errors of records with so many samples a joint.
+
+        A joint is left with more than noise where its excess variance is beyond the line from which a diagnosis looks
+        for a missing effect, and beyond the scatter of a variance of so many samples.
+        """
+        line = 1.0 + max(MORE_THAN_NOISE, SCATTER * math.sqrt(2.0 / max(samples, 1)))
+        left = sorted((e for e in errors if e.in_noises**2 > line), key=lambda e: e.in_noises, reverse=True)
+        far = far_numbers(model)
+        return cls(explains=not left, left=tuple(left), far=far, text=_text(left, far))
+
+
+def far_numbers(model: Model) -> tuple[FarNumber, ...]:
+    """Numbers of a model that are far from what its machine file states, the furthest first."""
+    stated = base_model(model.machine).by_name
+    found = [
+        FarNumber(name=p.name, unit=p.unit, value=p.value, stated=s.value, deviation=s.deviation)
+        for p in model.parameters
+        if (s := stated.get(p.name)) is not None and s.effect is None and s.deviation
+    ]
+    return tuple(sorted((n for n in found if n.distance > FAR_OFF), key=lambda n: n.distance, reverse=True))
+
+
+def _text(left: Sequence[JointLeft], far: Sequence[FarNumber]) -> str:
+    numbers = f"Numbers far from the machine file: {'; '.join(map(str, far))}."
+    if left:
+        joints = "; ".join(map(_left, left))
+        parts = [f"The model does not explain the records: {joints}.", "`daq diagnose` names what is missing."]
+        return " ".join([parts[0], *([numbers] if far else []), parts[1]])
+    if far:
+        return (
+            f"The model explains the records within their noise, but not with the numbers of the file. {numbers} "
+            "They may stand in for a missing effect: `daq diagnose` compares both."
+        )
+    return "The model explains the records within their noise."
+
+
+def _left(one: JointLeft) -> str:
+    factor, unit = shown_unit(one.unit)
+    size = with_unit(f"{one.rms * factor:.3g}", unit)
+    return f"joint {one.joint} is left with {one.in_noises:.2g} times its noise ({size})"
