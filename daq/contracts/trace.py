@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -55,6 +55,8 @@ EventKind = Literal[
 
 SLOW_LINE = "slow line: "
 """Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
+INCOMPLETE = "INCOMPLETE: "
+"""Beginning of the note on what an imported file promises, or once held, and does not give."""
 LATE_SET_POINTS = "late_set_points"
 """Counter of the control periods that used an older set point than the one that was sent for them. A record lacks it
 where that is not known."""
@@ -108,6 +110,10 @@ class TraceRecord(FrozenRecord):
     operator: str | None = None
     machine: Machine | None = None
     memory_map: dict[str, object] | None = None
+    joint_names: Annotated[tuple[str, ...], Field(exclude_if=lambda names: not names)] = ()
+    """What an imported file calls the joints, in the order of the columns; empty where it does not name them."""
+    joints_chosen: Annotated[bool, Field(exclude_if=lambda chosen: not chosen)] = False
+    """Whether a person gave the order of the joints, so that names may be others than the machine's."""
     spec: ExperimentSpec | None = None
     gains: dict[int, ReportedGain] | None = None
     """P, I, D of each joint, as the controller reported them."""
@@ -124,7 +130,7 @@ class TraceRecord(FrozenRecord):
     """The link's counters at the end of the record."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trace:
     """Signals of n samples on the joints `joints` (numbers from 1), one column each, in that order.
 
@@ -160,7 +166,7 @@ class Trace:
     status: Integers | None = None
     taken: Integers | None = None
     events: tuple[TraceEvent, ...] = field(default=())
-    file: str = field(default="", compare=False)
+    file: str = ""
 
     def __repr__(self) -> str:
         """One line: a notebook shows it, and an array of every signal would fill the page."""
@@ -215,6 +221,17 @@ class Trace:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether another trace has the same record, joints, events and numbers; what its file is called is no part."""
+        if not isinstance(other, Trace):
+            return NotImplemented
+        return all(
+            _same(getattr(self, one.name), getattr(other, one.name)) for one in fields(self) if one.name != "file"
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.record.trace_id, self.joints, len(self)))
+
     @property
     def called(self) -> str:
         """What messages call the trace: its file where that is known, else its number."""
@@ -224,6 +241,21 @@ class Trace:
     def missing(self) -> int:
         """Number of samples that are not there between the first and the last."""
         return sum(lost for _, lost in self.gaps)
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of the drive, for people: old recordings state none, and are in volts."""
+        return self.record.drive_unit or ("V" if self.record.source != "imported" else "unit not stated")
+
+    @property
+    def missing_text(self) -> str:
+        """Whether samples are missing, for people; without ticks what the times between samples show."""
+        if self.tick is not None or len(self) < 2:
+            return f"{self.missing} missing"
+        steps = np.diff(self.time)
+        usual, longest = float(np.median(steps)), int(steps.argmax())
+        line = f"usually {usual:.4g} s apart, at most {steps[longest]:.4g} s (after {self.time[longest]:.4g} s)"
+        return f"{line}; it has no ticks, so whether some are missing is not known"
 
     @property
     def gaps(self) -> list[tuple[int, int]]:
@@ -242,3 +274,9 @@ class Trace:
         if joint not in self.joints:
             raise TraceError(f"{self.called}: joint {joint} is not in it; it has {self.joints}")
         return self.joints.index(joint)
+
+
+def _same(one: object, other: object) -> bool:
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return np.array_equal(one, other)
+    return type(one) is type(other) and bool(one == other)
