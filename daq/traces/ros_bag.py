@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -153,10 +154,7 @@ def _topic(path: Path, found: Contents, wanted: str | None) -> str:
 
 def _decoded(origin: str, messages: list[tuple[int, bytes]], ros_1: bool) -> Iterator[_State]:
     """Decodes messages. Raises TraceError."""
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC if ros_1 else Stores.ROS2_JAZZY)
-    decode: Callable[[bytes, str], Any] = store.deserialize_ros1 if ros_1 else store.deserialize_cdr
+    decode = _decoder(ros_1)
     for number, (received, raw) in enumerate(messages, start=1):
         place = f"{origin}: message {number}"
         if len(raw) > LARGEST_MESSAGE:
@@ -176,6 +174,16 @@ def _decoded(origin: str, messages: list[tuple[int, bytes]], ros_1: bool) -> Ite
         )
         _check_lengths(place, state)
         yield state
+
+
+@cache
+def _decoder(ros_1: bool) -> Callable[[bytes, str], Any]:
+    """What decodes a message. It knows ROS's definitions alone, whatever a bag says of its types."""
+    from rosbags.typesys import Stores, get_typestore
+
+    if ros_1:
+        return get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
+    return get_typestore(Stores.ROS2_JAZZY).deserialize_cdr
 
 
 def _check_lengths(origin: str, state: _State) -> None:

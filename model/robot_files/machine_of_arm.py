@@ -91,7 +91,8 @@ def machine_of_arm(
     frames = frames_of([j.point for j in arm.joints], [j.direction for j in arm.joints], arm.tip, names)
     down = arm.description.gravity if gravity is None else np.array(gravity)
     known = _known(names, drives, parts)
-    notes = [f"Made from {source}.", *_held(arm), *(f"{note[0].upper()}{note[1:]}." for note in frames.notes)]
+    doubts = [f"CHECK: {doubt}" for doubt in arm.description.doubts]
+    notes = [f"Made from {source}.", *doubts, *_held(arm), *(f"{note[0].upper()}{note[1:]}." for note in frames.notes)]
     made = []
     for i, joint in enumerate(arm.joints):
         body = _body(joint, frames, i + 1, source, notes)
