@@ -34,9 +34,7 @@ class Invalid:
 
     def where(self, whole: str = "", first: int = 0) -> str:
         """The place with dots, its indices counted from `first`; `whole` where it is the data as a whole."""
-        return (
-            ".".join(str(part + first) if isinstance(part, int) else _short(part, 60) for part in self.place) or whole
-        )
+        return ".".join(str(part + first if isinstance(part, int) else part) for part in self.place) or whole
 
 
 def first_invalid(error: ValidationError) -> Invalid:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -19,6 +19,7 @@ from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleCount
 from daq.contracts.sketch import html_of, name_of
+from daq.contracts.with_arrays import WithArrays
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,7 +132,7 @@ class TraceRecord(FrozenRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(WithArrays):
     """Signals of n samples on the joints `joints` (numbers from 1), one column each, in that order.
 
     time:      (n,)   s from the start of the record, strictly increasing
@@ -166,7 +167,7 @@ class Trace:
     status: Integers | None = None
     taken: Integers | None = None
     events: tuple[TraceEvent, ...] = field(default=())
-    file: str = ""
+    file: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
         """One line: a notebook shows it, and an array of every signal would fill the page."""
@@ -221,17 +222,6 @@ class Trace:
     def __len__(self) -> int:
         return len(self.time)
 
-    def __eq__(self, other: object) -> bool:
-        """Whether another trace has the same record, joints, events and numbers; what its file is called is no part."""
-        if not isinstance(other, Trace):
-            return NotImplemented
-        return all(
-            _same(getattr(self, one.name), getattr(other, one.name)) for one in fields(self) if one.name != "file"
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.record.trace_id, self.joints, len(self)))
-
     @property
     def called(self) -> str:
         """What messages call the trace: its file where that is known, else its number."""
@@ -274,9 +264,3 @@ class Trace:
         if joint not in self.joints:
             raise TraceError(f"{self.called}: joint {joint} is not in it; it has {self.joints}")
         return self.joints.index(joint)
-
-
-def _same(one: object, other: object) -> bool:
-    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return np.array_equal(one, other)
-    return type(one) is type(other) and bool(one == other)

@@ -88,7 +88,10 @@ def machine_of_arm(
     """The machine of an arm; see `machine_from_urdf`. What `parts` says of a joint comes before `drives`."""
     names = [joint.joint.name for joint in arm.joints]
     source = Path(arm.description.origin).name
-    frames = frames_of([j.point for j in arm.joints], [j.direction for j in arm.joints], arm.tip, names)
+    try:
+        frames = frames_of([j.point for j in arm.joints], [j.direction for j in arm.joints], arm.tip, names)
+    except SpecError as error:
+        raise SpecError("; ".join([str(error), *arm.description.doubts])) from error
     down = arm.description.gravity if gravity is None else np.array(gravity)
     known = _known(names, drives, parts)
     doubts = [f"CHECK: {doubt}" for doubt in arm.description.doubts]
