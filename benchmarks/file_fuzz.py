@@ -38,8 +38,9 @@ from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import TraceLimits
 from daq.teaching.program import load_program
+from daq.traces.bag_storage import JOINT_STATE
 from daq.traces.csv_table import import_csv
-from daq.traces.ros_bag import JOINT_STATE, BagChoice, import_bag
+from daq.traces.ros_bag import BagChoice, import_bag
 from model.machine_model.model import base_model
 from model.machine_model.model_file import load_model, save_model
 from model.robot_files.urdf_reader import read_urdf
@@ -160,7 +161,7 @@ def _bag(folder: Path, kind: str) -> Path:
             )
             for moment, data in messages:
                 writer.add_message(channel, moment, data, moment)
-            writer.finish()
+            writer.finish()  # type: ignore[no-untyped-call]
         return folder / "a.mcap"
     with Writer2(folder / "a", version=9, storage_plugin=StoragePlugin.SQLITE3) as new:
         connection2 = new.add_connection("/joint_states", JOINT_STATE, typestore=store)

@@ -231,7 +231,7 @@ def title_of(trace: Recorded) -> str:
 def _foot(trace: Recorded, recorded: tuple[int, ...]) -> str:
     record = trace.record
     created = record.created.strftime("%Y-%m-%d %H:%M:%S UTC")
-    missing = f", {trace.missing} missing" if trace.tick is not None else ""
+    missing = f", {trace.missing} missing" if trace.has_ticks else ""
     foot = f"{created}   trace {record.trace_id}   {len(trace)} samples{missing}   {record.software}"
     held = [str(joint) for joint in recorded if joint not in trace.joints]
     return f"{foot}   recorded too: joint {', '.join(held)}" if held else foot

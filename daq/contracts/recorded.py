@@ -78,6 +78,10 @@ class Recorded(Protocol):
         """Number of samples that are not there."""
 
     @property
+    def has_ticks(self) -> bool:
+        """Whether periods are counted, so that missing samples show."""
+
+    @property
     def missing_text(self) -> str:
         """The same for people, also where it is not known."""
 

@@ -238,6 +238,11 @@ class Trace(WithArrays):
         return self.record.drive_unit or ("V" if self.record.source != "imported" else "unit not stated")
 
     @property
+    def has_ticks(self) -> bool:
+        """Whether its control periods are counted, so that missing samples show."""
+        return self.tick is not None
+
+    @property
     def missing_text(self) -> str:
         """Whether samples are missing, for people; without ticks what the times between samples show."""
         if self.tick is not None or len(self) < 2:

@@ -71,7 +71,7 @@ def _without_main(function: Callable[..., Any]) -> Iterator[None]:
     if getattr(function, "__module__", None) == "__main__":
         yield
         return
-    kept = {name: vars(main)[name] for name in ("__file__", "__spec__") if name in vars(main)}
+    kept: dict[str, Any] = {name: vars(main)[name] for name in ("__file__", "__spec__") if name in vars(main)}
     try:
         vars(main).update(dict.fromkeys(kept))
         yield

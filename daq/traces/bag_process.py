@@ -11,6 +11,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,9 @@ def main() -> int:
     _limit(resource.RLIMIT_DATA, _own_memory() + memory_of(limits))
     _limit(resource.RLIMIT_FSIZE, limits.file_bytes)
     _limit(resource.RLIMIT_CORE, 0)
-    given = {name: tuple(value) if isinstance(value, list) else value for name, value in order["choice"].items()}
+    given: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in order["choice"].items()
+    }
     code = REFUSED
     try:
         trace = import_bag(Path(order["path"]), limits, BagChoice(**given))

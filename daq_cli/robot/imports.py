@@ -21,8 +21,9 @@ def foreign_trace(file: Path, limits: TraceLimits, choice: BagChoice, numbering:
     """The trace in a CSV file or a bag. numbering: names of the joints 1, 2 … of the machine in use, by which those of
     a bag are numbered. Raises SpecError, TraceError, MissingExtraError."""
     from daq.traces import ros_bag
-    from daq.traces.bag_files import METADATA, STORAGES, kind_of
+    from daq.traces.bag_files import STORAGES, kind_of
     from daq.traces.bag_process import import_bag_apart
+    from daq.traces.bag_storage import METADATA
     from daq.traces.csv_table import import_csv
 
     if choice.drive_unit is not None and choice.drive_unit not in UNITS:

@@ -12,7 +12,8 @@ from rosbags.typesys import Stores, get_typestore
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces.bag_process import import_bag_apart
-from daq.traces.ros_bag import JOINT_STATE, BagChoice, import_bag
+from daq.traces.bag_storage import JOINT_STATE
+from daq.traces.ros_bag import BagChoice, import_bag
 from tests.daq.traces.test_ros_bag import bag, state
 
 MIB = 1 << 20

@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from daq.contracts.errors import TraceError
-from daq.traces.ros_bag import JOINT_STATE
+from daq.traces.bag_storage import JOINT_STATE
 from tests.daq.traces.test_ros_bag import NS, START, bag, imported, state
 
 STORE: Any = get_typestore(Stores.ROS2_HUMBLE)

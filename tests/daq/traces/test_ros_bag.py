@@ -15,8 +15,9 @@ from rosbags.typesys import Stores, get_typestore
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.traces.bag_storage import JOINT_STATE
 from daq.traces.reader import read_trace
-from daq.traces.ros_bag import JOINT_STATE, BagChoice, import_bag
+from daq.traces.ros_bag import BagChoice, import_bag
 from daq.traces.store import write_trace
 from tests.daq.traces.samples import write
 
