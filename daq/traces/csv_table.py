@@ -82,6 +82,8 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
     description, described = CsvDescription.read(path, limits)
     whole, said = _whole_rows(data)
     header, table, rows = _read_table(path, whole, limits)
+    if said and not len(table):
+        raise TraceError(f"{path}: {' '.join(said)} No row is left")
     joints = _joints(path, header, description)
     _check_bounds(path, header, table, rows)
     description.check_period(table[:, 0], str(path))
