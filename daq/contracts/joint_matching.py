@@ -27,8 +27,11 @@ def other_joints(
 ) -> TraceError:
     """The error for joints whose numbers are not those of a machine with the joints `known`, with what to do."""
     own = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
-    order = ",".join(known) if set(names) <= set(known) else "…"
-    return TraceError(
-        f"{called}: its joints are {own}, those of {machine} {', '.join(known)}; import it again with "
-        f"--joints {order}, the bag's names in the machine's order"
-    )
+    if set(names) == set(known):
+        advice = f"with --joints {','.join(known)}"
+    elif set(names) < set(known):
+        advice = "with this machine in the TOML beside it, by which names are matched"
+    else:
+        advice = f"with --joints and its own names for {', '.join(known)}, in this order"
+    line = f"its joints are {own}, those of {machine} {', '.join(known)}"
+    return TraceError(f"{called}: {line}; import it again {advice}")

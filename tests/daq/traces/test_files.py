@@ -114,9 +114,11 @@ def test_joints_are_matched_by_name_and_never_by_the_order_that_they_came_in(tmp
     assert (matched.joints, matched.record.joint_names) == ((3, 1, 2), ("elbow", "pan", "lift"))
     check_joints(read_trace(write_trace(matched, tmp_path / "a.mcap")), machine)
     unmatched = import_bag(path)
-    with pytest.raises(TraceError, match=r"its joints are 1 elbow, 2 pan, 3 lift, .* --joints pan,lift,elbow, the bag"):
+    with pytest.raises(
+        TraceError, match=r"its joints are 1 elbow, 2 pan, 3 lift, .* again with --joints pan,lift,elbow$"
+    ):
         check_joints(unmatched, machine)
-    with pytest.raises(TraceError, match="those of ma2000 base, shoulder, upper; import it again with --joints …"):
+    with pytest.raises(TraceError, match="--joints and its own names for base, shoulder, upper, in this"):
         check_joints(unmatched, named("base", "shoulder", "upper"))
     chosen = import_bag(path, choice=BagChoice(joints=("pan", "lift", "elbow")))
     assert np.array_equal(chosen.position[0], [1.0, 2.0, 3.0])
