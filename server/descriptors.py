@@ -6,7 +6,7 @@ import resource
 from contextlib import suppress
 
 RESERVED = 32
-"""Files that are no connections: an idle service has 15, and a stop, a trace and the database need a few each."""
+"""Files that are no connections: a service with an arm has 27, and a stop, a trace and a backup need a few more."""
 
 
 def most_connections(wanted: int) -> int:
