@@ -148,11 +148,8 @@ def test_a_memory_map_that_cannot_be_read_is_one_line() -> None:
 
 
 def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path: Path) -> None:
-    for name, text in (
-        ("daq.toml", "[server]\nport = 8301\n"),
-        ("map.toml", MAP.read_text("utf-8")),
-        ("a.json", "[1]"),
-    ):
+    texts = {"daq.toml": "[server]\nport = 8301\n", "map.toml": MAP.read_text("utf-8"), "a.json": "[1]"}
+    for name, text in texts.items():
         (tmp_path / name).write_text(text, "utf-8-sig")
     assert load_settings(tmp_path / "daq.toml")[0].server.port == 8301
     assert load_memory_map(tmp_path / "map.toml") == default_memory_map()
