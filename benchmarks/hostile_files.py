@@ -8,7 +8,6 @@ import tempfile
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from random import Random
 from typing import Any
 
 import zstandard
@@ -156,19 +155,6 @@ def lying_chunk(data: bytes, offset: int, length: int) -> bytes:
         return bytes(changed)
 
     return rewritten(data, change)
-
-
-def damaged(data: bytes, random: Random) -> bytes:
-    """A trace with a byte flipped, a sector zeroed, its end cut off, or a part doubled."""
-    at = random.randrange(len(data))
-    kind = random.randrange(4)
-    if kind == 0:
-        return data[:at] + bytes([data[at] ^ 1 << random.randrange(8)]) + data[at + 1 :]
-    if kind == 1:
-        return data[:at] + bytes(min(512, len(data) - at)) + data[at + 512 :]
-    if kind == 2:
-        return data[:at]
-    return data[:at] + data[max(0, at - 512) :]
 
 
 def hostile_traces(data: bytes) -> dict[str, bytes]:

@@ -26,8 +26,9 @@ from pathlib import Path
 from random import Random
 from urllib.parse import urlsplit
 
+from benchmarks.damaged_traces import AT_RANDOM
 from benchmarks.figures import Figure, at_most, quantile, show
-from benchmarks.hostile_files import DEEP, bomb, damaged, hostile_tables, hostile_traces, sound_trace
+from benchmarks.hostile_files import DEEP, bomb, hostile_tables, hostile_traces, sound_trace
 from benchmarks.service_process import ROBOT, RunningService, started_service
 from benchmarks.stopper import Stopped, stopping
 from daq.contracts.service.system import stop_port_after
@@ -79,7 +80,8 @@ def attacks(random: Random, count: int) -> list[Attack]:
     while len(made) < count:
         kind = random.randrange(3)
         if kind == 0:
-            made.append(_upload("a damaged trace", damaged(sound, random), MCAP, (201, 409, 413, 422)))
+            damage = random.choice(list(AT_RANDOM.values()))
+            made.append(_upload("a damaged trace", damage(random, sound), MCAP, (201, 409, 413, 422)))
         else:
             made.append(random.choice(fixed[len(files) :] if kind == 1 else files[:-1]))
     random.shuffle(made)

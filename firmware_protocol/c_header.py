@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> int:
     """Prints the header of a map, or of the one that ships; the exit code."""
     try:
         paths = [Path(argument) for argument in arguments]
-        maps = [parse_memory_map(path.read_text("utf-8"), str(path)) for path in paths] or [default_memory_map()]
+        maps = [parse_memory_map(path.read_text("utf-8-sig"), str(path)) for path in paths] or [default_memory_map()]
         print(c_header(maps[0]), end="")
     except (MemoryMapError, OSError) as error:
         print(f"c_header: {error}", file=sys.stderr)

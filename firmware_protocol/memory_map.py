@@ -202,7 +202,7 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
     Raises MemoryMapError with one line that says what is wrong and where.
     """
     try:
-        return MemoryMap.model_validate(tomllib.loads(text))
+        return MemoryMap.model_validate(tomllib.loads(text.removeprefix("\ufeff")))
     except RecursionError:
         raise MemoryMapError(f"{origin}: not a memory map: it is nested too deeply") from None
     except ValidationError as error:

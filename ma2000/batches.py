@@ -59,8 +59,8 @@ def batch(
 
     Args:
         traces: folder of traces; `query` says which of them, as `ramp since:2026-11-01`.
-        executor: who computes (docs/batches.md). A script that uses processes of this computer must keep what it does
-            behind `if __name__ == "__main__":`.
+        executor: who computes (docs/batches.md). A script that has Dask start processes of this computer must keep
+            what it does behind `if __name__ == "__main__":`.
         model: of all traces; None for the machine of each, or for `machine` where a trace names none.
         options: of the study, as the service's `FitStudy`, `ValidateStudy`, `SimulateStudy`, `DiagnoseStudy`.
 

@@ -10,17 +10,16 @@ from pydantic import TypeAdapter, ValidationError
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.trace import Trace
-from daq.traces import catalogue, disk, reader, store
+from daq.traces import catalogue, disk, store
 from daq.traces.catalogue import TraceSummary, summary_of
-from daq.traces.csv_table import import_csv
+from daq.traces.files import open_trace
 from daq.traces.tables import export_table
 from firmware_protocol.invalid import first_invalid
 
 
 def read_trace(path: Path | str) -> Trace:
     """The trace in a file: MCAP, or CSV as docs/own-machine.md describes it. Raises TraceError, SpecError."""
-    path = Path(path)
-    return import_csv(path) if path.suffix == ".csv" else reader.read_trace(path)
+    return open_trace(Path(path))
 
 
 def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) -> tuple[Trace, ...]:

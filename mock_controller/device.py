@@ -128,7 +128,7 @@ def _board_parameters(options: Options) -> BoardParameters:
 
 def _text(path: Path, option: str) -> str:
     try:
-        return path.read_text("utf-8")
+        return path.read_text("utf-8-sig")
     except OSError as error:
         raise OptionsError(f"{option}: {path}: {error.strerror}") from None
     except UnicodeDecodeError:

@@ -97,7 +97,7 @@ def _shown(value: object) -> str:
 
 def _read_file(path: Path) -> dict[str, Any]:
     try:
-        return {key.replace("-", "_"): value for key, value in tomllib.loads(path.read_text("utf-8")).items()}
+        return {key.replace("-", "_"): value for key, value in tomllib.loads(path.read_text("utf-8-sig")).items()}
     except OSError as error:
         raise OptionsError(f"config: {path}: {error.strerror}") from None
     except ValueError as error:  # also what is not UTF-8

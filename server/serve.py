@@ -16,13 +16,14 @@ from daq.config.settings import Settings
 from daq.contracts.errors import SpecError
 from daq.contracts.service.audit import AuditNote
 from server.access.caller import Caller
-from server.access.connections import Connection
+from server.access.connections import MOST_CONNECTIONS, Connection
 from server.access.gate import Gate
 from server.access.origin import is_loopback
 from server.access.session_cookie import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.audit.words import line_of
+from server.descriptors import most_connections
 from server.ending import EndInTime
 from server.listening import listening
 from server.services import Services
@@ -73,6 +74,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
 
 
 def _configuration(app: FastAPI) -> uvicorn.Config:
+    Connection.most = most_connections(MOST_CONNECTIONS)
     return uvicorn.Config(
         app,
         log_config=None,

@@ -486,6 +486,6 @@ def _place(settings: Settings) -> RobotPlace:
     path = settings.robot.memory_map
     if path is not None:
         load_memory_map(path)
-    memory_map = None if path is None else path.read_text("utf-8")
+    memory_map = None if path is None else path.read_text("utf-8-sig")
     folder = settings.traces.folder.absolute()
     return RobotPlace(settings.robot.name, settings.port, settings.machine(), folder, memory_map)

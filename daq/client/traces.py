@@ -17,6 +17,8 @@ from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetai
 
 LAST = "last"
 """Name of the newest trace, in place of its number."""
+MCAP = b"\x89MCAP0\r\n"
+"""First bytes of a file of MCAP."""
 KINDS = {".mcap": "application/octet-stream", ".csv": "text/csv"}
 MOST_NAMED = 4
 """Number of traces named in the error about an ambiguous beginning."""
@@ -177,10 +179,12 @@ class Traces:
         """Takes in a trace from elsewhere: .mcap of this project, or plain .csv. Raises TraceError for another file,
         ServiceError where the service has it already (`trace-exists`)."""
         file = Path(file)
-        kind = KINDS.get(file.suffix)
-        if kind is None:
-            raise TraceError(f"{file}: is no trace: {' or '.join(KINDS)} are taken")
         try:
+            with file.open("rb") as stream:
+                suffix = ".mcap" if stream.read(len(MCAP)) == MCAP else file.suffix.lower()
+            kind = KINDS.get(suffix)
+            if kind is None:
+                raise TraceError(f"{file}: is no trace: {' or '.join(KINDS)} are taken")
             size = file.stat().st_size
             with file.open("rb") as stream:
                 pieces = iter(lambda: stream.read(PART), b"")

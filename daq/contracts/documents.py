@@ -21,6 +21,8 @@ MOST_KEY_PARTS = 64
 MOST_BITS = 4096
 """Most bits of a whole number; Python cannot write one of many thousands as text."""
 
+MARK = "\ufeff"
+"""The byte-order mark, which some editors put before a text."""
 _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_KEY_PARTS}}}", re.MULTILINE)
 """Matches only where a key can begin, so that the search takes time in proportion to the text."""
 
@@ -71,7 +73,7 @@ def read_text(path: Path, what: str) -> str:
     if len(content) > LARGEST:
         raise SpecError(f"{what}: cannot be read: it is larger than {LARGEST >> 20} MiB")
     try:
-        return content.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SpecError(
             f"{what}: cannot be read: it is not UTF-8 text (byte {content[error.start]:#04x} at {error.start})"
@@ -82,7 +84,7 @@ def parse_json(text: str, what: str) -> Any:
     """Plain data from JSON. Raises SpecError in one line for text that is not JSON, is nested deeper than DEEPEST, or
     holds a whole number of more than MOST_BITS."""
     try:
-        data = json.loads(text)
+        data = json.loads(text.removeprefix(MARK))
     except RecursionError:
         raise _too_deep(what) from None
     except ValueError as error:  # also a whole number of thousands of digits
@@ -98,6 +100,7 @@ def parse_json(text: str, what: str) -> Any:
 def parse_toml(text: str, what: str) -> dict[str, Any]:
     """Plain data from TOML. Raises SpecError in one line for text that is not TOML, is nested deeper than DEEPEST, or
     holds a whole number of more than MOST_BITS."""
+    text = text.removeprefix(MARK)
     if _LONG_KEY.search(text):
         raise SpecError(f"{what}: a key has more than {MOST_KEY_PARTS} parts; no key here needs them")
     try:

@@ -122,7 +122,7 @@ def _rows(trace: Recorded) -> list[_Row]:
     if trace.error is not None:
         rows.append(_Row("error", unit, trace.error * scale))
     if trace.drive is not None:
-        rows.append(_Row("drive", trace.record.drive_unit or "V", trace.drive))
+        rows.append(_Row("drive", trace.drive_unit, trace.drive))
     if trace.velocity is not None:
         rows.append(_Row("velocity", f"{unit}/s", trace.velocity * scale))
     return rows
@@ -240,6 +240,7 @@ def title_of(trace: Recorded) -> str:
 def _foot(trace: Recorded, recorded: tuple[int, ...]) -> str:
     record = trace.record
     created = record.created.strftime("%Y-%m-%d %H:%M:%S UTC")
-    foot = f"{created}   trace {record.trace_id}   {len(trace)} samples, {trace.missing} missing   {record.software}"
+    missing = f", {trace.missing} missing" if trace.has_ticks else ""
+    foot = f"{created}   trace {record.trace_id}   {len(trace)} samples{missing}   {record.software}"
     held = [str(joint) for joint in recorded if joint not in trace.joints]
     return f"{foot}   recorded too: joint {', '.join(held)}" if held else foot

@@ -78,6 +78,18 @@ class Recorded(Protocol):
         """Number of samples that are not there."""
 
     @property
+    def has_ticks(self) -> bool:
+        """Whether periods are counted, so that missing samples show."""
+
+    @property
+    def missing_text(self) -> str:
+        """The same for people, also where it is not known."""
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of the drive, for people."""
+
+    @property
     def gaps(self) -> list[tuple[int, int]]:
         """Row before each gap, and how many samples are missing in it."""
 

@@ -28,7 +28,7 @@ def name_of(trace: Recorded) -> str:
 def html_of(trace: Recorded) -> str:
     """Facts, how far each joint moved from its first position over time, and its range. Every text is escaped."""
     record, name = trace.record, name_of(trace)
-    facts = f"{len(trace)} samples, {trace.missing} missing, {record.outcome or 'no outcome'}"
+    facts = f"{len(trace)} samples, {trace.missing_text}, {record.outcome or 'no outcome'}"
     head = f"<b>{escape(name)}</b> <code>{escape(record.trace_id)}</code> · {escape(facts)}"
     return f"<div>{head}<br>{_picture(trace)}<br>{_key(trace)}</div>"
 

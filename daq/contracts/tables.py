@@ -23,7 +23,7 @@ def units_of(trace: Recorded) -> dict[str, str]:
     own = {"position": length, "set_point": length, "error": length, "velocity": f"({length})/s"}
     if " " not in length:
         own["velocity"] = f"{length}/s"
-    drive = trace.record.drive_unit or "V"
+    drive = trace.drive_unit
     counted = {"power_raw": "DAC counts", "tick": "1", "status": "1", "taken": "1"}
     return own | {"time": "s", "host_time": "s", "drive": drive} | counted
 

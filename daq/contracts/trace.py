@@ -19,6 +19,7 @@ from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleCount
 from daq.contracts.sketch import html_of, name_of
+from daq.contracts.with_arrays import WithArrays
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,6 +56,8 @@ EventKind = Literal[
 
 SLOW_LINE = "slow line: "
 """Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
+INCOMPLETE = "INCOMPLETE: "
+"""Beginning of the note on what an imported file promises, or once held, and does not give."""
 LATE_SET_POINTS = "late_set_points"
 """Counter of the control periods that used an older set point than the one that was sent for them. A record lacks it
 where that is not known."""
@@ -111,6 +114,10 @@ class TraceRecord(FrozenRecord):
     operator: str | None = None
     machine: Machine | None = None
     memory_map: dict[str, object] | None = None
+    joint_names: Annotated[tuple[str, ...], Field(exclude_if=lambda names: not names)] = ()
+    """What an imported file calls the joints, in the order of the columns; empty where it does not name them."""
+    joints_chosen: Annotated[bool, Field(exclude_if=lambda chosen: not chosen)] = False
+    """Whether a person gave the order of the joints, so that names may be others than the machine's."""
     spec: ExperimentSpec | None = None
     gains: dict[int, ReportedGain] | None = None
     """P, I, D of each joint, as the controller reported them."""
@@ -127,8 +134,8 @@ class TraceRecord(FrozenRecord):
     """The link's counters at the end of the record."""
 
 
-@dataclass(frozen=True)
-class Trace:
+@dataclass(frozen=True, eq=False)
+class Trace(WithArrays):
     """Signals of n samples on the joints `joints` (numbers from 1), one column each, in that order.
 
     time:      (n,)   s from the start of the record, strictly increasing
@@ -227,6 +234,26 @@ class Trace:
     def missing(self) -> int:
         """Number of samples that are not there between the first and the last."""
         return sum(lost for _, lost in self.gaps)
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of the drive, for people: old recordings state none, and are in volts."""
+        return self.record.drive_unit or ("V" if self.record.source != "imported" else "unit not stated")
+
+    @property
+    def has_ticks(self) -> bool:
+        """Whether its control periods are counted, so that missing samples show."""
+        return self.tick is not None
+
+    @property
+    def missing_text(self) -> str:
+        """Whether samples are missing, for people; without ticks what the times between samples show."""
+        if self.tick is not None or len(self) < 2:
+            return f"{self.missing} missing"
+        steps = np.diff(self.time)
+        usual, longest = float(np.median(steps)), int(steps.argmax())
+        line = f"usually {usual:.4g} s apart, at most {steps[longest]:.4g} s (after {self.time[longest]:.4g} s)"
+        return f"{line}; it has no ticks, so whether some are missing is not known"
 
     @property
     def gaps(self) -> list[tuple[int, int]]:

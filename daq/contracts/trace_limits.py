@@ -34,8 +34,8 @@ class TraceLimits(FrozenRecord):
     """Size of all attachments of a file."""
     metadata_bytes: Annotated[int, Field(ge=1)] = 8 * MIB
     """Size of one metadata record; that at the start holds experiment, machine and memory map."""
-    joints: Annotated[int, Field(ge=1, le=100)] = 6
-    """Joints of a file."""
+    joints: Annotated[int, Field(ge=1, le=99)] = 99
+    """Joints of a file: as many as their numbers, of two digits, allow. The MA2000's six limit experiments alone."""
 
 
 DEFAULT_TRACE_LIMITS = TraceLimits()

@@ -5,9 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 from daq.executors.parent import end_with_parent
@@ -41,7 +43,7 @@ class LocalWorkers(Workers):
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
         """As any executor does."""
-        with self._lock:
+        with self._lock, _without_main(function):
             try:
                 return self._pool.submit(function, *args, **named)
             except BrokenExecutor:
@@ -59,6 +61,22 @@ class LocalWorkers(Workers):
         for process in list((self._pool._processes or {}).values()):
             process.kill()
         self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _without_main(function: Callable[..., Any]) -> Iterator[None]:
+    """Keeps processes that are started meanwhile from running the caller's script again, unless it defines the
+    function. A script then needs no `if __name__ == "__main__":`, without which each process would start others."""
+    main = sys.modules["__main__"]
+    if getattr(function, "__module__", None) == "__main__":
+        yield
+        return
+    kept: dict[str, Any] = {name: vars(main)[name] for name in ("__file__", "__spec__") if name in vars(main)}
+    try:
+        vars(main).update(dict.fromkeys(kept))
+        yield
+    finally:
+        vars(main).update(kept)
 
 
 def begin_worker() -> None:

@@ -1,21 +1,23 @@
-"""The files of a bag, checked against the limits of traces before a library that has none of its own reads them."""
+"""Which file is what, by its content; and the files of a bag, checked against the limits of traces."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
+from typing import Literal
 
 import zstandard
-from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace_limits import TraceLimits
-from daq.traces import disk, fields, layout
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.traces import disk, layout
+from daq.traces.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC
 from daq.traces.ends import first_metadata
-from daq.traces.inflate import inflate
-from daq.traces.scan import HEAD, UNREADABLE, require
 
-METADATA = "metadata.yaml"
+Kind = Literal["trace", "bag", "csv"]
+"""What reads a file: that of traces, `import_bag` or `import_csv`."""
+
 STORAGES = (".mcap", ".db3", ".bag")
 COMPRESSED = ".zstd"
 _FRAMES = (0xFD2FB528, *range(0x184D2A50, 0x184D2A60))
@@ -23,14 +25,23 @@ _FRAMES = (0xFD2FB528, *range(0x184D2A50, 0x184D2A60))
 _PIECE = 1 << 20
 
 
-def is_bag(path: Path) -> bool:
-    """Whether a path is named as a bag: a folder with metadata.yaml, or a file of a bag."""
-    return (path / METADATA).exists() or (path.suffix in STORAGES and not path.is_dir())
+def kind_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Kind:
+    """What a file is by its first bytes; by its name where these say nothing, as those of a damaged or absent file."""
+    if path.is_dir():
+        return "bag" if (path / METADATA).exists() else "csv"
+    first = b""
+    with suppress(OSError), disk.open_regular(path) as stream:
+        first = stream.read(len(SQLITE_MAGIC))
+    if first.startswith(MCAP0_MAGIC):
+        return "trace" if is_trace(path, limits) else "bag"
+    if first == SQLITE_MAGIC or first.startswith(ROS_1_MAGIC):
+        return "bag"
+    return "bag" if path.suffix.lower() in STORAGES else "trace" if path.name.endswith(layout.PART_SUFFIX) else "csv"
 
 
 def check_files(path: Path, limits: TraceLimits) -> None:
     """Raises TraceError where a bag is none, is a trace already, or exceeds a limit, also once it is uncompressed."""
-    if not is_bag(path):
+    if kind_of(path, limits) == "csv":
         wanted = f"a folder with {METADATA}, or a file {', '.join(STORAGES)}"
         raise TraceError(f"{path}: {f'is no bag: that is {wanted}' if path.exists() else 'there is no such bag'}")
     try:
@@ -58,10 +69,8 @@ def _check_file(file: Path, limits: TraceLimits) -> int:
         stream.seek(0)
         if file.suffix == COMPRESSED or first in _FRAMES:
             return _size_uncompressed(file, limits)
-        if file.suffix == ".mcap":
-            if is_trace(file, limits):
-                raise TraceError(f"{file}: is a trace already; copy it into the folder of traces")
-            _check_chunks(file, stream.read(size), limits)
+        if is_trace(file, limits):
+            raise TraceError(f"{file}: is a trace already; copy it into the folder of traces")
     return size
 
 
@@ -85,30 +94,8 @@ def _size_uncompressed(file: Path, limits: TraceLimits) -> int:
 
 def is_trace(file: Path, limits: TraceLimits) -> bool:
     """Whether a file begins as a trace of this project. Raises OSError."""
-    if file.suffix != layout.SUFFIX or not file.is_file():
-        return False
     try:
         with disk.open_regular(file) as stream:
             return first_metadata(stream, limits, str(file))[0] == layout.START_METADATA
     except TraceError:
         return False
-
-
-def _check_chunks(file: Path, data: bytes, limits: TraceLimits) -> None:
-    """Uncompresses every chunk within its limits, and keeps none. Raises TraceError."""
-    view, position, total = memoryview(data), len(MCAP0_MAGIC), 0
-    while position + HEAD.size <= len(view) - len(MCAP0_MAGIC):
-        opcode, length = HEAD.unpack_from(view, position)
-        start, position = position + HEAD.size, position + HEAD.size + length
-        if opcode != Opcode.CHUNK:
-            continue
-        try:
-            if position > len(view):
-                raise ValueError("a chunk is cut off")
-            chunk = fields.chunk_of(view[start:position])
-            total += chunk.size
-            require(chunk.size, limits.chunk_bytes, "a chunk declares more than {} bytes", "chunk_bytes")
-            require(total, limits.total_bytes, "its chunks have more than {} bytes", "total_bytes")
-            inflate(chunk)
-        except UNREADABLE as error:
-            raise TraceError(f"{file}: {error}") from error

@@ -11,6 +11,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.extras import require_extra
 from daq.contracts.trace import Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces.ros_bag import NO_MEMORY, Times, import_bag
+from daq.traces.ros_bag import NO_MEMORY, BagChoice, import_bag
 
 SPARE = 64 << 20
 """Memory (bytes) beside that for files and messages: rosbags takes it for its definitions of types."""
@@ -28,23 +29,14 @@ _SIGNALS = ("time", "position", "velocity", "drive")
 _UNLIMITED = 1 << 62
 
 
-def import_bag_apart(
-    path: Path,
-    limits: TraceLimits = DEFAULT_TRACE_LIMITS,
-    *,
-    topic: str | None = None,
-    joints: tuple[str, ...] | None = None,
-    times: Times | None = None,
-    numbering: tuple[str, ...] = (),
-) -> Trace:
+def import_bag_apart(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: BagChoice | None = None) -> Trace:
     """What `import_bag` returns, made in another process, which may use no more memory than `memory_of` says.
 
     Each file that it writes is limited too, and lies in a folder of its own that is removed in any case.
     Raises TraceError, also where the memory does not suffice, and MissingExtraError.
     """
     require_extra("ros", f"{path}: reading a bag", "rosbags")
-    order = {"path": str(path), "limits": limits.model_dump(), "topic": topic, "joints": joints, "times": times}
-    order["numbering"] = numbering
+    order = {"path": str(path), "limits": limits.model_dump(), "choice": vars(choice or BagChoice())}
     with TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-P", "-m", "daq.traces.bag_process"],
@@ -70,16 +62,17 @@ def main() -> int:
     """Reads one order, and writes the trace or one line of error."""
     order = json.loads(sys.stdin.buffer.read())
     limits = TraceLimits(**order["limits"])
-    from rosbags import rosbag1, rosbag2  # noqa: F401 - what loading takes is not the bag's memory
+    from rosbags import rosbag1  # noqa: F401 - what loading takes is not the bag's memory
 
     _limit(resource.RLIMIT_DATA, _own_memory() + memory_of(limits))
     _limit(resource.RLIMIT_FSIZE, limits.file_bytes)
     _limit(resource.RLIMIT_CORE, 0)
-    joints = None if order["joints"] is None else tuple(order["joints"])
+    given: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in order["choice"].items()
+    }
     code = REFUSED
     try:
-        choice = {name: order[name] for name in ("topic", "times")}
-        trace = import_bag(Path(order["path"]), limits, joints=joints, numbering=tuple(order["numbering"]), **choice)
+        trace = import_bag(Path(order["path"]), limits, BagChoice(**given))
         answer, code = _packed(trace), 0
     except DaqError as error:
         answer = str(error).encode("utf-8", "surrogateescape")

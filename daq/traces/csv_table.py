@@ -16,12 +16,13 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from daq.contracts.documents import shown
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import load_machine, shipped_machines
-from daq.contracts.trace import Floats, Trace
+from daq.contracts.trace import INCOMPLETE, Floats, Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
-from daq.traces.description import Description, read_file, toml_path
+from daq.traces.description import Description, DriveUnit, read_file, toml_path
 from daq.traces.naming import trace_id_of
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
@@ -31,6 +32,8 @@ SIGNALS = ("set_point", "position", "drive", "velocity")
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 """Note in a trace whose positions were integrated."""
 
+SHOWN = 20
+"""Number of columns that an error lists."""
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
 
 
@@ -67,18 +70,23 @@ def export_csv(trace: Trace, path: Path) -> Path:
     return path
 
 
-def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
-    """The trace in a CSV file and, where there is one, the TOML beside it.
+def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_unit: DriveUnit | None = None) -> Trace:
+    """The trace in a CSV file and, where there is one, the TOML beside it; `drive_unit` goes before that of the TOML.
 
+    A last row without a line end may have lost digits, so it is left out, and the notes say so.
     Raises TraceError with one line that names the row (from 1, the header is row 1) and the column of what is wrong:
     a missing or unknown column, text, NaN, time that does not increase, rows of unequal length.
     """
     path = Path(path)
     data = read_file(path, limits.file_bytes, "file_bytes")
     description, described = CsvDescription.read(path, limits)
-    header, table, rows = _read_table(path, data, limits)
+    whole, said = _whole_rows(data)
+    header, table, rows = _read_table(path, whole, limits)
+    if said and not len(table):
+        raise TraceError(f"{path}: {' '.join(said)} No row is left")
     joints = _joints(path, header, description)
     _check_bounds(path, header, table, rows)
+    description.check_period(table[:, 0], str(path))
     signals: dict[str, Any] = {}
     for name in SIGNALS:
         having = [joint for joint in joints if f"{name}_{joint}" in header]
@@ -91,9 +99,25 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     if "position" not in signals:
         signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
-        record = record.model_copy(update={"notes": f"{record.notes} {INTEGRATED}".strip()})
+        said.append(INTEGRATED)
+    record = record.model_copy(update={"notes": " ".join([record.notes, *said]).strip()})
+    if drive_unit is not None:
+        record = record.model_copy(update={"drive_unit": drive_unit})
     bounds.check_record(record, (), str(path))
     return Trace(record, joints, table[:, 0], **signals)
+
+
+def _whole_rows(data: bytes) -> tuple[bytes, list[str]]:
+    """The rows that end with a line end, and what was left out behind them."""
+    rows, said = data.rstrip(b"\0"), []
+    if len(rows) < len(data):
+        said.append(f"{INCOMPLETE}its last {len(data) - len(rows)} bytes are zeros, as a power cut leaves them.")
+    end = max(rows.rfind(b"\n"), rows.rfind(b"\r")) + 1
+    if end and rows[end:].strip():
+        line = "its last row has no line end, so it may be cut off, and was left out"
+        said.append(f"{INCOMPLETE}{line}; where it is whole, end it with a line end.")
+        rows = rows[:end]
+    return rows, said
 
 
 def _integrate(time: Floats, velocity: Floats) -> Floats:
@@ -108,10 +132,14 @@ def _joints(path: Path, header: list[str], description: CsvDescription) -> tuple
     wanted = description.joints or tuple(found)
     for joint in wanted:
         if joint not in found:
-            raise TraceError(f"{path}: row 1: column 'position_{joint}' is missing; it has {', '.join(header)}")
+            raise TraceError(f"{path}: row 1: column 'position_{joint}' is missing; it has {_listed(header)}")
     if not wanted:
-        raise TraceError(f"{path}: row 1: column 'position_1' is missing; it has {', '.join(header)}")
+        raise TraceError(f"{path}: row 1: column 'position_1' is missing; it has {_listed(header)}")
     return wanted
+
+
+def _listed(header: list[str]) -> str:
+    return ", ".join(shown(name).strip("'") for name in header[:SHOWN]) + (" …" if len(header) > SHOWN else "")
 
 
 def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int]]:
@@ -135,11 +163,11 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise TraceError(f"{path}: row 1: columns must be separated by commas")
     for position, name in enumerate(header):
         if name != "time" and not _COLUMN.fullmatch(name):
-            raise TraceError(f"{path}: row 1, column {position + 1}: {name!r} is not known; {allowed}")
+            raise TraceError(f"{path}: row 1, column {position + 1}: {shown(name)} is not known; {allowed}")
         if name in header[:position]:
-            raise TraceError(f"{path}: row 1, column {position + 1}: {name!r} comes twice")
+            raise TraceError(f"{path}: row 1, column {position + 1}: {shown(name)} comes twice")
     if header[0] != "time":
-        raise TraceError(f"{path}: row 1: the first column must be 'time', it is {header[0]!r}")
+        raise TraceError(f"{path}: row 1: the first column must be 'time', it is {shown(header[0])}")
 
 
 def _numbers(
@@ -203,7 +231,7 @@ def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) ->
         except ValueError:
             finite = False
         if not finite:
-            raise TraceError(f"{path}: row {number}, column {name!r}: {text!r} is not a finite number")
+            raise TraceError(f"{path}: row {number}, column {name!r}: {shown(text)} is not a finite number")
 
 
 def _description_text(trace: Trace) -> str:

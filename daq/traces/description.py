@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from daq.contracts.documents import parse_toml
@@ -15,11 +17,13 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq.contracts.refused import refused_words
-from daq.contracts.trace import Moment, TraceRecord
+from daq.contracts.trace import Floats, Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
 from daq.traces.recording import software
 
+EARLY = 0.9
+"""Share of a control period after which a sample can come, its clock's jitter included."""
 DriveUnit = Literal["V", "A", "N·m", "N"]
 
 
@@ -53,7 +57,7 @@ class Description(FrozenRecord):
     def of(cls, path: Path, data: bytes) -> Self:
         """The description in a TOML file. Raises TraceError."""
         try:
-            description = cls.model_validate(parse_toml(data.decode("utf-8"), str(path)))
+            description = cls.model_validate(parse_toml(data.decode("utf-8-sig"), str(path)))
         except ValidationError as error:
             raise TraceError(f"{path}: {refused_words(error, cls, 'the file')}") from error
         except UnicodeDecodeError as error:
@@ -75,6 +79,12 @@ class Description(FrozenRecord):
             return load_machine(self.machine if named else str(path.parent / self.machine))
         except DaqError as error:
             raise TraceError(f"{toml_path(path)}: machine: {error}") from error
+
+    def check_period(self, time: Floats, origin: str) -> None:
+        """Raises TraceError for a control period that is longer than the time from row to row, as one in ms is."""
+        usual = float(np.median(np.diff(time))) if len(time) > 1 else math.inf
+        if self.period is not None and usual < EARLY * self.period:
+            raise TraceError(f"{origin}: period = {self.period:g} s, and its rows are {usual:g} s apart; write it in s")
 
     def record(self, path: Path, machine: Machine | None, identity: str) -> TraceRecord:
         """The record of the trace in the file `path`. `identity` follows from what the files hold, so that a model

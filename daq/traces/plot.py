@@ -68,7 +68,7 @@ def _facts(trace: Trace) -> list[tuple[str, str]]:
         ("operator", record.operator or "not given"),
         ("joints", ", ".join(str(joint) for joint in trace.joints)),
         ("duration", f"{trace.time[-1] - trace.time[0]:.2f} s"),
-        ("samples", f"{len(trace)}, {trace.missing} missing"),
+        ("samples", f"{len(trace)}, {trace.missing_text}"),
         ("outcome", record.outcome or "not known"),
         ("software", record.software),
         ("notes", record.notes),

@@ -1,4 +1,4 @@
-"""Joint states in bags of ROS 2 (MCAP and SQLite) and ROS 1, read as a trace with the library rosbags.
+"""Joint states in bags of ROS 2 (MCAP and SQLite) and ROS 1, decoded as a trace by the library rosbags.
 
 Only messages of the type sensor_msgs/JointState are decoded, and only by the definition that ROS has of them: what a
 bag says about its types is never run.
@@ -7,32 +7,26 @@ bag says about its types is never run.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.extras import require_extra
-from daq.contracts.trace import EARLIEST, LATEST, Floats, Trace, TraceRecord
+from daq.contracts.joint_matching import other_joints
+from daq.contracts.trace import EARLIEST, INCOMPLETE, LATEST, Floats, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds
 from daq.traces.bag_files import check_files
-from daq.traces.description import Description
+from daq.traces.bag_storage import JOINT_STATE, LARGEST_MESSAGE, Contents, contents
+from daq.traces.description import Description, DriveUnit
 from daq.traces.naming import trace_id_of
 
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
-    from rosbags.rosbag1 import Reader as Reader1
-    from rosbags.rosbag2 import Reader as Reader2
-
-JOINT_STATE = "sensor_msgs/msg/JointState"
-LARGEST_MESSAGE = 1 << 20
-"""Largest message (bytes) of joint states: that of some ten thousand joints."""
 NO_MEMORY = "is damaged, or needs more memory than it may use (traces.limits.file_bytes and total_bytes)"
 SHOWN = 8
 """Number of names that an error lists."""
@@ -65,42 +59,51 @@ class _State:
     effort: Floats
 
 
-def import_bag(
-    path: Path,
-    limits: TraceLimits = DEFAULT_TRACE_LIMITS,
-    *,
-    topic: str | None = None,
-    joints: tuple[str, ...] | None = None,
-    times: Times | None = None,
-    numbering: tuple[str, ...] = (),
-) -> Trace:
-    """The joint states in a bag as a trace: a folder with metadata.yaml, or an .mcap, .db3 or .bag file.
+@dataclass(frozen=True)
+class BagChoice:
+    """What is taken from a bag; it goes before the TOML beside it.
 
-    A TOML file of the same name beside it holds what messages cannot; the arguments go before it.
+    topic:      of the joint states; needed where several topics have some
+    joints:     names of the joints to take, in the order of the trace's joints; messages without them are left out
+    times:      `received` takes the times at which messages were received, in place of those in the messages
+    drive_unit: of the effort; `none` leaves the effort out
+    numbering:  names of a machine's joints 1, 2 …, for a bag whose TOML names no machine
+    """
 
-    Args:
-        topic: of the joint states; needed where a bag has several.
-        joints: names of the joints to take, in the order of the trace's joints; messages without them are left out.
-        times: `received` takes the times at which messages were received, in place of those in the messages.
-        numbering: names of a machine's joints 1, 2 …, for a bag whose TOML names no machine.
+    topic: str | None = None
+    joints: tuple[str, ...] | None = None
+    times: Times | None = None
+    drive_unit: DriveUnit | Literal["none"] | None = None
+    numbering: tuple[str, ...] = ()
 
-    Nothing here limits the memory that rosbags takes: `daq.traces.bag_process` does, for the bags of strangers.
+
+def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: BagChoice | None = None) -> Trace:
+    """The joint states in a bag as a trace: a folder with metadata.yaml, or a file of MCAP, SQLite or ROS 1.
+
+    A TOML file of the same name beside it holds what messages cannot. What the bag promises and does not hold is told
+    in the notes, and the outcome is then `interrupted`.
+
+    Nothing here limits the memory that a bag takes: `daq.traces.bag_process` does, for the bags of strangers.
     Raises TraceError with one line for anything that is no bag, holds no joint states, or contradicts itself, and
     MissingExtraError where rosbags is not installed.
     """
-    path = Path(path)
+    path, choice = Path(path), choice or BagChoice()
     require_extra("ros", f"{path}: reading a bag", "rosbags")
     path = path if path.name else path.resolve()
     description, described = BagDescription.read(path, limits)
     check_files(path, limits)
     machine = description.load_machine(path)
-    chosen = description.joints if joints is None else joints
-    found_topic, states = _states(path, topic or description.topic, limits)
-    names = _names(f"{path}: topic {found_topic}", states, chosen, limits)
-    trace = _Table(f"{path}: topic {found_topic}", names, states).trace(
-        description.record(path, machine, ""), times or description.times
-    )
-    known = numbering if machine is None else tuple(joint.name for joint in machine.joints)
+    chosen = description.joints if choice.joints is None else choice.joints
+    found_topic, states, missing = _states(path, choice.topic or description.topic, limits)
+    origin = f"{path}: topic {found_topic}"
+    names = _names(origin, states, chosen, limits)
+    known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
+    if machine is not None and chosen is None and len(names) > 1 and not set(names) <= set(known):
+        raise other_joints(origin, _in_order(names), names, machine.name, known)
+    unit = choice.drive_unit or description.drive_unit
+    table = _Table(origin, names, states, missing)
+    trace = table.trace(description.record(path, machine, ""), choice.times or description.times, unit)
+    description.check_period(trace.time, origin)
     numbers, record = _numbers(names, known), trace.record
     spoken = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
     signals = (trace.time, trace.position, trace.velocity, trace.drive)
@@ -111,19 +114,19 @@ def import_bag(
         *described,
     )
     notes = f"{record.notes} From topic {found_topic}, joints {spoken}.".strip()
-    record = record.model_copy(update={"trace_id": identity, "notes": notes})
+    told = {"joint_names": names, "joints_chosen": chosen is not None}
+    record = record.model_copy(update={"trace_id": identity, "notes": notes} | told)
     bounds.check_signals({name: getattr(trace, name) for name in bounds.LARGEST}, str(path))
     bounds.check_record(record, (), str(path))
     return Trace(record, numbers, trace.time, trace.position, velocity=trace.velocity, drive=trace.drive)
 
 
-def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, list[_State]]:
-    """The joint states of a topic. Raises TraceError."""
+def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, list[_State], list[str]]:
+    """The joint states of a topic, and what of them is missing. Raises TraceError."""
     try:
-        with ExitStack() as stack:
-            reader, ros_1 = _opened(path, stack)
-            connections = _connections(path, reader, topic)
-            return connections[0].topic, list(_decoded(path, reader, connections, limits, ros_1))
+        found = contents(path, limits)
+        name = _topic(path, found, topic)
+        return name, list(_decoded(f"{path}: topic {name}", found.messages[name], found.ros_1)), found.missing
     except TraceError:
         raise
     except MemoryError as error:
@@ -135,51 +138,33 @@ def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, li
         raise TraceError(f"{path}: cannot be read as a bag ({type(error).__name__}: {told})") from error
 
 
-def _opened(path: Path, stack: ExitStack) -> tuple[Reader1 | Reader2, bool]:
-    """The reader of a bag, and whether the bag is of ROS 1."""
-    if path.suffix == ".bag" and not path.is_dir():
-        from rosbags import rosbag1
-
-        return stack.enter_context(rosbag1.Reader(path)), True
-    from rosbags import rosbag2
-
-    return stack.enter_context(rosbag2.Reader(path)), False
-
-
-def _connections(path: Path, reader: Reader1 | Reader2, topic: str | None) -> list[Connection]:
-    """The connections of the topic with joint states. Raises TraceError where it is not one topic."""
-    there = [one for one in reader.connections if one.msgtype == JOINT_STATE]
-    topics = sorted({one.topic for one in there})
+def _topic(path: Path, found: Contents, wanted: str | None) -> str:
+    """The topic with joint states: the one that is wanted, else the only one with messages. Raises TraceError."""
+    there = sorted(found.messages)
     if not there:
-        others = sorted({f"{one.topic} ({one.msgtype})" for one in reader.connections})
+        others = sorted(f"{name} ({kind})" for name, kind in found.types.items())
         raise TraceError(f"{path}: has no topic of {JOINT_STATE}; it has {_listed(others) or 'no topic'}")
-    if topic is None and len(topics) > 1:
-        raise TraceError(f"{path}: has joint states on {_listed(topics)}; choose one with --topic")
-    if topic is not None and topic not in topics:
-        raise TraceError(f"{path}: topic {topic}: has no joint states; there are some on {_listed(topics)}")
-    return [one for one in there if one.topic == (topic or topics[0])]
+    if wanted is not None and wanted not in there:
+        raise TraceError(f"{path}: topic {wanted}: has no joint states; there are some on {_listed(there)}")
+    told = [name for name in there if found.messages[name]] or there
+    if wanted is None and len(told) > 1:
+        raise TraceError(f"{path}: has joint states on {_listed(told)}; choose one with --topic")
+    return wanted or told[0]
 
 
-def _decoded(
-    path: Path, reader: Reader1 | Reader2, connections: list[Connection], limits: TraceLimits, ros_1: bool
-) -> Iterator[_State]:
-    """Decodes the messages of a topic. Raises TraceError, and whatever rosbags does."""
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC if ros_1 else Stores.ROS2_JAZZY)
-    decode: Any = store.deserialize_ros1 if ros_1 else store.deserialize_cdr
-    for number, (connection, received, raw) in enumerate(reader.messages(connections=connections), start=1):
-        origin = f"{path}: topic {connection.topic}: message {number}"
-        if number > limits.records:
-            raise TraceError(f"{origin}: up to {limits.records} are read (traces.limits.records)")
+def _decoded(origin: str, messages: list[tuple[int, bytes]], ros_1: bool) -> Iterator[_State]:
+    """Decodes messages. Raises TraceError."""
+    decode = _decoder(ros_1)
+    for number, (received, raw) in enumerate(messages, start=1):
+        place = f"{origin}: message {number}"
         if len(raw) > LARGEST_MESSAGE:
-            raise TraceError(f"{origin}: has {len(raw)} bytes; joint states have up to {LARGEST_MESSAGE}")
+            raise TraceError(f"{place}: has more than {LARGEST_MESSAGE} bytes; joint states have not")
         try:
-            message: Any = decode(raw, JOINT_STATE)
+            message = decode(raw, JOINT_STATE)
         except MemoryError:
             raise
         except Exception as error:
-            raise TraceError(f"{origin}: is no {JOINT_STATE}") from error
+            raise TraceError(f"{place}: is no {JOINT_STATE}") from error
         state = _State(
             number,
             message.header.stamp.sec * 10**9 + message.header.stamp.nanosec,
@@ -187,8 +172,18 @@ def _decoded(
             tuple(message.name),
             *(np.array(values, np.float64) for values in (message.position, message.velocity, message.effort)),
         )
-        _check_lengths(origin, state)
+        _check_lengths(place, state)
         yield state
+
+
+@cache
+def _decoder(ros_1: bool) -> Callable[[bytes, str], Any]:
+    """What decodes a message. It knows ROS's definitions alone, whatever a bag says of its types."""
+    from rosbags.typesys import Stores, get_typestore
+
+    if ros_1:
+        return get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
+    return get_typestore(Stores.ROS2_JAZZY).deserialize_cdr
 
 
 def _check_lengths(origin: str, state: _State) -> None:
@@ -229,56 +224,79 @@ def _names(origin: str, states: list[_State], wanted: tuple[str, ...] | None, li
 class _Table:
     """The messages that have all of some joints, as columns in the order of these joints."""
 
-    def __init__(self, origin: str, names: tuple[str, ...], states: list[_State]) -> None:
+    def __init__(self, origin: str, names: tuple[str, ...], states: list[_State], missing: list[str]) -> None:
         self._origin = origin
         self._names = names
-        self._states = [state for state in states if set(names) <= set(state.names)]
-        self._left_out = len(states) - len(self._states)
-        self._columns = [[state.names.index(name) for name in names] for state in self._states]
+        self._said = [f"{INCOMPLETE}{line}." for line in missing]
+        self._states = self._keep("Messages without all of these joints", states, lambda s: set(names) <= set(s.names))
+        self._states = self._keep(
+            "Messages with a position that is no number",
+            self._states,
+            lambda s: bool(np.isfinite(s.position[self._columns(s)]).all()),
+        )
 
-    def trace(self, record: TraceRecord, times: Times | None) -> Trace:
+    def _columns(self, state: _State) -> list[int]:
+        return [state.names.index(name) for name in self._names]
+
+    def _keep(self, what: str, states: list[_State], good: Callable[[_State], bool]) -> list[_State]:
+        """The states that are good; the others are counted. Raises TraceError where none is."""
+        kept = [state for state in states if good(state)]
+        if len(kept) < len(states):
+            first = next(state.number for state in states if not good(state))
+            line = f"{what}, left out: {len(states) - len(kept)}, the first is message {first}."
+            if not kept:
+                raise TraceError(f"{self._origin}: {line} None is left")
+            self._said.append(line)
+        return kept
+
+    def trace(self, record: TraceRecord, times: Times | None, unit: DriveUnit | Literal["none"] | None) -> Trace:
         """The trace with joints numbered from 1, and notes on what was left out. Raises TraceError."""
-        said = [f"Messages without all of these joints, left out: {self._left_out}."] if self._left_out else []
-        moments = self._moments(times, said)
+        lost = bool(self._said) and self._said[0].startswith(INCOMPLETE)
+        moments = self._moments(times)
         created, time = _since_start(moments)
         if not EARLIEST <= created < LATEST:
             raise TraceError(f"{self._origin}: its times are not of the years 1970 to 2261; --received takes others")
-        velocity, effort = self._optional("velocity", said), self._optional("effort", said)
-        update = {"notes": " ".join([record.notes, *said]).strip(), "created": created}
-        if effort is not None:
-            update["drive_unit"] = record.drive_unit or "N·m"
+        velocity, effort = self._optional("velocity"), self._optional("effort")
+        if effort is not None and unit is None:
+            line = "its effort may be in N·m, as ROS defines it, or in amperes, as many drivers send it"
+            raise TraceError(f"{self._origin}: {line}; say --drive-unit Nm, N, A or V, or none to leave it out")
+        drive = None if unit == "none" else effort
+        update: dict[str, Any] = {"notes": " ".join([record.notes, *self._said]).strip(), "created": created}
+        update |= {"drive_unit": unit if drive is not None else None} | ({"outcome": "interrupted"} if lost else {})
         numbers = tuple(range(1, len(self._names) + 1))
-        position = self._position()
-        return Trace(record.model_copy(update=update), numbers, time, position, velocity=velocity, drive=effort)
+        position = self._stacked("position")
+        return Trace(record.model_copy(update=update), numbers, time, position, velocity=velocity, drive=drive)
 
-    def _moments(self, times: Times | None, said: list[str]) -> list[int]:
-        """Time (ns since 1970) of each sample. Raises TraceError where it does not increase."""
+    def _moments(self, times: Times | None) -> list[int]:
+        """Time (ns since 1970) of each sample; a message with the time of the one before is left out.
+
+        Raises TraceError where a time goes back.
+        """
         stamped = all(state.stamp for state in self._states)
         if times == "stamped" and not stamped:
             number = next(state.number for state in self._states if not state.stamp)
             raise TraceError(f"{self._origin}: message {number}: has no stamp; --received takes other times")
         received = times == "received" or not stamped
         if received:
-            said.append("Times are those at which messages were received.")
-        moments = [state.received if received else state.stamp for state in self._states]
-        for before, after, state in zip(moments, moments[1:], self._states[1:], strict=False):
-            if after <= before:
-                line = f"its time {after / 1e9:.9f} s does not come after {before / 1e9:.9f} s"
-                hint = "" if received else "; --received takes the times at which messages were received"
+            self._said.append("Times are those at which messages were received.")
+        moments = {state.number: state.received if received else state.stamp for state in self._states}
+        for before, state in zip(self._states, self._states[1:], strict=False):
+            if moments[state.number] < moments[before.number]:
+                now, then = moments[state.number] / 1e9, moments[before.number] / 1e9
+                line = f"its time {now:.9f} s does not come after {then:.9f} s"
+                hint = "; --received takes the times at which messages were received"
                 raise TraceError(f"{self._origin}: message {state.number}: {line}{hint}")
-        return moments
+        again = {
+            state.number
+            for before, state in zip(self._states, self._states[1:], strict=False)
+            if moments[state.number] == moments[before.number]
+        }
+        self._states = self._keep(
+            "Messages with the time of the one before", self._states, lambda state: state.number not in again
+        )
+        return [moments[state.number] for state in self._states]
 
-    def _position(self) -> Floats:
-        found = self._stacked("position")
-        wrong = np.argwhere(~np.isfinite(found))
-        if len(wrong):
-            row, column = wrong[0]
-            value, number = found[row, column], self._states[row].number
-            line = f"position of joint {self._names[column]!r} is {value}"
-            raise TraceError(f"{self._origin}: message {number}: {line}")
-        return found
-
-    def _optional(self, name: Optional, said: list[str]) -> Floats | None:
+    def _optional(self, name: Optional) -> Floats | None:
         """A signal that messages may lack, or fill with NaN; None where one of them does."""
         lacking = sum(len(getattr(state, name)) == 0 for state in self._states)
         if lacking == 0:
@@ -288,12 +306,11 @@ class _Table:
                 return found
             lacking = int((~finite).sum())
         if lacking < len(self._states):
-            said.append(f"{name} was left out: {lacking} of {len(self._states)} messages lack it.")
+            self._said.append(f"{name} was left out: {lacking} of {len(self._states)} messages lack it.")
         return None
 
     def _stacked(self, name: Literal["position", "velocity", "effort"]) -> Floats:
-        rows = zip(self._states, self._columns, strict=True)
-        return np.array([getattr(state, name)[columns] for state, columns in rows])
+        return np.array([getattr(state, name)[self._columns(state)] for state in self._states])
 
 
 def _since_start(moments: list[int]) -> tuple[datetime, Floats]:

@@ -5,19 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.bounds import check_trace
 from daq.traces.naming import part_path
+from daq.traces.reader import trace_of
 from daq.traces.recording import Recording
+from daq.traces.scan import scan
 from daq.traces.writer import ROWS_A_CHUNK
 
 
-def write_trace(trace: Trace, path: Path) -> Path:
+def write_trace(trace: Trace, path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Path:
     """Writes `trace` to a new file at `path`, so that it is there whole or not at all. Returns `path`.
+
+    It is read back within `limits` before it gets its name: what no command reads is not kept.
 
     Raises TraceError when the file exists or cannot be written, or no reader would take the trace.
     """
@@ -38,6 +47,7 @@ def write_trace(trace: Trace, path: Path) -> Path:
                         recording.flush()
                 recording.finish(trace.record.outcome, trace.record.counters)
                 disk.sync(stream)
+                _check_copy(part, trace, limits)
                 disk.rename(part, path)
             except BaseException:
                 part.unlink(missing_ok=True)
@@ -45,6 +55,23 @@ def write_trace(trace: Trace, path: Path) -> Path:
     except OSError as error:
         raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
     return path
+
+
+def _check_copy(part: Path, trace: Trace, limits: TraceLimits) -> None:
+    """Raises TraceError where a file does not read back as the trace that was written to it."""
+    data = part.read_bytes()
+    if len(data) > limits.file_bytes:
+        raise TraceError(f"{part}: would have more than {limits.file_bytes} bytes (traces.limits.file_bytes)")
+    copy = trace_of(scan(data, str(part), limits), str(part), limits)
+    differing = [name for name in layout.ALL_SIGNALS if not _same(getattr(copy, name), getattr(trace, name))]
+    if differing or copy.joints != trace.joints:
+        raise TraceError(f"{part}: does not read back as it was written ({', '.join(differing) or 'joints'})")
+
+
+def _same(read: NDArray[Any] | None, written: NDArray[Any] | None) -> bool:
+    return (read is None and written is None) or (
+        read is not None and written is not None and np.array_equal(read, written)
+    )
 
 
 def _signals(trace: Trace) -> tuple[str, ...]:

@@ -11,9 +11,11 @@ import numpy as np
 from daq.contracts.errors import TraceError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
-from daq.contracts.trace import LATE_SET_POINTS, Trace, late_set_points_line
+from daq.contracts.trace import INCOMPLETE, LATE_SET_POINTS, Trace, late_set_points_line
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
+from daq.traces.bag_files import kind_of
+from daq.traces.csv_table import import_csv
 from daq.traces.reader import TOO_LARGE, trace_of
 from daq.traces.scan import Scan, scan
 
@@ -56,11 +58,25 @@ def verify(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Verificati
     try:
         with disk.open_regular(path) as stream:
             data = disk.read_at_most(stream, limits.file_bytes, str(path))
+        if kind_of(path, limits) == "csv":
+            return Verification(path=path, findings=tuple(_findings_of_csv(path, limits)))
         return Verification(path=path, findings=tuple(_findings(path, data, limits)))
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
     except MemoryError as error:
         raise TraceError(f"{path}: {TOO_LARGE}") from error
+
+
+def _findings_of_csv(path: Path, limits: TraceLimits) -> Iterator[Finding]:
+    yield Finding(level="note", check="file", message="is CSV: it has no checksums, so no number of it can be checked")
+    try:
+        trace = import_csv(path, limits)
+    except TraceError as error:
+        yield Finding(level="error", check="trace", message=str(error))
+        return
+    yield from _outcome(trace)
+    yield from _ticks(trace)
+    yield from _signals(trace)
 
 
 def _findings(path: Path, data: bytes, limits: TraceLimits) -> Iterator[Finding]:
@@ -100,12 +116,17 @@ def _outcome(trace: Trace) -> Iterator[Finding]:
         yield Finding(level="warning", check="outcome", message=f"the run ended as {outcome!r}")
     if late := trace.record.counters.get(LATE_SET_POINTS, 0.0):
         yield Finding(level="warning", check="set_points", message=late_set_points_line(late))
+    if INCOMPLETE in trace.record.notes:
+        yield Finding(level="warning", check="samples", message=trace.record.notes)
     if len(trace) == 0:
         yield Finding(level="warning", check="samples", message="has no samples")
 
 
 def _ticks(trace: Trace) -> Iterator[Finding]:
-    if trace.tick is None or len(trace) < 2:
+    if len(trace) < 2:
+        return
+    if trace.tick is None:
+        yield Finding(level="note", check="gaps", message=f"samples are {trace.missing_text}")
         return
     steps = np.diff(trace.tick)
     if (steps <= 0).any():

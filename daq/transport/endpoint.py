@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import socket
+import termios
+from contextlib import suppress
 from typing import Protocol
 
 import serial
 
 from daq.transport.channel import ByteChannel, DescriptorChannel
+from daq.transport.holders import FINDERS, other_holders
 from daq.transport.mock_process import MockProcess, start_mock
-from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
+from daq.transport.pseudo_terminal import NUMBERED, Terminal, require_same, terminal_at
 from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
 
 CONNECT_TIMEOUT_S = 3.0
@@ -118,6 +123,9 @@ def _connect_serial(port: SerialPort) -> ByteChannel:
     except (serial.SerialException, OSError, ValueError) as error:
         kind = PortBusyError if _is_busy(error) else TransportError
         raise kind(_why_serial_failed(port.device, error)) from error
+    with suppress(OSError):  # a program that is started later gets no part of the line; the last close frees it again
+        if NUMBERED.fullmatch(os.path.realpath(port.device)) is None and not other_holders(port.device):
+            fcntl.ioctl(device.fileno(), termios.TIOCEXCL)
     device.reset_input_buffer()
     return DescriptorChannel(device.fileno(), port.device, device.close)
 
@@ -129,7 +137,8 @@ def _is_busy(error: Exception) -> bool:
 def _why_serial_failed(device: str, error: Exception) -> str:
     text = str(error)
     if _is_busy(error):
-        return f"{device} is in use by another program: end that one, or stop the arm with `daq stop` as its user"
+        line = f"{device} is in use by another program: end that one, or stop the arm with `daq stop` as its user"
+        return f"{line}; it is {' and '.join(other_holders(device)) or 'not one of yours: ' + FINDERS}"
     if "No such file" in text:
         return f"{device} does not exist: `daq ports` lists the ports that do"
     if "Permission denied" in text:

@@ -43,14 +43,14 @@ def traces(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     folder = Path(ctx.params.get("folder") or _configured_folder())
     found = {str(path): None for path in sorted(folder.glob("*.mcap"), reverse=True)}
     here = Path(incomplete).parent if incomplete else Path()
-    found |= {str(path): None for path in sorted(here.glob("*")) if path.suffix in SUFFIXES}
+    found |= {str(path): None for path in sorted(here.glob("*")) if path.suffix.lower() in SUFFIXES}
     yield from (name for name in found if name.startswith(incomplete))
 
 
 def _configured_folder() -> str:
     """The folder of traces in ./daq.toml, read directly: loading the settings takes a third of a second."""
     try:
-        section = tomllib.loads(Path(os.environ.get("DAQ_CONFIG", CONFIGURATION)).read_text("utf-8"))["traces"]
+        section = tomllib.loads(Path(os.environ.get("DAQ_CONFIG", CONFIGURATION)).read_text("utf-8-sig"))["traces"]
         return str(Path(section["folder"]).expanduser())
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return "traces"

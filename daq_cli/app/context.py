@@ -130,5 +130,6 @@ def invocation(context: typer.Context) -> Invocation:
 
 def print_json(data: Any) -> None:
     """Prints data on standard output as one JSON document."""
-    json.dump(data, sys.stdout, indent=2, ensure_ascii=False, default=str)
-    sys.stdout.write("\n")
+    text = json.dumps(data, indent=2, ensure_ascii=False, default=str)
+    # A file's name that is no UTF-8 has surrogates in Python: written as JSON's own escapes, they read back.
+    sys.stdout.write(text.encode("utf-8", "backslashreplace").decode() + "\n")

@@ -39,10 +39,10 @@ def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
 
 
 def _read(context: typer.Context, wanted: str, folder: Path | None) -> tuple[Path, Trace]:
-    from daq.traces.reader import read_trace
+    from daq.traces.files import open_trace
 
     path = _path(context, wanted, folder)
-    return path, read_trace(path, robot_of(context).call.trace_limits)
+    return path, open_trace(path, robot_of(context).call.trace_limits)
 
 
 @app.command("ls")
@@ -114,7 +114,7 @@ def show(
                 "path": path,
                 "record": data,
                 "samples": len(found),
-                "missing": found.missing,
+                "missing": None if found.tick is None else found.missing,
                 "joints": joints,
                 "tracking": tracking_data(found),
             }
@@ -124,7 +124,7 @@ def show(
     what = record.spec.trajectory.kind if record.spec else "import"
     print(printable(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}"))
     print(printable(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}"))
-    print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing} missing")
+    print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing_text}")
     if record.operator or record.notes:
         print(printable(f"operator {record.operator or '?'}: {record.notes}"))
     print_figures(found)
@@ -169,6 +169,8 @@ def export(
 
     path, found = _read(context, trace, folder)
     write = export_table if output is not None and output.suffix in (PARQUET, NETCDF) else write_csv
+    if output is None and path.suffix.lower() == ".csv":
+        raise SpecError(f"{path}: is CSV already; name the file to write with -o")
     _print_file(path, write(found, output or path.with_suffix(".csv")), as_json=json)
 
 
@@ -192,13 +194,17 @@ def import_(
     topic: Annotated[str | None, typer.Option(help="Of a bag: the topic of the joint states.")] = None,
     joints: Annotated[str | None, typer.Option(help="Of a bag: names of joints, separated by commas.")] = None,
     received: Annotated[bool, typer.Option("--received", help="Of a bag: the times of reception.")] = False,
+    drive_unit: Annotated[
+        str | None,
+        typer.Option(help="Unit of the drive: V, A, Nm or N; of a bag, that of its effort, which `none` leaves out."),
+    ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
     """Import a trace of another rig or tool."""
     robot = robot_of(context)
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
-    made = robot.import_trace(file, folder, BagChoice(topic, names, received))
+    made = robot.import_trace(file, folder, BagChoice(topic, names, received, drive_unit))
     if json:
         print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:

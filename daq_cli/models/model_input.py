@@ -13,7 +13,7 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq_cli.app import completion
-from daq_cli.app.context import console
+from daq_cli.app.context import console, printable
 from daq_cli.app.output_file import check_folder
 
 if TYPE_CHECKING:
@@ -152,9 +152,12 @@ def model_labels(names: Sequence[str]) -> list[str]:
 
 
 def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -> list[Trace]:
-    """Traces by file, number, name or `last`; CSV files are read as they are. Raises TraceError, SpecError."""
-    from daq.traces.csv_table import import_csv
-    from daq.traces.reader import read_trace
+    """Traces by file, number, name or `last`; CSV files are read as they are, and what one lacks is told.
+
+    Raises TraceError, SpecError.
+    """
+    from daq.contracts.trace import INCOMPLETE
+    from daq.traces.files import open_trace
 
     call = robot.call
     place = folder or call.trace_folder
@@ -162,12 +165,11 @@ def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -
         raise SpecError("no traces named: at least one is needed")
     found = []
     for name in names:
-        if Path(name).suffix == ".csv" and Path(name).is_file():
-            trace, file = import_csv(Path(name), call.trace_limits), name
-        else:
-            path = robot.find_trace(place, name)
-            trace, file = read_trace(path, call.trace_limits), name if Path(name).is_file() else path.name
-        found.append(replace(trace, file=file))
+        path = robot.find_trace(place, name)
+        trace = replace(open_trace(path, call.trace_limits), file=name if Path(name).is_file() else path.name)
+        if INCOMPLETE in trace.record.notes:
+            console().print(printable(f"{trace.file}: {trace.record.notes}"))
+        found.append(trace)
     return found
 
 

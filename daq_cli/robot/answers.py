@@ -33,11 +33,13 @@ class ResetDone:
 
 @dataclass(frozen=True)
 class BagChoice:
-    """What is taken from a bag: the topic, the names of the joints, and whether the times are those of reception."""
+    """What is taken from a bag: the topic, the names of the joints, whether the times are those of reception, and the
+    unit of the effort. Of any other file only the unit of the drive can be chosen."""
 
     topic: str | None = None
     joints: tuple[str, ...] | None = None
     received: bool = False
+    drive_unit: str | None = None
 
 
 @dataclass(frozen=True)

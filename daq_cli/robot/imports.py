@@ -6,50 +6,63 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import TraceLimits
 from daq_cli.robot.answers import BagChoice
 
+UNITS = {"V": "V", "A": "A", "N": "N", "Nm": "N·m", "N·m": "N·m", "none": "none"}
+"""What a person may write for the unit of a drive, and what a trace calls it."""
+
 
 def foreign_trace(file: Path, limits: TraceLimits, choice: BagChoice, numbering: tuple[str, ...]) -> Trace:
     """The trace in a CSV file or a bag. numbering: names of the joints 1, 2 … of the machine in use, by which those of
     a bag are numbered. Raises SpecError, TraceError, MissingExtraError."""
-    from daq.traces.bag_files import METADATA, STORAGES, is_bag
+    from daq.traces import ros_bag
+    from daq.traces.bag_files import STORAGES, kind_of
     from daq.traces.bag_process import import_bag_apart
+    from daq.traces.bag_storage import METADATA
     from daq.traces.csv_table import import_csv
-    from daq.traces.ros_bag import Times
 
-    if is_bag(file):
-        times: Times | None = "received" if choice.received else None
-        return import_bag_apart(
-            file, limits, topic=choice.topic, joints=choice.joints, times=times, numbering=numbering
-        )
+    if choice.drive_unit is not None and choice.drive_unit not in UNITS:
+        raise SpecError(f"--drive-unit {choice.drive_unit}: write {', '.join(UNITS)}")
+    unit: Any = UNITS.get(choice.drive_unit or "")
+    if kind_of(file, limits) != "csv":
+        times: ros_bag.Times | None = "received" if choice.received else None
+        chosen = ros_bag.BagChoice(choice.topic, choice.joints, times, unit, numbering)
+        return import_bag_apart(file, limits, chosen)
     if file.is_dir():
         inside = sorted(one.name for one in file.iterdir() if one.suffix in STORAGES)
         rather = f"; name the file in it, {file / inside[0]}" if inside else ""
         raise SpecError(f"{file}: is a folder without {METADATA}, as a recording leaves that was cut off{rather}")
-    if choice != BagChoice():
+    _require_no_bag_choice(file, choice)
+    if unit == "none":
+        raise SpecError(f"{file}: --drive-unit none is for bags; leave the column out")
+    return import_csv(file, limits, drive_unit=unit)
+
+
+def _require_no_bag_choice(file: Path, choice: BagChoice) -> None:
+    if choice != BagChoice(drive_unit=choice.drive_unit):
         raise SpecError(f"{file}: --topic, --joints and --received are for bags; this is none")
-    return import_csv(file, limits)
 
 
 @contextmanager
 def to_upload(
     file: Path, limits: TraceLimits, choice: BagChoice, numbering: Callable[[], tuple[str, ...]]
 ) -> Iterator[tuple[Path, str]]:
-    """Yields the file to upload to a service, the trace that is made of a bag and any other file as it is, and what was
-    noted in making it."""
-    from daq.traces.bag_files import is_bag, is_trace
+    """Yields the file to upload to a service, the trace that is made of anything but a trace, and what was noted in
+    making it."""
+    from daq.traces.bag_files import is_trace
     from daq.traces.naming import trace_path
     from daq.traces.store import write_trace
 
-    if not is_bag(file) or is_trace(file, limits):
+    if file.is_file() and is_trace(file, limits):
         if choice != BagChoice():
-            raise SpecError(f"{file}: --topic, --joints and --received are for bags; this is none")
+            raise SpecError(f"{file}: --topic, --joints, --received and --drive-unit are for bags; this is none")
         yield file, ""
         return
     with tempfile.TemporaryDirectory() as folder:
         trace = foreign_trace(file, limits, choice, numbering())
-        yield write_trace(trace, trace_path(Path(folder), trace.record)), trace.record.notes
+        yield write_trace(trace, trace_path(Path(folder), trace.record), limits), trace.record.notes

@@ -205,7 +205,7 @@ class LocalRobot:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
-        made = write_trace(found, trace_path(place, found.record))
+        made = write_trace(found, trace_path(place, found.record), self.call.trace_limits)
         return ImportedTrace(found.record.trace_id, str(made), str(made), found.record.notes)
 
     def program(self, name: Path) -> Program:

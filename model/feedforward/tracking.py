@@ -8,11 +8,12 @@ import numpy as np
 
 from daq.contracts.experiment import TrackingError
 from daq.contracts.trace import Floats, Integers, Trace
+from daq.contracts.with_arrays import WithArrays
 from model.feedforward.motion import Planner
 
 
-@dataclass(frozen=True)
-class Followed:
+@dataclass(frozen=True, eq=False)
+class Followed(WithArrays):
     """A motion beside the arm that was to follow it, sample by sample.
 
     joints: those of the experiment, one column each. time (m,) s; wanted, reached (m, j) rad.

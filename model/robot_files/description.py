@@ -70,6 +70,8 @@ class Description:
     name: str
     links: tuple[DescribedLink, ...]
     gravity: Floats
+    doubts: tuple[str, ...] = ()
+    """One line for everything that looks like another unit."""
 
     @property
     def joints(self) -> dict[str, int]:

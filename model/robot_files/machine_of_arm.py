@@ -88,10 +88,14 @@ def machine_of_arm(
     """The machine of an arm; see `machine_from_urdf`. What `parts` says of a joint comes before `drives`."""
     names = [joint.joint.name for joint in arm.joints]
     source = Path(arm.description.origin).name
-    frames = frames_of([j.point for j in arm.joints], [j.direction for j in arm.joints], arm.tip, names)
+    try:
+        frames = frames_of([j.point for j in arm.joints], [j.direction for j in arm.joints], arm.tip, names)
+    except SpecError as error:
+        raise SpecError("; ".join([str(error), *arm.description.doubts])) from error
     down = arm.description.gravity if gravity is None else np.array(gravity)
     known = _known(names, drives, parts)
-    notes = [f"Made from {source}.", *_held(arm), *(f"{note[0].upper()}{note[1:]}." for note in frames.notes)]
+    doubts = [f"CHECK: {doubt}" for doubt in arm.description.doubts]
+    notes = [f"Made from {source}.", *doubts, *_held(arm), *(f"{note[0].upper()}{note[1:]}." for note in frames.notes)]
     made = []
     for i, joint in enumerate(arm.joints):
         body = _body(joint, frames, i + 1, source, notes)

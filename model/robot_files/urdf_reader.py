@@ -35,7 +35,7 @@ def parse_urdf(text: str, origin: str) -> Description:
         waiting += body.bodies
     if len(links) != len(checked.parents) + 1:
         raise SpecError(f"{origin}: MuJoCo reads {len(links)} of its {len(checked.parents) + 1} links")
-    return Description(origin, checked.name, tuple(links), np.array(spec.option.gravity))
+    return Description(origin, checked.name, tuple(links), np.array(spec.option.gravity), checked.doubts)
 
 
 def _spec(text: str, origin: str) -> Any:

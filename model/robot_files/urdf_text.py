@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree as Xml
 
@@ -20,6 +21,17 @@ MOST_LINKS = 1000
 """Most links of a URDF that is read; reading takes time in proportion to the square of their number."""
 MOST_ELEMENTS = 200_000
 """Most XML elements of a URDF that is read."""
+
+LONGEST = 20.0
+"""Length (m) beyond any arm's; Canadarm2, the longest, has 17.6 m."""
+FULL_TURN = math.tau + 1e-2
+"""Largest angle (rad) of an origin's turn, with its rounding."""
+MOST_TURNS = 4
+"""Turns of a joint with limits beyond which they are doubted: cables that run through a joint allow two or three."""
+DENSEST = 9 * 22_600.0
+"""Largest mass (kg) by the cube of half the sum of its moments' radius (m³): a ball of osmium, the densest matter
+(22 600 kg/m³), has m/r³ = 4π/3 ρ and a radius of 0.775 r; every other shape has less."""
+XACRO = "is xacro that was not expanded; make a URDF of it first: `xacro FILE > robot.urdf`"
 
 NO_LIMIT = 1e9
 """Number from which a limit counts as none: of a joint that slides, a URDF must state limits, even if it has none."""
@@ -67,6 +79,8 @@ class CheckedUrdf:
     parents: dict[str, str]
     joint_of: dict[str, str]
     joints: dict[str, JointText]
+    doubts: tuple[str, ...] = ()
+    """One line for everything that looks like another unit than URDF's m, kg, kg·m² and rad."""
 
 
 def checked_urdf(text: str, origin: str) -> CheckedUrdf:
@@ -81,7 +95,7 @@ def checked_urdf(text: str, origin: str) -> CheckedUrdf:
         _check_inertial(link, origin)
     found = {_name(joint, origin): _joint(joint, origin) for joint in joints}
     root, parents, joint_of = _tree(links, joints, origin)
-    return CheckedUrdf(robot.get("name") or "robot", root, parents, joint_of, found)
+    return CheckedUrdf(robot.get("name") or "robot", root, parents, joint_of, found, tuple(_doubts(robot)))
 
 
 def _robot(text: str, origin: str) -> Xml.Element:
@@ -95,7 +109,11 @@ def _robot(text: str, origin: str) -> Xml.Element:
     try:
         root = Xml.fromstring(text)
     except (Xml.ParseError, ValueError, RecursionError) as error:
+        if "<xacro:" in text:
+            raise SpecError(f"{origin}: {XACRO}") from error
         raise SpecError(f"{origin}: not XML: {error}") from error
+    if any("xacro" in element.tag.rpartition("}")[0] for element in root.iter()):
+        raise SpecError(f"{origin}: {XACRO}")
     if root.tag != "robot":
         raise SpecError(f"{origin}: its outermost element is <{shown(root.tag)[1:-1]}>; a URDF has <robot>")
     return root
@@ -167,6 +185,35 @@ def _joint(joint: Xml.Element, origin: str) -> JointText:
         _number(dynamics, "friction", where),
         None if leader is None else Follower(leader, 1.0 if ratio is None else ratio, offset or 0.0),
     )
+
+
+def _doubts(robot: Xml.Element) -> Iterator[str]:
+    """What no arm has in URDF's own units; numbers have been checked before."""
+    origins = [origin for joint in robot.findall("joint") if (origin := joint.find("origin")) is not None]
+    reach = sum(math.hypot(*(_numbers(origin, "xyz", "") or (0.0,))) for origin in origins)
+    if reach > LONGEST:
+        yield f"its joints are {reach:.4g} m apart in all, more than any arm's: are lengths in mm?"
+    turns = [abs(angle) for origin in origins for angle in _numbers(origin, "rpy", "") or ()]
+    limits = [
+        abs(_number(joint.find("limit"), end, "") or 0.0)
+        for joint in robot.findall("joint")
+        for end in ("lower", "upper")
+        if joint.get("type") == "revolute"
+    ]
+    if max(turns, default=0.0) > FULL_TURN:
+        yield f"an origin is turned by rpy {max(turns):.4g} rad, more than once round: are angles in degrees?"
+    if NO_LIMIT > max(limits, default=0.0) > MOST_TURNS * FULL_TURN:
+        yield f"a joint turns up to {max(limits):.4g} rad, more than {MOST_TURNS} times round: are limits in degrees?"
+    for link in robot.findall("link"):
+        mass = _number(link.find("inertial/mass"), "value", "") or 0.0
+        moments = [_number(link.find("inertial/inertia"), axis, "") or 0.0 for axis in ("ixx", "iyy", "izz")]
+        if mass <= 0.0 or min(moments) <= 0.0:
+            continue
+        radius = math.sqrt(sum(moments) / (2.0 * mass))
+        if radius > LONGEST or mass > DENSEST * radius**3:
+            what = f"{mass:.4g} kg with moments to {max(moments):.4g} kg·m²"
+            yield f"link {shown(link.get('name'))} has {what}, which no body has: are they in g, mm or placeholders?"
+            return
 
 
 def _largest(limit: float | None) -> float | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
+from daq.contracts.with_arrays import WithArrays
 from model.arrays import Floats
 from model.dynamics.dual import DUAL_STEP
 from model.machine_model.model import Model
@@ -21,8 +22,8 @@ from model.simulation.period import OUT_DRIVE, OUT_ERROR, OUT_POSITION, OUT_POWE
 from model.simulation.prepared import Options, prepare
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, eq=False)
+class Simulation(WithArrays):
     """Motion of a model, one row a control period, one column a joint.
 
     time (k,) s; position (k, n) rad, the joint's own angle; velocity rad/s; reading rad, what the model's sensor shows;

@@ -178,7 +178,7 @@ def open_provider(settings: OidcSettings) -> Provider | None:
     secret = None
     if settings.client_secret is not None:
         try:
-            secret = settings.client_secret.read_text("utf-8").strip()
+            secret = settings.client_secret.read_text("utf-8-sig").strip()
         except (OSError, UnicodeDecodeError) as error:
             # Without the value: whoever writes the secret itself there shall not find it in a log.
             why = error.strerror if isinstance(error, OSError) else "it is no text"

@@ -10,10 +10,10 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace, TraceRecord
+from daq.traces.bag_files import kind_of
 from daq.traces.catalogue import TraceSummary, summary_of
-from daq.traces.csv_table import import_csv
+from daq.traces.files import open_trace
 from daq.traces.naming import trace_path
-from daq.traces.reader import read_trace
 from daq.traces.store import write_trace
 from daq.traces.summary import joint_figures
 from server.bounded.messages import ReadUpload, UploadedTrace
@@ -29,13 +29,13 @@ def read_upload(order: ReadUpload) -> UploadedTrace:
     """Reads the trace in a file. Raises TraceError, and any error that a damaged file causes in its reader."""
     path = order.path
     try:
-        trace = import_csv(path, order.limits) if path.suffix == ".csv" else read_trace(path, order.limits)
+        trace = open_trace(path, order.limits)
         _require_sound(trace)
         target = trace_path(order.folder, trace.record)
         made = path
-        if path.suffix == ".csv":
+        if kind_of(path, order.limits) == "csv":
             made = path.with_name(target.name)
-            write_trace(trace, made)
+            write_trace(trace, made, order.limits)
         summary = summary_of(made, order.limits)
         _require_true(summary, trace)
         return UploadedTrace(path=made, name=target.name, summary=summary)

@@ -21,6 +21,7 @@ from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.robot import StopResult
 from server.access.caller import Caller
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
+from server.descriptors import most_connections
 from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
 from server.stopping.arm import together
 
@@ -78,7 +79,8 @@ class _Server(ThreadingHTTPServer):
         self.gate, self.stops, self.on_stop = gate, stops, on_stop
         self.socket.close()
         self.socket = listener
-        self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
+        self._most = most_connections(MOST_AT_ONCE)
+        self._room = threading.BoundedSemaphore(self._most)
         self._since: dict[socket.socket, float] = {}
         """When each connection was made (s, monotonic). Adding and removing an entry are one atomic operation each."""
         self.server_activate()
@@ -144,7 +146,7 @@ class _Server(ThreadingHTTPServer):
     def wait_for_answers(self, within: float) -> None:
         """Waits until no connection is left, or `within` s are over."""
         until = time.monotonic() + within
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(self._most):
             if not self._room.acquire(timeout=max(0.0, until - time.monotonic())):
                 return
 

@@ -16,7 +16,18 @@ from tests.daq_cli.invoke import CommandLine
 
 def test_the_joints_that_are_named_become_a_trace(daq: CommandLine, tmp_path: Path) -> None:
     path = bag(tmp_path / "a", [{}] * 5, topics=("/left", "/right"))
-    words = ("--topic", "/right", "--joints", "lift, pan", "--received", "--folder", tmp_path / "kept", "--json")
+    words = (
+        "--topic",
+        "/right",
+        "--joints",
+        "lift, pan",
+        "--received",
+        "--drive-unit",
+        "none",
+        "--folder",
+        tmp_path / "kept",
+        "--json",
+    )
     made = json.loads(daq("traces", "import", path, *words).out)
     trace = read_trace(Path(made["file"]))
     np.testing.assert_array_equal(trace.position, [[-0.2 * k, 0.1 * k] for k in range(5)])
@@ -41,11 +52,11 @@ def test_joints_have_the_numbers_of_the_configured_machine_and_it_is_told(daq: C
     turned = {"names": ["tilt", "pan"], "position": [7.0, 8.0]}
     path = bag(tmp_path / "a", [turned] * 3)
     (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{PAN_TILT}"\n')
-    said = daq("--config", tmp_path / "daq.toml", "traces", "import", path)
+    said = daq("--config", tmp_path / "daq.toml", "traces", "import", path, "--drive-unit", "Nm")
     assert "From topic /joint_states, joints 2 tilt, 1 pan." in said.err
     trace = read_trace(Path(said.out.strip()))
     assert trace.position[0, trace.column(1)] == 8.0
-    other = daq("traces", "import", path)
+    other = daq("traces", "import", path, "--drive-unit", "Nm")
     assert "joints 1 tilt, 2 pan." in other.err
     assert read_trace(Path(other.out.strip())).record.trace_id != trace.record.trace_id
 
@@ -56,3 +67,35 @@ def test_a_folder_that_a_cut_off_recording_left_is_named_as_that(daq: CommandLin
     daq("traces", "import", path).complains(2, "is a folder without metadata.yaml", f"name the file in it, {path}/")
     (tmp_path / "empty").mkdir()
     daq("traces", "import", tmp_path / "empty").complains(2, "is a folder without metadata.yaml")
+
+
+def test_the_unit_of_the_effort_is_asked_for(daq: CommandLine, tmp_path: Path) -> None:
+    path = bag(tmp_path / "a", [{}] * 3)
+    daq("traces", "import", path).complains(2, "say --drive-unit Nm, N, A or V, or none to leave it out")
+    daq("traces", "import", path, "--drive-unit", "kV").complains(2, "--drive-unit kV: write V, A, N, Nm")
+    amperes, without = (daq("traces", "import", path, "--drive-unit", unit, "--json").out for unit in ("A", "none"))
+    assert read_trace(Path(json.loads(amperes)["file"])).record.drive_unit == "A"
+    assert read_trace(Path(json.loads(without)["file"])).drive is None
+
+
+def test_a_table_is_shown_plotted_verified_and_exported_as_it_is(daq: CommandLine, tmp_path: Path) -> None:
+    path = tmp_path / "RIG.CSV"
+    path.write_text("time,position_1,drive_1\n0,0,1\n0.1,1,1\n20.1,1,1\n0.2")
+    shown = daq("traces", "show", path).out
+    assert "at most 20 s (after 0.1 s); it has no ticks, so whether some are missing is not known" in shown
+    assert "its last row has no line end" in shown
+    assert "is CSV: it has no checksums" in daq("traces", "verify", path).out
+    assert daq("traces", "plot", path, "-o", tmp_path / "a.png").code == 0
+    assert daq("traces", "export", path, "-o", tmp_path / "b.csv").code == 0
+    daq("traces", "export", path).complains(2, "is CSV already; name the file to write with -o")
+    made = json.loads(daq("traces", "import", path, "--drive-unit", "Nm", "--json").out)
+    assert read_trace(Path(made["file"])).record.drive_unit == "N·m"
+
+
+def test_names_of_files_that_are_no_text_are_listed_as_json_that_reads_back(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    named = tmp_path / "b\udcff.mcap"
+    trace.rename(named)
+    listed = daq("traces", "ls", "--folder", tmp_path, "--json").out
+    listed.encode("utf-8")
+    assert json.loads(listed)[0]["path"] == str(named)

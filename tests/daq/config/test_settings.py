@@ -12,9 +12,13 @@ import pytest
 from daq.config.limits import merged_limits
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import Settings, config_files, load_settings
+from daq.contracts.documents import parse_json, read_document
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import JointLimits, Limits
 from daq.contracts.machine import load_machine
+from firmware_protocol.memory_map import default_memory_map
+
+MAP = Path(__file__).parents[3] / "firmware_protocol" / "memory_map.toml"
 
 
 @pytest.fixture(autouse=True)
@@ -141,3 +145,13 @@ def test_a_memory_map_that_cannot_be_read_is_one_line() -> None:
     with pytest.raises(SpecError, match=r"memory map missing\.toml: cannot be read"):
         load_memory_map(Path("missing.toml"))
     assert load_memory_map(None).name.startswith("MA2000")
+
+
+def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path: Path) -> None:
+    texts = {"daq.toml": "[server]\nport = 8301\n", "map.toml": MAP.read_text("utf-8"), "a.json": "[1]"}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8-sig")
+    assert load_settings(tmp_path / "daq.toml")[0].server.port == 8301
+    assert load_memory_map(tmp_path / "map.toml") == default_memory_map()
+    assert read_document(tmp_path / "a.json", "a") == [1]
+    assert parse_json("\ufeff[1]", "a") == [1]

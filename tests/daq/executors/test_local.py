@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from concurrent.futures import BrokenExecutor
+from pathlib import Path
 
 from daq.executors import done_in_any_order, open_workers
 from daq.executors.workers import ending
 from tests.daq.executors.by_hand import process_of, square, square_or_die
+
+ROOT = {"PYTHONPATH": str(Path(__file__).parents[3])}
 
 
 def test_a_job_that_kills_its_process_is_told_and_every_other_is_answered_once() -> None:
@@ -27,3 +32,15 @@ def test_processes_that_are_given_up_end_at_once() -> None:
     workers.submit(square, 2)
     workers.abandon()
     assert not os.path.exists(f"/proc/{process}")
+
+
+def test_a_script_without_a_main_guard_is_not_run_again_in_its_workers(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from daq.executors import open_workers\n"
+        "from tests.daq.executors.by_hand import square\n"
+        "print('begun')\n"
+        "print(open_workers('local://1').submit(square, 7).result())\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, env=os.environ | ROOT)
+    assert (done.stdout.split(), done.stderr) == (["begun", "49"], "")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import pty
 import socket
+import subprocess
+import sys
 import threading
 import tty
 from collections.abc import Iterator
@@ -13,6 +15,7 @@ from contextlib import closing
 import pytest
 
 from daq.transport import ChannelError, ReconnectDelay, TransportError, open_endpoint
+from daq.transport.holders import other_holders, sharing_words
 
 
 @pytest.fixture
@@ -48,6 +51,22 @@ def test_a_port_has_one_owner(terminal: tuple[int, str]) -> None:
     ):
         endpoint.connect()
     endpoint.connect().close()
+
+
+def test_another_program_that_reads_from_a_port_is_named(terminal: tuple[int, str]) -> None:
+    _, device = terminal
+    with open(device, "rb", buffering=0) as held:
+        other = subprocess.Popen(["sleep", "60"], stdin=held)
+    try:
+        assert other_holders(device) == []  # what this process started is no stranger
+        asked = f"from daq.transport import holders; print(holders.sharing_words({device!r}))"
+        told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
+        assert f"sleep (process {other.pid}) has {device} open too, and takes its bytes: end that program" in told
+    finally:
+        other.kill()
+        other.wait()
+    assert "ModemManager and brltty open new ports by themselves" in sharing_words(device)
+    assert sharing_words("127.0.0.1:5000") == ""
 
 
 def test_a_port_that_does_not_exist_is_named() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,8 @@ import pytest
 from daq.contracts.errors import SpecError
 from model.machine_model.model import base_model
 from model.robot_files.machine_of_arm import machine_from_urdf
+from model.robot_files.urdf_text import checked_urdf
+from tests.model.robot_files.arms import ARMS
 from tests.model.robot_files.robots import HOSTILE, INERTIAL, TURNING, TWO_JOINTS, joint, link, robot
 
 
@@ -78,3 +82,36 @@ def test_moments_that_no_real_body_has_are_told(tmp_path: Path) -> None:
     unreal = INERTIAL.replace('"0.03"', '"0.3"')
     machine = machine_from_urdf(written(tmp_path, robot(link("a"), link("b", unreal), joint("j", "a", "b"))))
     assert "No real body has the moments that joint j carries (0.019" in machine.notes
+
+
+@pytest.mark.parametrize(
+    ("pattern", "factor", "said"),
+    [
+        (r'(xyz=")([^"]*)"', 1000.0, "are lengths in mm?"),
+        (r'(mass value=")([^"]*)"', 1000.0, "are they in g, mm or placeholders?"),
+        (r'(rpy=")([^"]*)"', math.degrees(1), "are angles in degrees?"),
+        (r'(lower="|upper=")([^"]*)"', math.degrees(1), "are limits in degrees?"),
+    ],
+)
+def test_a_urdf_in_other_units_is_doubted(pattern: str, factor: float, said: str) -> None:
+    def scaled(match: re.Match[str]) -> str:
+        return match[1] + " ".join(repr(float(word) * factor) for word in match[2].split()) + '"'
+
+    text = ARMS["ur5"].path.read_text()
+    assert checked_urdf(text, "ur5").doubts == ()
+    (doubt,) = checked_urdf(re.sub(pattern, scaled, text), "ur5").doubts
+    assert said in doubt
+
+
+def test_a_doubt_is_in_the_notes_of_the_machine(tmp_path: Path) -> None:
+    heavy = TWO_JOINTS.replace('mass value="2"', 'mass value="2000"')
+    assert "CHECK: link 'base' has 2000 kg with moments" in machine_from_urdf(written(tmp_path, heavy)).notes
+    far = TWO_JOINTS.replace('xyz="0.1 0.2 0.3"', 'xyz="100 200 300"')
+    with pytest.raises(SpecError, match=r"more than 100 m away.*; its joints are 748.3 m apart in all.*lengths in mm"):
+        machine_from_urdf(written(tmp_path, far))
+
+
+@pytest.mark.parametrize("declared", ['xmlns:xacro="http://www.ros.org/wiki/xacro"', ""])
+def test_xacro_that_was_not_expanded_is_named(tmp_path: Path, declared: str) -> None:
+    with pytest.raises(SpecError, match=r"is xacro that was not expanded; .*`xacro FILE > robot\.urdf`"):
+        machine_from_urdf(written(tmp_path, f'<robot name="a" {declared}><xacro:arm name="b"/></robot>'))

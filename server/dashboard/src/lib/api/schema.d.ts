@@ -6408,6 +6408,16 @@ export interface components {
             memory_map?: {
                 [key: string]: unknown;
             } | null;
+            /**
+             * Joint Names
+             * @default []
+             */
+            joint_names?: string[];
+            /**
+             * Joints Chosen
+             * @default false
+             */
+            joints_chosen?: boolean;
             spec?: components["schemas"]["ExperimentSpec"] | null;
             /** Gains */
             gains?: {

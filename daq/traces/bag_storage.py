@@ -1,0 +1,411 @@
+"""What a bag of ROS holds, and what of it is not there: each storage is held against what it says of itself.
+
+A channel of another program is never decoded, so whatever its definitions are, it keeps nothing from being read.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import zstandard
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
+from daq.contracts.documents import shown
+from daq.contracts.errors import TraceError
+from daq.contracts.trace_limits import TraceLimits
+from daq.traces import disk
+from daq.traces.fields import Fields, chunk_of, data_end_of
+from daq.traces.inflate import inflate
+from daq.traces.scan import HEAD, UNREADABLE
+
+METADATA = "metadata.yaml"
+JOINT_STATE = "sensor_msgs/msg/JointState"
+LARGEST_MESSAGE = 1 << 20
+"""Largest message (bytes) of joint states: that of some ten thousand joints."""
+NEVER_ENDED = "its recording was never ended, and what it had not yet written is missing"
+SQLITE_MAGIC = b"SQLite format 3\0"
+ROS_1_MAGIC = b"#ROSBAG V"
+
+_JOURNAL = bytes.fromhex("d9d505f920a163d7")
+"""First bytes of a rollback journal of SQLite; zeros stand there when its change has ended."""
+_WAL_HEAD, _FRAME_HEAD = 32, 24
+"""Bytes before the frames of SQLite's write-ahead log, and before the page of each (https://sqlite.org/fileformat2.html#walformat)."""
+_MESSAGE = struct.Struct("<HIQQ")
+
+
+@dataclass
+class Contents:
+    """Topics, and the messages of those with joint states.
+
+    types:    type of the messages on each topic
+    messages: moment of reception (ns since 1970) and bytes of each message, by topic
+    missing:  one line for everything that the bag promises, or once held, and that is not here
+    ros_1:    whether messages are laid out as those of ROS 1
+    """
+
+    types: dict[str, str] = field(default_factory=dict)
+    messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
+    missing: list[str] = field(default_factory=list)
+    ros_1: bool = False
+
+    def topic(self, name: str, kind: str) -> bool:
+        """Adds a topic; True where it has joint states."""
+        self.types.setdefault(name, kind)
+        if kind == JOINT_STATE:
+            self.messages.setdefault(name, [])
+        return kind == JOINT_STATE
+
+    def hold(self, before: Mapping[str, int], promised: Mapping[str, int], who: str) -> None:
+        """Notes the messages that `who` promises on each topic and that have not come since `before`."""
+        for topic, count in promised.items():
+            there = len(self.messages.get(topic, ())) - before.get(topic, 0)
+            if self.types.get(topic) == JOINT_STATE and there < count:
+                self.missing.append(f"{who} promises {count} messages on {_text(topic)}, {there} are there")
+
+    def counts(self) -> dict[str, int]:
+        """Number of messages on each topic so far."""
+        return {topic: len(messages) for topic, messages in self.messages.items()}
+
+
+def contents(path: Path, limits: TraceLimits) -> Contents:
+    """What is in a bag, messages by their moments of reception.
+
+    Raises TraceError where a storage is damaged so that nothing tells what is left of it, where a limit is exceeded, or
+    a bag is being written; OSError; and for a bag of ROS 1 whatever rosbags does.
+    """
+    found = Contents()
+    if path.is_dir():
+        _folder(path, found, limits)
+    else:
+        _file(path, found, limits)
+    for messages in found.messages.values():
+        messages.sort(key=lambda message: message[0])
+        if len(messages) > limits.records:
+            raise TraceError(f"{path}: up to {limits.records} messages are read (traces.limits.records)")
+    return found
+
+
+def _folder(path: Path, found: Contents, limits: TraceLimits) -> None:
+    about = _about((path / METADATA).read_bytes(), f"{path / METADATA}")
+    names, mode = about.get("relative_file_paths"), str(about.get("compression_mode") or "").lower()
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise TraceError(f"{path / METADATA}: names no files (relative_file_paths)")
+    for kind in _topics(about).values():
+        found.topic(*kind[:2])
+    for name in names:
+        file = path / PurePath(name).name
+        if not file.is_file():
+            found.missing.append(f"{METADATA} names {_text(file.name)}, which is not there")
+            continue
+        with _plain(file, mode == "file") as plain:
+            _file(plain, found, limits)
+    if mode == "message":
+        for messages in found.messages.values():
+            messages[:] = [(received, _inflated(data, path)) for received, data in messages]
+    found.hold({}, {topic: count for topic, _, count in _topics(about).values()}, METADATA)
+
+
+def _about(data: bytes, origin: str) -> dict[str, Any]:
+    """What rosbag2 says of a bag, in YAML. Raises TraceError."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        read = YAML(typ="safe").load(data.decode("utf-8-sig"))
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise TraceError(f"{origin}: is not YAML: {shown(str(error))}") from error
+    about = read.get("rosbag2_bagfile_information", read) if isinstance(read, dict) else None
+    if not isinstance(about, dict):
+        raise TraceError(f"{origin}: says nothing of a bag (rosbag2_bagfile_information)")
+    return about
+
+
+def _topics(about: dict[str, Any]) -> dict[int, tuple[str, str, int]]:
+    """Name, type and promised number of messages of each topic; entries that are none are left out."""
+    topics = {}
+    entries = about.get("topics_with_message_count")
+    for number, entry in enumerate(entries if isinstance(entries, list) else ()):
+        with suppress(KeyError, TypeError, ValueError):
+            said = entry["topic_metadata"]
+            topics[number] = str(said["name"]), str(said["type"]), int(entry["message_count"])
+    return topics
+
+
+@contextmanager
+def _plain(file: Path, compressed: bool) -> Iterator[Path]:
+    """The file as it is, or uncompressed in a folder that is removed."""
+    if not compressed:
+        yield file
+        return
+    with TemporaryDirectory() as folder, file.open("rb") as packed:
+        plain = Path(folder) / file.stem
+        with plain.open("wb") as stream:
+            zstandard.ZstdDecompressor().copy_stream(packed, stream)
+        yield plain
+
+
+def _inflated(data: bytes, path: Path) -> bytes:
+    with zstandard.ZstdDecompressor().stream_reader(data) as plain:
+        found = plain.read(LARGEST_MESSAGE + 1)
+    if len(found) > LARGEST_MESSAGE:
+        raise TraceError(f"{path}: a message has more than {LARGEST_MESSAGE} bytes uncompressed; joint states have not")
+    return found
+
+
+def _file(file: Path, found: Contents, limits: TraceLimits) -> None:
+    with disk.open_regular(file) as stream:
+        first = stream.read(16)
+        if first.startswith(MCAP0_MAGIC):
+            stream.seek(0)
+            _Mcap(file, disk.read_at_most(stream, limits.file_bytes, str(file)), found, limits).read()
+            return
+    if first == SQLITE_MAGIC:
+        _sqlite(file, found, limits)
+    elif first.startswith(ROS_1_MAGIC):
+        _ros_1(file, found)
+    else:
+        raise TraceError(f"{file}: is neither MCAP nor SQLite nor a bag of ROS 1, or its beginning is damaged")
+
+
+def _text(text: str) -> str:
+    """A name from a file, short and in one line."""
+    return " ".join(text.split())[:60]
+
+
+# ---- MCAP
+
+
+class _Mcap:
+    """One MCAP file, read from its begin to its end or to where it is cut off; damaged chunks are left out."""
+
+    def __init__(self, file: Path, data: bytes, found: Contents, limits: TraceLimits) -> None:
+        self._file, self._view, self._found, self._limits = file, memoryview(data), found, limits
+        self._types: dict[int, str] = {}
+        self._topics: dict[int, str] = {}
+        self._counts: Counter[int] = Counter()
+        self._promised: dict[int, int] = {}
+        self._inflated = self._damaged = 0
+        self._loose = False
+
+    def read(self) -> None:
+        """Adds what the file holds; first the definitions at its end, which outlast a damaged chunk."""
+        for opcode, _, body in self._records():
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._record(opcode, body)
+        position, opcode = len(MCAP0_MAGIC), 0
+        for opcode, begin, body in self._records():
+            if opcode == Opcode.CHUNK:
+                self._chunk(body)
+            elif opcode == Opcode.DATA_END:
+                self._data_end(body, begin - HEAD.size)
+            elif opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._record(opcode, body)
+            position = begin + len(body)
+        if opcode != Opcode.FOOTER or bytes(self._view[position:]) != MCAP0_MAGIC:
+            line = f"{_text(self._file.name)} ends or is damaged after byte {position} of {len(self._view)}"
+            self._found.missing.append(f"{line}, as a recorder that was killed leaves it; nothing after that was read")
+        if self._damaged:
+            self._found.missing.append(f"{_text(self._file.name)}: {self._damaged} damaged parts were left out")
+        for number, count in self._promised.items():
+            if number in self._topics and self._counts[number] < count:
+                line = f"the statistics promise {count} messages on {_text(self._topics[number])}"
+                self._found.missing.append(f"{_text(self._file.name)}: {line}, {self._counts[number]} are there")
+
+    def _records(self) -> Iterator[tuple[int, int, memoryview]]:
+        """Opcode, begin and content of each record, up to the footer or where the file is cut off."""
+        begin, end = len(MCAP0_MAGIC), len(self._view)
+        opcode = 0
+        while opcode != Opcode.FOOTER and begin + HEAD.size <= end:
+            opcode, length = HEAD.unpack_from(self._view, begin)
+            begin += HEAD.size
+            if opcode == 0 or begin + length > end:
+                return
+            yield opcode, begin, self._view[begin : begin + length]
+            begin += length
+
+    def _chunk(self, body: memoryview) -> None:
+        try:
+            packed = chunk_of(body)
+            self._require(packed.size, self._limits.chunk_bytes, "a chunk declares", "chunk_bytes")
+            self._inflated += packed.size
+            self._require(self._inflated, self._limits.total_bytes, "its chunks have", "total_bytes")
+            chunk = memoryview(inflate(packed))
+        except UNREADABLE:
+            self._damaged += 1
+            return
+        self._loose |= packed.crc == 0
+        position = 0
+        while position < len(chunk):
+            if len(chunk) - position < HEAD.size:
+                self._damaged += 1
+                return
+            opcode, length = HEAD.unpack_from(chunk, position)
+            begin, position = position + HEAD.size, position + HEAD.size + length
+            if position > len(chunk):
+                self._damaged += 1
+                return
+            self._record(opcode, chunk[begin:position])
+
+    def _require(self, value: int, most: int, line: str, limit: str) -> None:
+        if value > most:
+            raise TraceError(f"{self._file}: {line} more than {most} bytes (traces.limits.{limit})")
+
+    def _record(self, opcode: int, body: memoryview) -> None:
+        try:
+            if opcode == Opcode.MESSAGE:
+                channel, _, logged, _ = _MESSAGE.unpack_from(body)
+                if channel in self._topics:
+                    self._counts[channel] += 1
+                    data = bytes(body[_MESSAGE.size : _MESSAGE.size + LARGEST_MESSAGE + 1])
+                    self._found.messages[self._topics[channel]].append((logged, data))
+            elif opcode == Opcode.SCHEMA:
+                fields = Fields(body)
+                self._types.setdefault(fields.u16(), _name(fields))
+            elif opcode == Opcode.CHANNEL:
+                fields = Fields(body)
+                number, schema, topic, encoding = fields.u16(), fields.u16(), _name(fields), _name(fields)
+                kind = self._types.get(schema, "")
+                if self._found.topic(topic, kind if encoding == "cdr" else f"{kind} in {encoding}"):
+                    self._topics.setdefault(number, topic)
+            elif opcode == Opcode.STATISTICS:
+                fields = Fields(body)
+                fields.raw(8 + 2 + 4 * 4 + 8 + 8)  # sums over all channels, and the moments of the first and the last
+                counts = fields.raw(fields.u32())
+                self._promised = dict(struct.iter_unpack("<HQ", counts))
+        except (ValueError, struct.error):
+            self._damaged += 1
+
+    def _data_end(self, body: memoryview, position: int) -> None:
+        """Raises TraceError where numbers may be wrong that no checksum of a chunk protects."""
+        with suppress(ValueError):
+            crc = data_end_of(body).data_section_crc
+            if crc not in (0, zlib.crc32(self._view[:position])) and (self._loose or not self._inflated):
+                raise TraceError(f"{self._file}: is damaged: the data section does not match its checksum")
+
+
+def _name(fields: Fields) -> str:
+    return str(fields.raw(fields.u32()), "utf-8", "replace")
+
+
+# ---- SQLite
+
+
+def _sqlite(file: Path, found: Contents, limits: TraceLimits) -> None:
+    with TemporaryDirectory() as folder:
+        path = _recovered(file, Path(folder), found)
+        try:
+            with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as database:
+                database.text_factory = lambda raw: raw.decode("utf-8", "replace")
+                database.execute("PRAGMA trusted_schema = OFF")
+                _rows(file, database, found, limits)
+        except sqlite3.Error as error:
+            hint = "`sqlite3 FILE .recover` may save a part"
+            raise TraceError(f"{file}: is damaged: {shown(str(error))}; {hint}") from error
+
+
+def _rows(file: Path, database: sqlite3.Connection, found: Contents, limits: TraceLimits) -> None:
+    """Adds the messages of a database. Raises TraceError, sqlite3.Error."""
+    (sound,) = database.execute("PRAGMA quick_check(1)").fetchone()
+    if sound != "ok":
+        raise sqlite3.DatabaseError(sound)
+    tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    if not {"messages", "topics"} <= tables:
+        raise TraceError(f"{file}: is a database of something else: it has no tables of messages and topics")
+    before = found.counts()
+    for number, name, kind, encoding in database.execute("SELECT id, name, type, serialization_format FROM topics"):
+        if not found.topic(str(name), str(kind) if encoding == "cdr" else f"{kind} in {encoding}"):
+            continue
+        query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp LIMIT ?"
+        for received, data in database.execute(query, (number, limits.records + 1)):
+            if not isinstance(received, int) or not isinstance(data, bytes):
+                raise TraceError(f"{file}: a message on {_text(str(name))} is no message: it is of another type")
+            found.messages[str(name)].append((received, data[: LARGEST_MESSAGE + 1]))
+    (lost,) = database.execute("SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)").fetchone()
+    if lost:
+        found.missing.append(f"{_text(file.name)} has {lost} messages of no topic")
+    if "metadata" in tables:
+        _hold_to_its_own_metadata(file, database, found, before)
+
+
+def _hold_to_its_own_metadata(
+    file: Path, database: sqlite3.Connection, found: Contents, before: Mapping[str, int]
+) -> None:
+    row = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
+    with suppress(TraceError):
+        about = _about(str(row[0]).encode(), file.name) if row else {}
+        paths = about.get("relative_file_paths")
+        if isinstance(paths, list) and len(paths) > 1:
+            return  # of all files of the bag together; metadata.yaml says the same
+        topics = {name: count for name, _, count in _topics(about).values()}
+        if not about.get("message_count") and found.counts() != before:
+            found.missing.append(f"{_text(file.name)}: {NEVER_ENDED}")
+        found.hold(before, topics, _text(file.name))
+
+
+def _recovered(file: Path, folder: Path, found: Contents) -> Path:
+    """The database with what its journals hold: itself, or a copy to which SQLite has applied them.
+
+    Raises TraceError where the database is being written or a journal cannot be applied, OSError.
+    """
+    wal, journal = Path(f"{file}-wal"), Path(f"{file}-journal")
+    beside = [one for one in (wal, journal) if one.is_file() and one.stat().st_size]
+    if not beside:
+        return file
+    copy = folder / "copy.db3"
+    copies = {file: copy} | {one: Path(f"{copy}{one.name.removeprefix(file.name)}") for one in beside}
+    states = [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]
+    if journal in beside and journal.read_bytes()[:8] not in (_JOURNAL, bytes(8)):
+        raise TraceError(
+            f"{file}: was left in the middle of a change, and the damaged {journal.name} cannot take it back"
+        )
+    for one, target in copies.items():
+        shutil.copyfile(one, target)
+    if states != [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]:
+        raise TraceError(f"{file}: is being written; import it when its recording has ended")
+    whole = _frames(wal) if wal in beside else 0
+    with closing(sqlite3.connect(copy)) as database:
+        database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        _, applied, _ = database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+        if whole > max(applied, 0):
+            line = f"{whole - max(applied, 0)} of {whole} pages of {beside[0].name} are damaged or were never committed"
+            found.missing.append(f"{line}; rows in them are missing")
+    return copy
+
+
+def _frames(wal: Path) -> int:
+    """Number of pages that the present generation of a write-ahead log has, whether they are sound or not."""
+    data = memoryview(wal.read_bytes())
+    if len(data) < _WAL_HEAD:
+        return 0
+    page, salt = int.from_bytes(data[8:12], "big"), bytes(data[16:24])
+    begins = range(_WAL_HEAD, len(data), _FRAME_HEAD + page)
+    return next((n for n, at in enumerate(begins) if bytes(data[at + 8 : at + 16]) != salt), len(begins))
+
+
+# ---- ROS 1
+
+
+def _ros_1(file: Path, found: Contents) -> None:
+    from rosbags.rosbag1 import Reader
+
+    with Reader(file) as reader:
+        found.ros_1 = True
+        promised: Counter[str] = Counter()
+        for connection in reader.connections:
+            if found.topic(connection.topic, connection.msgtype):
+                promised[connection.topic] += connection.msgcount
+        wanted = [one for one in reader.connections if one.msgtype == JOINT_STATE]
+        for connection, received, data in reader.messages(connections=wanted) if wanted else ():
+            found.messages[connection.topic].append((received, data[: LARGEST_MESSAGE + 1]))
+        found.hold({}, promised, "its index")

@@ -1,0 +1,14 @@
+"""Every reader of files takes damaged ones in one line, or says what is missing of them (`benchmarks.file_fuzz`)."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.file_fuzz import CASES, campaign
+
+
+@pytest.mark.parametrize("cases", [700, pytest.param(CASES, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])
+def test_damaged_files_of_every_kind_are_refused_in_one_line_or_read_as_a_whole(tmp_path: Path, cases: int) -> None:
+    tally = campaign(cases, 2, tmp_path)
+    assert not tally.faults, "\n".join(tally.examples)
+    assert tally.ends["read"] > cases // 10
