@@ -179,7 +179,8 @@ def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanw
     bench.queue.on_arm_report(stopped)
     bench.queue.on_arm_report(CALM)  # reset, before the queue's thread has looked
     bench.queue.start()
-    line = f"the arm is {state} (somebody): look at it, reset it, then resume the queue"
+    had = {"stopped": "was stopped", "fault": "had a fault"}[state]
+    line = f"the arm {had}: look at it, then resume the queue"
     bench.until(lambda event: event == f"queue: paused: {line}")
     assert bench.queue.status().reason == line
     bench.queue.resume("anna", moves_real_arm=False)
