@@ -11,7 +11,6 @@ Since that name tells all, it does not matter where the sources lie: another clo
 from __future__ import annotations
 
 import ast
-import fcntl
 import hashlib
 import importlib
 import multiprocessing
@@ -28,6 +27,8 @@ from typing import Any
 import numba
 import platformdirs
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+
+from daq.contracts.file_lock import take_lock
 
 CACHE_DAYS = 30
 """Caches of older sources that have not been written for this long are removed."""
@@ -97,7 +98,7 @@ def one_process_at_a_time(module: str) -> Iterator[None]:
     with ExitStack() as held:
         with suppress(OSError):
             lock = held.enter_context((cache_folder(module) / "lock").open("w", encoding="utf-8"))
-            fcntl.flock(lock, fcntl.LOCK_EX)  # given back when the file is closed, however that comes about
+            take_lock(lock, waits=True)
         yield
 
 
