@@ -196,7 +196,7 @@ def test_a_stop_is_remembered_by_whoever_wants_to_resume_too_early(bench: Bench)
         bench.queue.resume("anna", moves_real_arm=False)
     bench.robot.arm = CALM
     bench.queue.start()
-    bench.until(lambda event: event.startswith("queue: paused: the arm is stopped"))
+    bench.until(lambda event: event.startswith("queue: paused: the arm was stopped"))
 
 
 # ---- schedules that nobody could submit
