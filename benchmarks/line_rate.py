@@ -79,6 +79,10 @@ class CountedEndpoint:
         self.bytes_per_second = self.inner.bytes_per_second
         self.control = self.inner.control
 
+    def waited(self) -> float:
+        """As the endpoint within."""
+        return self.inner.waited()
+
     def connect(self) -> ByteChannel:
         """A counted channel."""
         return CountedChannel(self.inner.connect(), self.passed)

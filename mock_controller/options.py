@@ -31,6 +31,7 @@ class Options(BaseModel):
     tcp: str | None = None
     control: str = "127.0.0.1:0"
     owned: bool = False
+    waits: bool = False
     lock_step: bool = False
     sample: bool = True
     compact: bool = True
@@ -135,6 +136,12 @@ def _parser() -> argparse.ArgumentParser:
         help="control port: HOST:PORT or unix:PATH (default 127.0.0.1:0), none for no control port",
     )
     where.add_argument("--owned", action="store_true", default=None, help="end when standard input ends")
+    where.add_argument(
+        "--waits",
+        action="store_true",
+        default=None,
+        help="the board's clock stands still while this process gets no processor; standard output tells how long",
+    )
 
     time = parser.add_argument_group("time and line")
     time.add_argument(

@@ -1,9 +1,10 @@
-"""Real time: the board's time follows the clock, and never drifts from it.
+"""Real time: the board's time follows the clock, and never drifts from it, unless it waits for its computer.
 
 The board advances at exactly the moments when something happens: a period begins, the drive changes, a snapshot is
 complete, bytes have left the line, the host has spoken. Between two of them lies little to simulate (some 0.5 ms of
-work at most). A process that was not given the processor in time catches up event by event, listening in between, and
-counts what was late.
+work at most). A process that was not given the processor in time catches up event by event, listening in between,
+and counts what was late. One that waits (`waits`) lets the board's clock stand still for that time instead: a late
+simulator is no fault of an arm. It is for a host that is told for how long; to any other the samples would seem late.
 """
 
 from __future__ import annotations
@@ -27,15 +28,18 @@ class Lateness:
     late_ticks: int = 0
     """Periods that began in the board more than LATE_US after their moment."""
     worst_us: int = 0
+    waited_us: int = 0
+    """Time for which the board's clock has stood still, since the process was late."""
 
 
 class RealTimePace:
     """Drives one link by a clock (µs, monotonic); board time at construction is the clock's present."""
 
-    def __init__(self, link: Link, board: Board, clock_us: Callable[[], int]) -> None:
+    def __init__(self, link: Link, board: Board, clock_us: Callable[[], int], *, waits: bool = False) -> None:
         self._link = link
         self._board = board
         self._clock_us = clock_us
+        self._waits = waits
         self.zero_us = clock_us() - board.time_us
         """Reading of the clock at board time 0."""
         self.lateness = Lateness()
@@ -72,6 +76,9 @@ class RealTimePace:
             if due > now:
                 self._link.run_until(now)
                 return
+            if self._waits and now - due > LATE_US:
+                self.zero_us += now - due
+                self.lateness.waited_us += now - due
             tick = self._board.tick
             self._link.run_until(due)
             if self._board.tick != tick:

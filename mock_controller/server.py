@@ -20,7 +20,7 @@ from mock_controller.options import Options
 from mock_controller.ports import Port, PortError, PtyPort, TcpPort, host_and_port
 from mock_controller.real_time import RealTimePace
 
-_STDIN = 0
+_STDIN, _STDOUT = 0, 1
 _RETRY_S = 0.1
 """Seconds between attempts to reopen a port that another program has taken meanwhile."""
 
@@ -53,11 +53,18 @@ class Server:
             raise
         link = self._device.link
         self._pace: LockStepPace | RealTimePace
-        self._pace = LockStepPace(link) if options.lock_step else RealTimePace(link, self._device.board, _clock_us)
+        self._pace = (
+            LockStepPace(link)
+            if options.lock_step
+            else RealTimePace(link, self._device.board, _clock_us, waits=options.waits)
+        )
+        self._told_us = 0
 
     def run(self) -> None:
         """Serves until interrupted, or, if owned, until standard input ends."""
         self._announce()
+        if self._options.waits:
+            os.set_blocking(_STDOUT, False)
         try:
             while self._turn():
                 pass
@@ -97,6 +104,7 @@ class Server:
             "monotonic_us_at_zero": self._pace.zero_us,
             "late_ticks": late.late_ticks,
             "worst_late_us": late.worst_us,
+            "waited_us": late.waited_us,
         }
 
     def lost_bytes(self) -> int:
@@ -118,7 +126,9 @@ class Server:
                 self._control.serve(descriptor)
             elif not os.read(_STDIN, 4096):
                 return False
-        self._port.send(self._pace.work())
+        output = self._pace.work()
+        self._tell_waited()  # before what comes after it
+        self._port.send(output)
         self._cut_and_restore()
         return True
 
@@ -148,6 +158,15 @@ class Server:
             self.disconnect(seconds)
         if self._back_at is not None and time.monotonic() >= self._back_at:
             self.reconnect()
+
+    def _tell_waited(self) -> None:
+        """Tells for how long the board's clock has stood still in all. What the owner has no room for comes later."""
+        if isinstance(self._pace, LockStepPace) or self._pace.lateness.waited_us == self._told_us:
+            return
+        line = json.dumps({"waited_us": self._pace.lateness.waited_us}) + "\n"
+        with contextlib.suppress(BlockingIOError, BrokenPipeError):
+            os.write(_STDOUT, line.encode())
+            self._told_us = self._pace.lateness.waited_us
 
     def _announce(self) -> None:
         ready = {"ready": True, "url": self._port.url, "control": self._control.url if self._control else None}

@@ -1,4 +1,4 @@
-"""The site of the documents, which Sphinx has built (`make docs`), as the service has it at `/docs/`."""
+"""The site of the documents, as the service has it at `/docs/`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fastapi import FastAPI, Response
 from fastapi.responses import PlainTextResponse, RedirectResponse
 from starlette.staticfiles import StaticFiles
 
-from daq.config.documents import NOT_BUILT
+from daq.config.documents import documents
 from server.access.headers import POLICY, SECURITY
 
 if TYPE_CHECKING:
@@ -35,18 +35,22 @@ class Site(StaticFiles):
 
 
 def serve_site(app: FastAPI, index: Path | None) -> None:
-    """Serves the site at `/docs/`, from its first page on. Where it is not built (None), every address below says how
-    to build it."""
+    """Serves the site at `/docs/`, from its first page on. Where it is not built (None), the pages are made from the
+    documents themselves."""
 
     @app.get("/docs", include_in_schema=False)
-    async def documents() -> Response:
+    async def documents_below() -> Response:
         return RedirectResponse("docs/")  # relative: a proxy may serve all this below a path of its own
 
     if index is not None:
         app.mount("/docs", Site(directory=index.parent, html=True), "documents")
         return
+    pages = documents()
 
-    @app.get("/docs/{path:path}", include_in_schema=False)
-    async def not_built(path: str) -> Response:
-        del path
-        return PlainTextResponse(f"{NOT_BUILT}. The API's page is at /api/docs.\n", 503)
+    @app.get("/docs/{address:path}", include_in_schema=False)
+    def page(address: str) -> Response:
+        found = pages.file(address)
+        if found is None:
+            return PlainTextResponse("the documents have no such page; the first one is at /docs/\n", 404)
+        content, media_type = found
+        return Response(content, media_type=media_type, headers={"Cache-Control": "no-cache", POLICY: SITE_POLICY})

@@ -20,6 +20,7 @@ CONTAINS: dict[Extra, tuple[Extra, ...]] = {"robot": ("live",), "model": ("robot
 EXTRA_OF: dict[str, Extra] = {
     "websockets": "live",
     "jinja2": "robot",
+    "markdown_it": "robot",
     "matplotlib": "robot",
     "mujoco": "robot",
     "platformdirs": "robot",

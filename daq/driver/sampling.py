@@ -197,9 +197,10 @@ class RingSampling:
         every = 1 if known is None or after is None else after - known + 1
         if isinstance(deliveries.clock, LockStepClock):
             deliveries.clock.tick_seen(reply.tick)
+        waited = deliveries.link.waited()  # before the time, so that all of the wait lies before it
         now = deliveries.clock.now()
-        times = (now, self._tick_time.arrived(reply.tick, now))
-        self._complete.arrived(reply.tick, now - self._time_on_line(reply))
+        times = (now, self._tick_time.arrived(reply.tick, now, waited))
+        self._complete.arrived(reply.tick, now - self._time_on_line(reply), waited)
         self._newest = reply.tick
         return deliveries.deliver(reply.tick, after, times, joints, StatusFlag(reply.status), "sample", every)
 

@@ -114,6 +114,10 @@ class Link:
         """Capacity of the line in each direction; infinite where nothing limits it."""
         return self._endpoint.bytes_per_second
 
+    def waited(self) -> float:
+        """Time (s) for which the clock of a mock's board has stood still, since the mock got no processor; else 0."""
+        return self._endpoint.waited()
+
     @property
     def lock_step(self) -> bool:
         """Whether the controller's time stands still between requests."""

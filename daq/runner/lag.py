@@ -50,5 +50,8 @@ class Lag:
         behind = (tick - self.since) * self.period
         if behind <= max(LONGEST_BEHIND, 10 * between):
             return Verdict(hold=True, findings=findings)
-        trip = f"{line}, and all for {behind:.2f} s: is the line too slow, or this computer too busy?"
+        trip = (
+            f"samples came up to {age * 1e3:.0f} ms late for {behind:.1f} s: this computer is too busy, or the line "
+            "too slow; end other programs, then reset the arm"
+        )
         return Verdict(hold=True, trips=(trip,), findings=findings)

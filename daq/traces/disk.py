@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import stat
 from pathlib import Path
 from typing import IO
 
 from daq.contracts.errors import TraceError
+from daq.contracts.file_lock import take_lock
 
 
 def open_regular(path: Path) -> IO[bytes]:
@@ -46,30 +46,28 @@ def create_locked(path: Path) -> IO[bytes]:
         stream = path.open("xb")
     except FileExistsError:
         raise TraceError(f"{path}: exists already; a trace is never written over") from None
-    fcntl.flock(stream, fcntl.LOCK_EX)
+    try:
+        take_lock(stream, waits=True)
+    except OSError:  # the file system has no locks: nothing is left there
+        stream.close()
+        path.unlink()
+        raise
     if not is_still_at(stream, path):
         stream.close()
         raise TraceError(f"{path}: was taken away by another process while it was being made")
     return stream
 
 
-def try_lock(stream: IO[bytes]) -> bool:
-    """Takes the lock of an open file; False when a living process has it."""
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
 def is_being_written(path: Path) -> bool:
-    """Whether a living process is writing this file. Raises OSError when it cannot be opened."""
+    """Whether a living process is writing this file. Raises OSError when it cannot be opened.
+
+    Where the file system refuses locks none is: a writer begins with one.
+    """
     with open_regular(path) as stream:
         try:
-            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
+            return not take_lock(stream, shared=True)
+        except OSError:
+            return False
 
 
 def is_still_at(stream: IO[bytes], path: Path) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from mcap.writer import Writer
 
 from daq.contracts.errors import TraceError
+from daq.contracts.file_lock import take_lock
 from daq.contracts.trace import Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
@@ -110,7 +111,7 @@ def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
         raise TraceError(f"{part}: is not an unfinished trace (*{layout.PART_SUFFIX})")
     try:
         with disk.open_regular(part) as stream:
-            if not disk.try_lock(stream):
+            if not take_lock(stream):
                 raise TraceError(f"{part}: is being written by a running process")
             if not disk.is_still_at(stream, part):
                 raise TraceError(f"{part}: was salvaged or finished by another process")

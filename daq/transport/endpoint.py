@@ -45,6 +45,10 @@ class Endpoint(Protocol):
         """URL of the mock's control port, where faults are switched; None for anything but mock://."""
         ...
 
+    def waited(self) -> float:
+        """Time (s) for which the clock of a mock's board has stood still, since the mock got no processor; else 0."""
+        ...
+
     def connect(self) -> ByteChannel:
         """A new channel. Raises TransportError: one line that says who, what, and what to do."""
         ...
@@ -58,7 +62,7 @@ def open_endpoint(url: str) -> Endpoint:
     """The endpoint of a URL; a mock is started. Nothing is sent. Raises TransportError."""
     port = parse_port_url(url)
     if isinstance(port, MockPort):
-        return MockEndpoint(url, port, start_mock(port))
+        return MockEndpoint(url, port, start_mock(port, waits=not port.lock_step))
     return PortEndpoint(url, port)
 
 
@@ -73,6 +77,10 @@ class PortEndpoint:
         self.bytes_per_second = port.baud / BITS_PER_BYTE
         self._port = port
         self._terminal: Terminal | None = None
+
+    def waited(self) -> float:
+        """No clock of an arm stands still."""
+        return 0.0
 
     def connect(self) -> ByteChannel:
         """A new channel, to what the first one led to."""
@@ -94,6 +102,10 @@ class MockEndpoint:
         self.bytes_per_second = port.baud / BITS_PER_BYTE
         self.control = process.control
         self._process = process
+
+    def waited(self) -> float:
+        """As the mock has told."""
+        return self._process.waited()
 
     def connect(self) -> ByteChannel:
         """A new channel to the same process. Raises TransportError when it has ended."""

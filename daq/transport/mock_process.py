@@ -13,11 +13,15 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from daq.contracts.extras import require_extra
+from daq.contracts.processor import processor_time
 from daq.transport.url import SERVOS, MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
-"""Longest time for a mock to start: the first import of the physics engine from a cold disk takes seconds."""
+"""Longest time for a mock to start: the first import of the physics engine from a cold disk takes seconds. The time in
+which it waits for a processor does not count."""
 END_TIMEOUT_S = 3.0
+PIECE = 1 << 16
+"""Bytes that a pipe holds on Linux: one reading empties it, and cuts no line."""
 LAST_WORDS = 500
 """Characters of the mock's error output that are shown when it does not start."""
 
@@ -31,6 +35,15 @@ class MockProcess:
     control: str | None
     """URL of its control port, where faults are switched."""
     _process: subprocess.Popen[bytes] = field(repr=False)
+    _waited_us: int = 0
+
+    def waited(self) -> float:
+        """Time (s) for which the clock of its board has stood still, since it got no processor."""
+        assert self._process.stdout is not None
+        while told := _available(self._process.stdout):
+            lines = [json.loads(line) for line in told.splitlines()]
+            self._waited_us = max([self._waited_us, *(line.get("waited_us", 0) for line in lines)])
+        return self._waited_us * 1e-6
 
     def check_running(self) -> None:
         """Raises TransportError when the process has ended."""
@@ -51,14 +64,18 @@ class MockProcess:
             self._process.wait()
 
 
-def start_mock(port: MockPort) -> MockProcess:
-    """Starts a mock and waits until it listens. Raises TransportError with the mock's own words when it does
-    not; MissingExtraError."""
+def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
+    """Starts a mock and waits until it listens. One that `waits` lets the time of its board stand still while it gets
+    no processor: for a host that asks it how long (`waited`).
+
+    Raises TransportError with the mock's own words when it does not start; MissingExtraError.
+    """
     if port.dialect != SERVOS:
         require_extra("robot", "the mock controller", "mujoco")
     where = ("--pty",) if port.through_pty else ("--tcp", "127.0.0.1:0")
     module = "mock_controller.servos" if port.dialect == SERVOS else "mock_controller"
-    command = [sys.executable, "-m", module, *where, "--owned", *port.arguments]
+    waiting = ("--waits",) if waits and port.dialect != SERVOS else ()
+    command = [sys.executable, "-m", module, *where, "--owned", *waiting, *port.arguments]
     with tempfile.TemporaryFile() as complaints:
         process = subprocess.Popen(
             command,
@@ -69,25 +86,49 @@ def start_mock(port: MockPort) -> MockProcess:
         )
         assert process.stdout is not None
         try:
-            ready = json.loads(_first_line(process.stdout))
+            ready = json.loads(_first_line(process.stdout, process.pid))
+            os.set_blocking(process.stdout.fileno(), False)
             return MockProcess(ready["url"], ready.get("control"), process)
         except (ValueError, KeyError, TypeError) as error:
+            code = process.poll()
             MockProcess("", None, process).close()
             complaints.seek(0)
             words = complaints.read().decode(errors="replace").strip()[-LAST_WORDS:]
-            last_line = words.splitlines()[-1] if words else "it said nothing"
+            last_line = words.splitlines()[-1] if words else _silent(code)
             raise TransportError(f"the mock controller did not start: {last_line}") from error
 
 
-def _first_line(output: IO[bytes]) -> bytes:
+def _available(output: IO[bytes]) -> bytes:
+    """Whole lines that have come. The process writes a line at once, so that none is cut."""
+    try:
+        return os.read(output.fileno(), PIECE)
+    except BlockingIOError:
+        return b""
+
+
+def _silent(code: int | None) -> str:
+    """Why a mock may have said nothing. `code`: its exit code; None where it was still starting."""
+    if code is None:
+        return f"it was not ready after {START_TIMEOUT_S:g} s; see what keeps this computer's disk busy, and try again"
+    if code < 0:
+        return f"signal {-code} ended it; see whether this computer is out of memory, and try again"
+    return f"it ended with exit code {code} and gave no reason"
+
+
+def _first_line(output: IO[bytes], process: int) -> bytes:
     """The first line that a process prints; what there is when it ends or START_TIMEOUT_S have passed."""
-    deadline = time.monotonic() + START_TIMEOUT_S
+    begun = time.monotonic()
     waiting = select.poll()
     waiting.register(output, select.POLLIN)
     line = b""
     while not line.endswith(b"\n"):
-        if not waiting.poll(max(0.0, deadline - time.monotonic()) * 1000):
+        counted = processor_time(process)
+        patience = START_TIMEOUT_S + (0.0 if counted is None else counted.waited)
+        left = begun + patience - time.monotonic()
+        if left <= 0:
             break
+        if not waiting.poll(left * 1000):  # it may have waited for a processor meanwhile
+            continue
         byte = os.read(output.fileno(), 1)
         if not byte:
             break

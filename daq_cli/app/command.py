@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -105,6 +106,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point: a user's error ends in one line on standard error and a documented exit code. arguments: as typed
     behind `daq`; None for those of this process"""
     _print_whatever_files_are_called()
+    # What it says of a home that cannot be written to is no news of a figure, which it draws all the same.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         exit_code = app(arguments, prog_name="daq", standalone_mode=False)
         _flush()  # now, while what keeps it from being written is still an error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,13 +21,27 @@ def docs(
     """Open the documents in the browser: guides, reference, gallery, glossary; without a network."""
     import webbrowser
 
-    from daq.config.documents import NOT_BUILT, site_index
+    from daq.config.documents import site_index
 
-    index = site_index()
-    if index is None:
-        raise SpecError(NOT_BUILT)
+    index = site_index() or _written()
     if path:
         print(index)
     elif not webbrowser.open(index.as_uri()):
         console().print("no browser was found; this is the first page:")
         print(index)
+
+
+def _written() -> Path:
+    """First page of the documents, made anew in this user's cache, or beside the temporary files where that fails."""
+    import platformdirs
+
+    from daq.config.documents import documents
+
+    cache = platformdirs.user_cache_path("ma2000-daq") / "documents"
+    try:
+        return documents().write(cache)
+    except OSError:
+        try:
+            return documents().write(Path(tempfile.mkdtemp(prefix="ma2000-documents-")))
+        except OSError as error:
+            raise SpecError(f"the documents cannot be written to {cache}: {error.strerror}") from error

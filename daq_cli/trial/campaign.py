@@ -3,7 +3,6 @@ result kept."""
 
 from __future__ import annotations
 
-import fcntl
 import math
 import time
 from collections import deque
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.file_lock import take_lock
 from daq.contracts.machine import Machine
 from daq.executors import Workers, done_in_any_order
 from daq.executors.each import growing
@@ -43,7 +43,7 @@ def _alone(folder: Path, load: int) -> Iterator[None]:
     """Keeps other processes that use this folder from working on the same load within the block."""
     folder.mkdir(exist_ok=True)
     with (folder / f".load-{load}").open("ab") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        take_lock(lock, waits=True)
         yield
 
 

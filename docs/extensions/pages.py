@@ -6,13 +6,13 @@ The files that stand for them in docs/ say in one line where to look without the
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 
 from docutils import nodes
 from sphinx.application import Sphinx
+
+from daq.config.documents import BROUGHT, brought
 
 from . import command_line, configuration, public_api, rest
 
@@ -24,43 +24,10 @@ GENERATED: dict[str, Callable[[], str]] = {
     "reference/rest-schemas": rest.schemas_page,
     "reference/python-api": public_api.page,
 }
-BROUGHT = {
-    "reference/protocol": "firmware_protocol/PROTOCOL.md",
-    "reference/changes": "CHANGELOG.md",
-    "explanation/contributing": "CONTRIBUTING.md",
-}
 LONGEST_WHOLE = 28
 """Most characters of code that a phone shows in one line beside a bullet."""
 BELOW = {"decisions/README": "0*"}
 """Pages that have others below them, by pattern."""
-LINK = re.compile(r"(\[[^\]]*)(\]\(<?)([^)\s>]+)(>?\))")
-CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)
-
-
-def brought(docname: str, text: str) -> str:
-    """The text of a page with its links as they are from the place of `docname` in the site, and titles of pages where
-    the text has names of files."""
-    origin = (ROOT / BROUGHT.get(docname, f"docs/{docname}.md")).parent
-    place = (ROOT / "docs" / docname).parent
-    home = {(ROOT / path).resolve(): name for name, path in BROUGHT.items()}
-    home[(ROOT / "README.md").resolve()] = "index"
-
-    def link(found: re.Match[str]) -> str:
-        text, between, whole, end = found.groups()
-        target, hash_sign, anchor = whole.partition("#")
-        if not target or re.match(r"[a-z][a-z+.-]*:", target):
-            return found[0]
-        path = (origin / target).resolve()
-        if path.is_dir():
-            return f"`{path.relative_to(ROOT)}/`" if text.startswith("[`") else text[1:]
-        if text == f"[{path.name}":
-            text = "["  # MyST puts the title of the page or heading here
-        if path in home:
-            path = ROOT / "docs" / f"{home[path]}.md"
-        return f"{text}{between}{os.path.relpath(path, place)}{hash_sign}{anchor}{end}"
-
-    parts = CODE.split(text)
-    return "".join(part if number % 2 else LINK.sub(link, part) for number, part in enumerate(parts))
 
 
 def _read(app: Sphinx, docname: str, source: list[str]) -> None:

@@ -11,14 +11,14 @@ Since that name tells all, it does not matter where the sources lie: another clo
 from __future__ import annotations
 
 import ast
-import fcntl
 import hashlib
 import importlib
+import multiprocessing
 import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
@@ -26,7 +26,9 @@ from typing import Any
 
 import numba
 import platformdirs
-from numba.core.caching import UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+
+from daq.contracts.file_lock import take_lock
 
 CACHE_DAYS = 30
 """Caches of older sources that have not been written for this long are removed."""
@@ -36,7 +38,6 @@ PACKAGES = ("model", "daq", "firmware_protocol")
 
 _ROOT = Path(__file__).resolve().parents[2]
 _numba_settings: Any = numba.config
-_LOCATORS = getattr(_numba_settings, "CACHE_LOCATOR_CLASSES", "")
 _PARENT = Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
 
 
@@ -76,19 +77,28 @@ def source_hash(module: str, root: Path = _ROOT) -> str:
 
 @cache
 def cache_folder(module: str) -> Path:
-    """Folder of the compiled code of a module as it is now; NUMBA_CACHE_DIR, where set, moves its parent."""
+    """Folder of the compiled code of a module as it is now; NUMBA_CACHE_DIR, where set, moves its parent.
+
+    It does not exist where it cannot be made.
+    """
     folder = _PARENT / source_hash(module)
-    if not folder.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        _remove_old(_PARENT, time.time() - CACHE_DAYS * 86_400)
+    with suppress(OSError):
+        if not folder.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            _remove_old(_PARENT, time.time() - CACHE_DAYS * 86_400)
     return folder
 
 
 @contextmanager
 def one_process_at_a_time(module: str) -> Iterator[None]:
-    """While one process compiles a module's functions, others wait: they then find them on disk."""
-    with (cache_folder(module) / "lock").open("w", encoding="utf-8") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # given back when the file is closed, however that comes about
+    """While one process compiles a module's functions, others wait: they then find them on disk.
+
+    Where the file system has no room for the lock or refuses it, each compiles by itself.
+    """
+    with ExitStack() as held:
+        with suppress(OSError):
+            lock = held.enter_context((cache_folder(module) / "lock").open("w", encoding="utf-8"))
+            take_lock(lock, waits=True)
         yield
 
 
@@ -134,6 +144,17 @@ def _remove_old(parent: Path, before: float) -> None:
 class SharedCacheLocator(UserProvidedCacheLocator):
     """Tells numba where to keep machine code: for sources of ours by their place in the project, not on the disk."""
 
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        """Below the folder of the function's module."""
+        self._py_file = py_file
+        self._lineno = py_func.__code__.co_firstlineno
+        self._cache_path = str(cache_folder(py_func.__module__) / self.get_suitable_cache_subpath(py_file))
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> SharedCacheLocator:
+        """Also where the folder cannot be written to: what it has is read."""
+        return cls(py_func, py_file)
+
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
         """Folder below that of the module."""
@@ -148,16 +169,46 @@ class SharedCacheLocator(UserProvidedCacheLocator):
         return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
 
+class _SharedCacheFiles(CompileResultCacheImpl):
+    _locator_classes = [SharedCacheLocator]  # numba declares it so
+
+
+class SharedCache(FunctionCache):
+    """A function's machine code on disk. Where the disk refuses to read or write it, this process does without."""
+
+    _impl_class = _SharedCacheFiles
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Compiled code for the signature; None where the disk has none."""
+        with suppress(OSError):
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keeps compiled code; where that fails, one line on standard error says so for all functions."""
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except OSError as error:
+            _tell_once(error.strerror or str(error))
+
+
+@cache
+def _tell_once(reason: str) -> None:
+    """Says that nothing is cached: by the process that a person has started, not by each of its workers as well."""
+    if multiprocessing.parent_process() is None:
+        sys.stderr.write(
+            f"Compiled code cannot be kept in {_PARENT} ({reason}): every start compiles it again, some 20 s. "
+            "Set NUMBA_CACHE_DIR to a folder that can be written to.\n"
+        )
+
+
 def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> Any:
     """Compiles so that division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as
     a C compiler does with -march=native. So results repeat to the bit on one machine, not across machines."""
-    if cached:  # both settings are read when the function is decorated
-        _numba_settings.CACHE_DIR = str(cache_folder(function.__module__))
-        _numba_settings.CACHE_LOCATOR_CLASSES = f"{__name__}.{SharedCacheLocator.__name__}"
-    try:
-        return numba.njit(cache=cached, error_model="numpy", fastmath={"contract"}, **options)(function)
-    finally:
-        _numba_settings.CACHE_LOCATOR_CLASSES = _LOCATORS
+    dispatcher: Any = numba.njit(error_model="numpy", fastmath={"contract"}, **options)(function)
+    if cached and not _numba_settings.DISABLE_JIT:
+        dispatcher._cache = SharedCache(function)  # type: ignore[no-untyped-call]  # what its enable_caching does, with numba's own cache
+    return dispatcher
 
 
 def compiled(function: Callable[..., Any], *, nogil: bool = False) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Collection, Iterator
@@ -16,6 +15,7 @@ from pydantic import ValidationError
 from daq.contracts import exit_codes
 from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.file_lock import take_lock
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.jobs import Study
 from daq.executors.program import program_here
@@ -142,9 +142,11 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
         raise _unwritable(path, error) from error
     with lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise BatchInUseError(f"{path}: another batch computes into it; wait until it has ended") from None
+            alone = take_lock(lock)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        if not alone:
+            raise BatchInUseError(f"{path}: another batch computes into it; wait until it has ended")
         _require_same(path / ASKED, asked)
         yield BatchFolder(path, _read_rows(path / ROWS))
 

@@ -2,8 +2,10 @@
 
 A nice value alone is not enough. Linux compares nice values only within one session (sched_autogroup): a fit in the
 service's own session uses up that session's share of the cores, and then the service itself waits for up to 0.1 s. In a
-session of its own it uses up its own share. Where sessions do not count, as in a container or a unit of systemd, the
-scheduling class SCHED_IDLE makes the process leave a core as soon as anything else needs it.
+session of its own it uses up its own share. Where sessions do not count, as in a container or a unit of systemd, its
+nice value gives the process the same share. It must have one: in the class SCHED_IDLE, with a three-hundredth of an
+ordinary process, the imports of a job took longer on a busy computer than anybody waits. SCHED_BATCH keeps it from
+taking a core at once when it wakes.
 """
 
 from __future__ import annotations
@@ -16,11 +18,10 @@ from daq.executors.parent import end_with_parent
 from server import logs
 from server.core_sharing import weigh_session
 
-NICENESS = 19
-"""Nice value of the process within its session."""
-SESSION_NICENESS = 10
-"""Nice value of the session: it has a tenth of an ordinary session's weight, so that jobs progress even on a computer
-that is always busy. With a third (5) the service itself waited for a core in most of its slowest answers."""
+NICENESS = 10
+"""Nice value of the session, and of the process where sessions do not count: a tenth of the ordinary weight, so that
+jobs progress even on a computer that is always busy. With a third (5) the service itself waited for a core in most of
+its slowest answers."""
 
 
 def begin_worker() -> None:
@@ -31,12 +32,11 @@ def begin_worker() -> None:
 
 
 def give_way() -> None:
-    """Makes this process compute only while the service and its robot do not; on systems other than Linux, with the
-    lowest weight."""
+    """Makes this process compute with a tenth of the weight that the service and its robot have."""
     with contextlib.suppress(PermissionError):  # it leads a session already
         os.setsid()
     os.nice(NICENESS)
     if sys.platform == "linux":
-        weigh_session(SESSION_NICENESS)
+        weigh_session(NICENESS)
         with contextlib.suppress(OSError):  # forbidden in some containers
-            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))

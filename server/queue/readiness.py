@@ -31,10 +31,13 @@ class Missing:
 
 
 def why_paused(arm: ArmReport) -> str:
-    """Returns why the queue must wait for a person after a stop or a fault of the arm; empty in every other state."""
+    """Returns why the queue must wait for a person after a stop or a fault of the arm; empty in every other state.
+
+    It holds after the reset as well. The arm itself says the cause, and until the reset that one is needed.
+    """
     if arm.arm not in ("stopped", "fault"):
         return ""
-    return f"the arm is {arm.arm} ({arm.cause}): look at it, reset it, then resume the queue"
+    return f"the arm {'was stopped' if arm.arm == 'stopped' else 'had a fault'}: look at it, then resume the queue"
 
 
 def approval_missing(experiments: int, reviewer: Reviewer | None) -> str:
@@ -52,7 +55,7 @@ def what_is_missing(now: Circumstances) -> Missing | None:
     state, cause = now.arm.arm, why_paused(now.arm)
     found = [
         (now.arm.link == "lost" or state == "disconnected", Missing("the link to the robot is lost")),
-        (cause != "", Missing(f"the arm is {state}", cause)),
+        (cause != "", Missing(f"the arm {'is stopped' if state == 'stopped' else 'has a fault'}", cause)),
         (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
         (
             lacks_consent(now.identity, now.consent),

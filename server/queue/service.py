@@ -138,7 +138,7 @@ class QueueService:
             arm = self._context.robot.arm
             if arm is not None and (cause := why_paused(arm)):
                 self.notices.note(cause)
-                line = f"the arm is {arm.arm}: {arm.cause}"
+                line = f"the arm {'is stopped' if arm.arm == 'stopped' else 'has a fault'}: {arm.cause}"
                 raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
             state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
             self._context.queues.set(self._context.robot.name, state)  # first: what is not written stays paused

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import os
 import signal
@@ -16,6 +15,7 @@ from sqlalchemy.exc import DatabaseError
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
+from daq.contracts.file_lock import take_lock
 from server.database_errors import line_of
 from server.store.address import StoreError, masked, open_engine, parse_address
 
@@ -66,9 +66,12 @@ def _locked_file(file: Path) -> Iterator[None]:
         raise InUseError(f"{path}: cannot be made: {error.strerror}") from error
     with stream:
         try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InUseError(f"database {file}: a service uses it; end that one first") from None
+            alone = take_lock(stream)
+        except OSError as error:
+            line = f"{path}: cannot be locked: {error.strerror}; keep the database on another file system"
+            raise InUseError(line) from error
+        if not alone:
+            raise InUseError(f"database {file}: a service uses it; end that one first")
         yield
 
 

@@ -45,6 +45,9 @@ class VirtualBench:
 
     # the channel
 
+    def waited(self) -> float:
+        return 0.0
+
     def connect(self) -> VirtualBench:
         return self
 

@@ -80,11 +80,11 @@ class HandClock:
 class RealTimeHost:
     """Speaks to a mock in real time, where time is a hand-wound clock."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, waits: bool = False, **options: Any) -> None:
         self.clock = HandClock()
         self.device = make_device(**options)
         self.board = self.device.board
-        self.pace = RealTimePace(self.device.link, self.device.board, self.clock)
+        self.pace = RealTimePace(self.device.link, self.device.board, self.clock, waits=waits)
         self.dialect = FramedDialect()
         greet(self.device, self.dialect)
 

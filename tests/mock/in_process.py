@@ -25,6 +25,9 @@ class InProcess:
         self.bridge: Any = kind(Timeline(device.board, device.faults), sees_period=sample, lock_step=True)
         self._pace = LockStepPace(BridgeLink(self.bridge, device.faults))
 
+    def waited(self) -> float:
+        return 0.0
+
     def connect(self) -> InProcess:
         return self
 

@@ -7,6 +7,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+from daq.config.documents import BROUGHT
 from hatch_readme import absolute
 from tests.repository.tracked import ROOT, tracked_files
 
@@ -42,6 +43,9 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     assert re.findall(r"\]\((?!https?:)[^)]*\)|<img", description) == [], "an index shows no file of the repository"
     built = (ROOT / "docs" / "_site" / "index.html").is_file()
     assert ("ma2000/docs_site/index.html" in packed) == built
+    documents = {name.removeprefix("ma2000/documents/") for name in packed if name.startswith("ma2000/documents/")}
+    pages = {name for name in tracked if name.startswith("docs/") and name.endswith((".md", ".png", ".svg"))}
+    assert documents == (set() if built else pages | {"README.md", "CHANGELOG.md", *BROUGHT.values()})
 
 
 def test_where_the_project_has_an_address_the_description_keeps_its_pictures_and_pages() -> None:

@@ -69,6 +69,9 @@ class Line:
         self.us = max(self.us, round(time_s * 1e6))
         self.stage.advance_to(self.us // 1000)
 
+    def waited(self) -> float:
+        return 0.0
+
     def connect(self) -> Line:
         return self
 

@@ -49,3 +49,12 @@ def test_a_tick_to_come_is_as_many_periods_later() -> None:
     estimator = TickTime(0.02)
     estimator.arrived(7, 5.0)
     assert [estimator.time_of(tick) for tick in (6, 7, 10)] == pytest.approx([4.98, 5.0, 5.06])
+
+
+def test_while_a_mock_waits_no_sample_grows_late_and_what_comes_later_than_that_does() -> None:
+    """The board stood still for 0.15 s before tick 3; tick 4 was 40 ms late beside that."""
+    estimator = TickTime(0.02)
+    arrivals = [(1, 0.02, 0.0), (2, 0.04, 0.0), (3, 0.21, 0.15), (4, 0.27, 0.15), (5, 0.25, 0.15)]
+    late = [time - estimator.arrived(tick, time, waited) for tick, time, waited in arrivals]
+    assert late == pytest.approx([0.0, 0.0, 0.0, 0.04, 0.0])
+    assert estimator.time_of(6) == pytest.approx(0.27)

@@ -80,6 +80,9 @@ class ScriptedEndpoint:
     control: str | None = None
     connected: int = 0
 
+    def waited(self) -> float:
+        return 0.0
+
     def connect(self) -> ScriptedChannel:
         if not self.channels:
             raise TransportError("nobody there")

@@ -35,6 +35,9 @@ class SampleWaitsForStop:
         self._sample: int | None = None
         self._replies: SimpleQueue[bytes] = SimpleQueue()
 
+    def waited(self) -> float:
+        return 0.0
+
     def connect(self) -> SampleWaitsForStop:
         return self
 

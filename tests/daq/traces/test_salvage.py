@@ -1,5 +1,7 @@
 """After a kill or a power cut every trace is salvaged, none is complete, and none is touched while it is written."""
 
+import errno
+import fcntl
 import os
 import random
 import shutil
@@ -20,6 +22,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
 from daq.contracts.errors import TraceError
+from daq.contracts.file_lock import take_lock
 from daq.contracts.trace import TraceEvent
 from daq.traces import disk
 from daq.traces.naming import finished_path, part_path
@@ -232,13 +235,30 @@ def test_a_part_file_that_another_process_has_just_finished_is_left_to_it(
 ) -> None:
     path = write(tmp_path / "a.mcap")
     part = path.rename(tmp_path / "a.mcap.part")
-    lock = disk.try_lock
 
     def finished_meanwhile(stream: IO[bytes]) -> bool:
         part.rename(path)
-        return lock(stream)
+        return take_lock(stream)
 
-    monkeypatch.setattr(disk, "try_lock", finished_meanwhile)
+    monkeypatch.setattr("daq.traces.salvage.take_lock", finished_meanwhile)
     with pytest.raises(TraceError, match="was salvaged or finished by another process"):
         salvage(part)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_where_the_file_system_refuses_locks_nothing_is_written_and_what_is_there_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "a.mcap")
+    part = shutil.copy(path, tmp_path / "b.mcap.part")
+
+    def refused(_stream: object, _how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    assert len(read_trace(path)) > 0
+    assert not disk.is_being_written(part), "a writer would have begun with a lock"
+    for line in (lambda: write(tmp_path / "c.mcap"), lambda: salvage(part)):
+        with pytest.raises(TraceError, match="No locks available"):
+            line()
+    assert sorted(tmp_path.iterdir()) == [path, part]

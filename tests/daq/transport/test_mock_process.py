@@ -12,6 +12,9 @@ from contextlib import closing
 import pytest
 
 from daq.transport import TransportError, open_endpoint
+from daq.transport.mock_process import start_mock
+from daq.transport.url import MockPort
+from tests.control_port import told_by
 
 OWNER = """
 import json, sys
@@ -42,6 +45,34 @@ def test_a_mock_that_cannot_start_says_why_in_one_line() -> None:
     with pytest.raises(TransportError, match=r"the mock controller did not start: .*nonsense") as caught:
         open_endpoint("mock://?fault=nonsense")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("process", "says"), [("import os; os.kill(os.getpid(), 9)", "signal 9 .*memory"), ("", "code 0")]
+)
+def test_a_mock_that_ends_without_a_word_has_its_end_named(
+    monkeypatch: pytest.MonkeyPatch, process: str, says: str
+) -> None:
+    start = subprocess.Popen
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **given: start([command[0], "-c", process], **given))
+    with pytest.raises(TransportError, match=f"did not start: .*{says}"):
+        start_mock(MockPort())
+
+
+def test_a_mock_that_is_held_up_tells_for_how_long_its_board_stood_still() -> None:
+    mock = start_mock(MockPort(), waits=True)
+    try:
+        os.kill(mock._process.pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, mock._process.pid, os.WSTOPPED)
+        subprocess.run([sys.executable, "-c", ""], check=True)  # for a while, something else computes
+        os.kill(mock._process.pid, signal.SIGCONT)
+        assert mock._process.stdout is not None
+        while mock.waited() == 0.0:
+            assert select.select([mock._process.stdout], [], [], 10)[0], "it has told nothing"
+        clock = told_by(mock.control, "state")["clock"]
+        assert mock.waited() <= clock["waited_us"] * 1e-6
+    finally:
+        mock.close()
 
 
 def test_a_mock_can_be_left_and_come_back_to_and_is_missed_when_it_has_ended() -> None:

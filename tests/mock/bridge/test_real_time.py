@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from firmware_protocol.commands import AFTER_NEWEST, Sample, Snapshot, Stop, Stopped
+from mock_controller.real_time import LATE_US
 from tests.mock.host import RealTimeHost
 
 
@@ -37,6 +38,22 @@ def test_a_starved_process_catches_up_and_counts_what_was_late() -> None:
     assert host.board.counters.periods == 51
     assert host.pace.lateness.late_ticks == 49  # the last began 1 ms ago
     assert host.pace.lateness.worst_us == 981_000
+
+
+def test_one_that_waits_lets_the_board_stand_still_and_says_for_how_long() -> None:
+    host = RealTimeHost(waits=True)
+    host.wait(1_000)
+    due = host.board.next_event_us
+    host.clock.now_us += 1_000_000
+    host.wait(0)
+    assert host.board.time_us == due, "what was due is done, and nothing after it"
+    waited = 1_001_000 - due
+    assert host.pace.lateness.waited_us == waited
+    host.wait(20_000)
+    assert host.board.time_us == due + 20_000, "it goes on at its own pace"
+    host.clock.now_us = host.pace.zero_us + host.board.next_event_us + LATE_US
+    host.wait(0)
+    assert host.pace.lateness.waited_us == waited, "what every process must expect is no wait"
 
 
 def test_a_stop_does_not_wait_until_a_starved_process_has_caught_up() -> None:

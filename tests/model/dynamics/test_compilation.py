@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import fcntl
 import os
 import shutil
@@ -154,6 +155,31 @@ def test_one_process_compiles_while_others_wait() -> None:
         with one_process_at_a_time(recursive.__name__), pytest.raises(BlockingIOError):
             fcntl.flock(another, fcntl.LOCK_EX | fcntl.LOCK_NB)
         fcntl.flock(another, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+FULL = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
+"""Every write to a file fails from here on, as on a full disk."""
+
+
+@pytest.mark.parametrize(("first", "folder"), [("", "/proc/nonexistent"), (FULL, "full")], ids=["no folder", "full"])
+def test_without_room_for_a_cache_it_computes_and_says_so_once(tmp_path: Path, first: str, folder: str) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / folder)}
+    run = subprocess.run(
+        [sys.executable, "-c", first + USES_ONE], env=environment, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.split() == ["0", "1"]
+    (line,) = run.stderr.splitlines()
+    assert line.startswith(f"Compiled code cannot be kept in {tmp_path / folder} (")
+    assert "NUMBA_CACHE_DIR" in line
+
+
+def test_a_lock_that_the_file_system_refuses_is_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(_file: object, _how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    with one_process_at_a_time(recursive.__name__), pytest.raises(ValueError, match="own"):
+        raise ValueError("its own errors pass")
 
 
 def test_only_old_caches_are_removed(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from server.jobs.service import worker_processes
+from server.jobs.yielding import NICENESS
 
 FOREVER = """
 import os, sys
@@ -44,9 +45,11 @@ def _readable(descriptor: int, patience: float) -> bool:
     return bool(select.select([descriptor], [], [], patience)[0])
 
 
-@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="Linux's classes of processes")
-def test_a_worker_is_in_a_session_of_its_own_and_in_the_class_for_idle_times() -> None:
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="Linux's classes of processes")
+def test_a_worker_is_in_a_session_of_its_own_and_keeps_a_tenth_of_the_weight_where_sessions_do_not_count() -> None:
+    """In the class for idle times it would have a three-hundredth, and not even start beside a busy program."""
     with worker_processes(1) as workers:
         worker = workers.submit(os.getpid).result()
         assert os.getsid(worker) == worker
-        assert os.sched_getscheduler(worker) == os.SCHED_IDLE
+        assert os.sched_getscheduler(worker) == os.SCHED_BATCH
+        assert os.getpriority(os.PRIO_PROCESS, worker) == os.getpriority(os.PRIO_PROCESS, 0) + NICENESS

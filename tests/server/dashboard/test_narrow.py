@@ -1,4 +1,4 @@
-"""On the narrowest screens: Stop is whole on every page, whatever stands beside it, and nothing sticks out."""
+"""On the narrowest screens: Stop is whole on every page, nothing sticks out, and a thumb reaches every page."""
 
 from __future__ import annotations
 
@@ -25,6 +25,12 @@ STOP = """() => {
         width: box.width, left: box.left, right: box.right, top: box.top, inside: document.documentElement.clientWidth,
         covered: corners.some(([x, y]) => !stop.contains(document.elementFromPoint(x, y))),
         beyond: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+        hidden: [...document.querySelectorAll('nav[aria-label=Pages] a')].filter((link) => {
+            const place = link.getBoundingClientRect();
+            const at = document.elementFromPoint(place.left + place.width / 2, place.top + place.height / 2);
+            return !link.contains(at) || place.left < 0 || place.right > innerWidth || place.bottom > innerHeight
+                || link.scrollWidth > link.clientWidth;
+        }).map((link) => link.textContent),
     };
 }"""
 
@@ -76,6 +82,8 @@ def _faults(dashboard: Dashboard, where: str) -> list[str]:
             found.append(f"{where} at {width} px: Stop is {seen['width']} px wide")
         if seen["beyond"] > 0:
             found.append(f"{where} at {width} px: {seen['beyond']} px stick out")
+        if seen["hidden"]:
+            found.append(f"{where} at {width} px: cannot be tapped: {seen['hidden']}")
     return found
 
 
@@ -111,3 +119,12 @@ def test_stop_is_whole_beside_every_badge(dashboard: Dashboard) -> None:
     expect(page.locator("[role=alert] [data-stop]")).to_be_visible()
     found += _faults(dashboard, "stopped")
     assert found == []
+
+
+def test_a_phone_has_state_arm_numbers_and_jogging_before_the_charts(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.set_viewport_size({"width": 390, "height": 844})
+    parts = [".now", ".side > :nth-child(1)", ".side > :nth-child(2)", ".hand", ".charts", ".link"]
+    top = "one => one.getBoundingClientRect().top"
+    places = [page.locator(f"main .page {part}").first.evaluate(top) for part in parts]
+    assert places == sorted(places)

@@ -159,7 +159,7 @@ MOCK = REAL.model_copy(update={"simulated": True})
         (Circumstances(MOCK, _arm(link="lost"), "", True, True), "the link to the robot is lost", False),
         (Circumstances(MOCK, _arm(arm="disconnected"), "", True, True), "the link to the robot is lost", False),
         (Circumstances(MOCK, _arm(arm="stopped", cause="x"), "", True, True), "the arm is stopped", True),
-        (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm is fault", True),
+        (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm has a fault", True),
         (Circumstances(MOCK, _arm(activity="jog"), "", True, True), "the arm is busy: jog", False),
         (Circumstances(REAL, _arm(), "", True, False), "no operator is present", True),
     ],

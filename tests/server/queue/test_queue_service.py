@@ -179,7 +179,8 @@ def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanw
     bench.queue.on_arm_report(stopped)
     bench.queue.on_arm_report(CALM)  # reset, before the queue's thread has looked
     bench.queue.start()
-    line = f"the arm is {state} (somebody): look at it, reset it, then resume the queue"
+    had = {"stopped": "was stopped", "fault": "had a fault"}[state]
+    line = f"the arm {had}: look at it, then resume the queue"
     bench.until(lambda event: event == f"queue: paused: {line}")
     assert bench.queue.status().reason == line
     bench.queue.resume("anna", moves_real_arm=False)
@@ -195,7 +196,7 @@ def test_a_stop_is_remembered_by_whoever_wants_to_resume_too_early(bench: Bench)
         bench.queue.resume("anna", moves_real_arm=False)
     bench.robot.arm = CALM
     bench.queue.start()
-    bench.until(lambda event: event.startswith("queue: paused: the arm is stopped"))
+    bench.until(lambda event: event.startswith("queue: paused: the arm was stopped"))
 
 
 # ---- schedules that nobody could submit

@@ -243,7 +243,7 @@ def test_without_anybody_s_word_a_simulated_arm_is_asked_all_the_same(bench: Ben
 def test_a_stopped_arm_is_named_to_whoever_wants_to_resume(bench: Bench) -> None:
     bench.queue.pause("a look", "anna")
     bench.robot.arm = CALM.model_copy(update={"arm": "fault", "cause": "joint 2 strayed"})
-    with pytest.raises(ProblemError, match="the arm is fault: joint 2 strayed"):
+    with pytest.raises(ProblemError, match="the arm has a fault: joint 2 strayed"):
         bench.queue.resume("anna", moves_real_arm=False)
     assert bench.queue.status().reason == "a look"
     assert bench.events == ["queue: paused: a look"]

@@ -50,7 +50,7 @@ def test_a_stop_holds_the_queue_and_a_busy_arm_only_delays_it() -> None:
     stopped = what_is_missing(replace(READY, arm=CALM.model_copy(update={"arm": "stopped", "cause": "anna"})))
     assert stopped is not None
     assert stopped.line == "the arm is stopped"
-    assert stopped.pause.startswith("the arm is stopped (anna): look at it")
+    assert stopped.pause.startswith("the arm was stopped: look at it")
     busy = what_is_missing(replace(READY, arm=CALM.model_copy(update={"activity": "jog"})))
     assert busy is not None
     assert (busy.line, busy.pause) == ("the arm is busy: jog", "")

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { LinkMessage } from '../api/types';
-import { LinkHealth } from './health';
+import { healthOf, LinkHealth } from './health';
 
 const told = (counters: Record<string, number>): LinkMessage => ({
   topic: 'link',
@@ -33,5 +33,29 @@ describe('link health', () => {
     expect(health.roundTrip()).toBeNull();
     health.heard(told({ round_trip_p99_s: 0.004 }), 0);
     expect(health.roundTrip()).toBeCloseTo(4);
+  });
+});
+
+describe('what is said of the link', () => {
+  const after = (more: Record<string, number>) => {
+    const health = new LinkHealth();
+    health.heard(told({ requests: 100 }), 0);
+    health.heard(told({ requests: 3100, ...more }), 60);
+    return healthOf('connected', health.figures());
+  };
+
+  it('is healthy only while nothing is counted', () => {
+    expect(after({})).toEqual({ tone: 'good', text: 'healthy', advice: '' });
+    expect(after({ late: 300, retries: 2 })).toMatchObject({ tone: 'warn', text: 'late samples' });
+    expect(after({ retries: 2 })).toMatchObject({ text: 'retries', advice: '' });
+  });
+
+  it('says what to do about samples that come late', () => {
+    expect(after({ late: 300 }).advice).toMatch(/computer is busy, or the line is slow\. End other programs/);
+  });
+
+  it('is what the service says of one that is lost or not open', () => {
+    expect(healthOf('lost', []).tone).toBe('bad');
+    expect(healthOf('none', []).text).toBe('not open');
   });
 });

@@ -11,6 +11,7 @@ export interface Figure {
   lately: number;
 }
 
+const LATE = 'Late samples';
 const FIGURES: readonly (readonly [counter: string, name: string, meaning: string])[] = [
   ['retries', 'Retries', 'Requests written again because no whole reply came'],
   ['damaged', 'CRC errors', 'Pieces of input that were no whole reply: checksum, stuffing or length'],
@@ -22,11 +23,36 @@ const FIGURES: readonly (readonly [counter: string, name: string, meaning: strin
     'Periods in which the controller did not take the set points sent',
   ],
   ['missing_samples', 'Missing samples', 'Periods of which no sample was delivered'],
-  ['late', 'Late samples', 'Samples that came more than one period after their tick'],
+  ['late', LATE, 'Samples that came more than one period after their tick'],
   ['restarts', 'Board restarts', 'Resets of the board that were noticed'],
 ];
 /** s that "lately" looks back. */
 export const LATELY = 60;
+
+export interface Health {
+  tone: 'good' | 'warn' | 'bad' | 'quiet';
+  text: string;
+  /** What a person can do; empty where nothing is to be done. */
+  advice: string;
+}
+
+/** How the link does: nothing is healthy of which something was counted lately. */
+export function healthOf(state: LinkMessage['state'] | 'none', figures: readonly Figure[]): Health {
+  if (state === 'none') return { tone: 'quiet', text: 'not open', advice: '' };
+  if (state === 'lost') return { tone: 'bad', text: 'lost', advice: '' };
+  const most = figures.reduce<Figure | null>(
+    (found, one) => (one.lately > (found?.lately ?? 0) ? one : found),
+    null,
+  );
+  const late = figures.find((one) => one.name === LATE);
+  const advice =
+    late !== undefined && late.lately > 0
+      ? 'Samples come late: this computer is busy, or the line is slow. End other programs on it.'
+      : '';
+  if (state === 'degraded') return { tone: 'warn', text: 'degraded', advice };
+  if (most === null) return { tone: 'good', text: 'healthy', advice };
+  return { tone: 'warn', text: most.name.toLowerCase(), advice };
+}
 
 /** Remembers what the counters were, to tell what is going on now from what once was. */
 export class LinkHealth {

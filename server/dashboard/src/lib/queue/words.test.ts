@@ -13,10 +13,10 @@ describe('what goes on', () => {
     expect(whatGoesOn(null, null, 0).isFree).toBe(false);
   });
 
-  it('says that the arm is stopped and the queue paused', () => {
+  it('says once that the arm is stopped, and that the queue is paused', () => {
     const found = whatGoesOn({ ...robot, arm: 'stopped' }, { ...paused, reason: 'the arm is stopped' }, 0);
     expect(found).toEqual({
-      text: 'Nothing moves until the arm is reset. The queue is paused: the arm is stopped.',
+      text: 'Nothing moves until the arm is reset.',
       isFree: false,
     });
     expect(whatGoesOn(robot, paused, 0)).toEqual({

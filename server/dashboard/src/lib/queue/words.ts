@@ -25,7 +25,8 @@ export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: nu
   const activity = ACTIVITIES[robot?.activity ?? 'none'];
   const isHeld = robot?.arm === 'stopped' || robot?.arm === 'fault';
   const held = isHeld ? 'Nothing moves until the arm is reset.' : '';
-  const paused = queue?.paused ? `The queue is paused: ${queue.reason}.` : '';
+  // Until the reset, the banner says why; the queue waits for the same reason.
+  const paused = queue?.paused && !isHeld ? `The queue is paused: ${queue.reason}.` : '';
   const said = [activity || held, paused].filter((part) => part !== '').join(' ');
   if (said !== '' || waiting > 0 || robot === null || queue === null) return { text: said, isFree: false };
   if (robot.connection !== 'connected') return { text: '', isFree: false };

@@ -1,6 +1,15 @@
 /** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
 
-import { api, ask, asProblem, here, newKey, type ExperimentSpec, type Problem } from '../../lib/api';
+import {
+  api,
+  ask,
+  asProblem,
+  here,
+  newKey,
+  type Experiment,
+  type ExperimentSpec,
+  type Problem,
+} from '../../lib/api';
 import { dayAndTime } from '../../lib/format';
 import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
 import { interval, localMoment, momentOf, UNITS, type Unit } from '../../lib/trajectory/when';
@@ -32,6 +41,8 @@ export class Sending {
   problem = $state.raw<Problem | null>(null);
   /** What became of the last one. */
   done = $state('');
+  /** The last one as it is in the queue; null for a schedule. */
+  made: Experiment | null = null;
   problems: Readonly<Record<string, string>> = $derived.by(() => this.wrong());
   private key = newKey();
 
@@ -41,6 +52,7 @@ export class Sending {
     this.busy = true;
     this.problem = null;
     this.done = '';
+    this.made = null;
     try {
       this.done = this.when === 'every' ? await this.schedule(spec) : await this.submit(spec);
       this.key = newKey();
@@ -60,6 +72,7 @@ export class Sending {
     const params = { path: here(), header: { 'idempotency-key': this.key } };
     const body = { spec, priority: Number(this.priority), ...(at === null ? {} : { at }) };
     const made = await ask(api.POST('/api/v1/robots/{robot}/experiments', { params, body }));
+    this.made = made;
     return `${made.spec.name ?? made.spec.trajectory.kind} was added to the queue`;
   }
 

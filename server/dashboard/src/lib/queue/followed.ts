@@ -1,0 +1,42 @@
+/** Where an experiment stands that somebody has just sent. Pure. */
+
+import type { Experiment } from '../api';
+
+export interface Lists {
+  readonly waiting: readonly Experiment[];
+  readonly running: Experiment | null;
+  readonly ended: readonly Experiment[];
+}
+
+export interface StandingOfRun {
+  /** `unknown`: the lists have not been read since it was sent. */
+  state: 'unknown' | 'waiting' | 'running' | 'ended';
+  experiment: Experiment | null;
+  tone: 'good' | 'warn' | 'bad' | 'busy' | 'quiet';
+  text: string;
+  /** For one that waits: what it waits behind. */
+  said: string;
+}
+
+const TONES = { done: 'good', failed: 'bad', cancelled: 'quiet', interrupted: 'warn' } as const;
+
+export function standingOf(id: string, { waiting, running, ended }: Lists): StandingOfRun {
+  const over = ended.find((one) => one.id === id);
+  if (over !== undefined) {
+    const tone = TONES[over.state as keyof typeof TONES] ?? 'quiet';
+    return { state: 'ended', experiment: over, tone, text: over.state, said: '' };
+  }
+  if (running?.id === id)
+    return { state: 'running', experiment: running, tone: 'busy', text: 'running', said: '' };
+  const place = waiting.findIndex((one) => one.id === id);
+  if (place === -1)
+    return { state: 'unknown', experiment: null, tone: 'quiet', text: 'added to the queue', said: '' };
+  const ahead = place + (running === null ? 0 : 1);
+  return {
+    state: 'waiting',
+    experiment: waiting[place]!,
+    tone: 'quiet',
+    text: `number ${place + 1} in the queue`,
+    said: ahead === 0 ? 'It is next.' : `It runs after ${ahead === 1 ? 'one other' : `${ahead} others`}.`,
+  };
+}
