@@ -30,6 +30,7 @@ from server.services import Services
 from server.steady import keep_steady
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
+from server.store.address import address_of
 from server.store.lock import sole_use, sqlite_file
 from server.store.owner_name import owner_name
 
@@ -48,7 +49,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         _serve_reading(settings, ready)
         return
     with (
-        sole_use(section.database_url) as tell_name,
+        sole_use(address_of(section)) as tell_name,
         listening(section) as (listener, beside),
         # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
@@ -161,6 +162,7 @@ def _is_open_here(section: ServiceSettings) -> bool:
 def _begin(settings: Settings, listener: socket.socket) -> Begin:
     """Returns the first message to the stop listener."""
     section = settings.server
+    database = address_of(section)
     return Begin(
         descriptor=-1,  # the door sets it
         service_port=listener.getsockname()[1],
@@ -168,8 +170,8 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         names=tuple(name.lower() for name in section.names),
         cookie=session_cookie(section.oidc.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
-        database_url=section.database_url,
-        sqlite=sqlite_file(section.database_url),
+        database_url=database.render_as_string(hide_password=False),
+        sqlite=sqlite_file(database),
     )
 
 

@@ -68,6 +68,7 @@ from server.robot.robot import Robot, RobotPlace
 from server.robot.status import status_of
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService, Word
+from server.store.address import address_of
 from server.store.archived import ArchivedStore
 from server.store.engine import Store
 from server.store.events import EventStore
@@ -169,7 +170,7 @@ class Services:
         destinations = destinations_of(settings.notifications)
         self.reads_only = settings.server.reads_only
         """Whether another service owns the arms, and this one only reads what that has stored."""
-        self.store = Store(settings.server.database_url, reads_only=self.reads_only)
+        self.store = Store(address_of(settings.server), reads_only=self.reads_only)
         self.store.migrate()
         self.store.require_sound()
         self.experiments = ExperimentStore(self.store)

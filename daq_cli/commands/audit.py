@@ -97,8 +97,9 @@ def _parse_head(text: str) -> Head:
 
 def _log(call: Invocation) -> AuditLog:
     from server.audit.log import AuditLog
+    from server.store.address import address_of
     from server.store.engine import Store
 
-    store = Store(call.configuration.server.database_url)
+    store = Store(address_of(call.configuration.server))
     store.migrate()
     return AuditLog(store)

@@ -19,7 +19,7 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from pydantic import ValidationError
-from sqlalchemy import Engine, event, text
+from sqlalchemy import URL, Engine, event, text
 from sqlalchemy.exc import DatabaseError, DBAPIError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.sql.dml import UpdateBase
@@ -44,7 +44,7 @@ __all__ = ["Store", "StoreError", "migrations"]
 class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
-    def __init__(self, url: str, *, reads_only: bool = False) -> None:
+    def __init__(self, url: str | URL, *, reads_only: bool = False) -> None:
         """reads_only: for a service that reads beside the one that writes. Raises StoreError if the database is not of
         PostgreSQL, then."""
         parsed = parse_address(url)

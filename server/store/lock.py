@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from sqlalchemy import Connection, Engine, text
+from sqlalchemy import URL, Connection, Engine, text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts import exit_codes
@@ -38,14 +38,14 @@ class InUseError(DaqError):
     exit_code = exit_codes.NOT_REACHED
 
 
-def sqlite_file(url: str) -> Path | None:
+def sqlite_file(url: str | URL) -> Path | None:
     """Returns the file of a SQLite database; None for any other, and for one in memory. Raises StoreError."""
     parsed = parse_address(url)
     return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
 
 
 @contextmanager
-def sole_use(url: str) -> Iterator[Callable[[str], None]]:
+def sole_use(url: str | URL) -> Iterator[Callable[[str], None]]:
     """Keeps other services and restores from using this database within the block. Raises InUseError, and StoreError
     if a database server cannot be reached. Yields a function that tells services that only read who this is.
 
@@ -88,7 +88,7 @@ def _locked_file(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _locked_server(url: str) -> Iterator[ServerLock]:
+def _locked_server(url: str | URL) -> Iterator[ServerLock]:
     engine = open_engine(url)
     place = masked(parse_address(url))
     try:

@@ -43,7 +43,7 @@ def quietly(_fraction: float, _text: str) -> None:
 
 def places_in(folder: Path, robot: str = "ma2000") -> Places:
     database = folder / "service" / "service.sqlite"
-    return Places(f"sqlite:///{database}", database, {robot: folder / "traces"}, folder / "service")
+    return Places(database, {robot: folder / "traces"}, folder / "service")
 
 
 def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") -> None:
@@ -424,7 +424,7 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     def places_of_two(folder: Path) -> Places:
         database = folder / "service" / "service.sqlite"
         traces = {name: folder / "traces" / name for name in ("left", "right")}
-        return Places(f"sqlite:///{database}", database, traces, folder / "service")
+        return Places(database, traces, folder / "service")
 
     here, there = places_of_two(tmp_path / "here"), places_of_two(tmp_path / "there")
     store = Store(here.url)
