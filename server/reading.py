@@ -24,7 +24,7 @@ from server.store.engine import Store
 from server.store.lock import owner_of
 
 _PLAIN = "/healthz|/readyz|/metrics|/api/docs|/docs/.*"
-_SERVICE = "robots|openapi.json|me|system|audit|fleet/comparison"
+_SERVICE = "robots|openapi.json|problems|me|system|audit|fleet/comparison"
 _ROBOT = (
     "machine|experiments(/[^/]+)?|queue/experiments|schedules(/[^/]+)?|programs(/[^/]+)?|presets|spec-schema|events"
     "|traces(/[^/]+(/data[.][a-z]+|/gain)?)?|jobs(/[^/]+(/[^/]+)?)?|models(/.+)?|lineage|effects"

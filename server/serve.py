@@ -76,8 +76,10 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         # The web server raises the signal again when it has ended; the with-blocks then end everything else.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         door.wait_ready()
+        end = EndInTime(services.end_processes, lambda: services.closed)
         with suppress(KeyboardInterrupt):  # by then the web server has ended in order
-            _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
+            _Server(config, lambda: ready(address), ending, end.arm).run([listener])
+    end.finish()
 
 
 def _serve_reading(settings: Settings, ready: Callable[[str], None]) -> None:
@@ -99,11 +101,13 @@ def _serve_reading(settings: Settings, ready: Callable[[str], None]) -> None:
             services.end_processes()
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        end = EndInTime(services.end_processes, lambda: services.closed)
         with suppress(KeyboardInterrupt):
-            server = _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm)
+            server = _Server(config, lambda: ready(address), ending, end.arm)
             # Clients ask for a stop at the port after the service's, too. It is refused there by this service itself:
             # at a port left free another service might listen, and stop an arm that nobody meant.
             server.run([listener, beside])
+    end.finish()
 
 
 def _configuration(app: FastAPI) -> uvicorn.Config:

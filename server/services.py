@@ -170,6 +170,8 @@ class Services:
         destinations = destinations_of(settings.notifications)
         self.reads_only = settings.server.reads_only
         """Whether another service owns the arms, and this one only reads what that has stored."""
+        self.closed = False
+        """Whether `close` has done everything."""
         self.store = Store(address_of(settings.server), reads_only=self.reads_only)
         self.store.migrate()
         self.store.require_sound()
@@ -258,6 +260,7 @@ class Services:
         )
         _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)])
         self.store.close()
+        self.closed = True
 
     def end_processes(self) -> None:
         """Ends the processes that read uploads and plan motions, at once. The owner of a robot's port ends by itself,

@@ -23,7 +23,14 @@ from server import logs
 from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, Buckets, counted
-from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
+from server.access.origin import (
+    SAFE_METHODS,
+    beside,
+    is_from_elsewhere,
+    is_known_name,
+    is_this_computers_user,
+    prefix_of,
+)
 from server.access.session_cookie import says_where_it_is_from, session_cookie, session_of
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
@@ -93,7 +100,8 @@ class Gate:
         state["request_id"] = request_id = secrets.token_hex(8)
         logs.request_id.set(request_id)
         status = 500
-        host = Headers(scope=scope).get("host", "")
+        asked_with = Headers(scope=scope)
+        host, state["prefix"] = asked_with.get("host", ""), prefix_of(asked_with)
         stop_listener = None if self.stop_port is None else beside(host, self.stop_port)
 
         async def secured(message: Message) -> None:
@@ -103,6 +111,8 @@ class Gate:
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-Id"] = request_id
                 secure(headers, scope["path"], stop_listener)
+                if headers.get("Location", "").startswith("/"):
+                    headers["Location"] = state["prefix"] + headers["Location"]
             await send(message)
 
         uploads = _is_post(scope, UPLOADS)
@@ -185,7 +195,7 @@ class Gate:
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
             line = f"this service is not called {headers.get('host', '')!r:.100}"
             raise ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
-        if is_from_elsewhere(headers, changes_something=changes):
+        if is_from_elsewhere(headers, self.names, changes_something=changes):
             line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
             raise ProblemError(403, "other-origin", line, "use the page that this service serves")
         caller = await self._caller(scope, headers)

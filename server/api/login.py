@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from datetime import timedelta
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -20,6 +21,8 @@ from server.problems import PROBLEMS, ProblemError, not_found
 from server.services import Services
 
 START = "/api/v1/login/start"
+HOME = "../../../"
+"""The page, from the addresses below. A relative one: a proxy may serve the service below a path of its own."""
 router = APIRouter(tags=["system"], responses=PROBLEMS)
 log = logging.getLogger("server.access")
 
@@ -49,7 +52,7 @@ async def start_login(
     answer = RedirectResponse(address, 303)
     word = services.sign_ins.begin(asked, robot)
     # It must come with a link from the provider's page, so it is `lax`; the session's cookie is `strict`.
-    _set_cookie(answer, services, sign_in_cookie(_address(services)), word, int(GOOD_FOR), "lax", "/api/v1/login")
+    _set_cookie(answer, services, sign_in_cookie(_address(services)), word, int(GOOD_FOR), "lax", _path(services))
     return answer
 
 
@@ -76,8 +79,8 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))
-    answer = RedirectResponse(f"/?robot={way.robot}" if way.robot else "/", 303)
-    _forget_cookie(answer, services, sign_in_cookie(_address(services)), "/api/v1/login")
+    answer = RedirectResponse(f"{HOME}?robot={way.robot}" if way.robot else HOME, 303)
+    _forget_cookie(answer, services, sign_in_cookie(_address(services)), _path(services))
     _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict", "/")
     return answer
 
@@ -112,6 +115,11 @@ def _of_sign_in(request: Request, caller: Caller, services: Services) -> AuditNo
 
 def _address(services: Services) -> str | None:
     return services.settings.server.oidc.address
+
+
+def _path(services: Services) -> str:
+    """Returns the path of the addresses below, as browsers see it."""
+    return urlsplit(_address(services) or "").path.rstrip("/") + "/api/v1/login"
 
 
 def _set_cookie(
@@ -149,4 +157,4 @@ def _told(request: Request, services: Services, problem: ProblemError) -> Respon
             detail=problem.kind,
         )
     )
-    return RedirectResponse(f"/?sign-in={problem.kind}", 303)
+    return RedirectResponse(f"{HOME}?sign-in={problem.kind}", 303)

@@ -17,7 +17,8 @@ from server.audit.log import AuditLog
 from server.backup.places import BackupError
 from server.database_errors import line_of, open_to_read
 from server.store.address import file_address
-from server.store.engine import BUSY_TIMEOUT_MS, Store, migrations
+from server.store.engine import BUSY_TIMEOUT_MS, Store
+from server.store.schema import difference, expected_schema, foreign, migrations, remove, schema_of
 
 
 def copy_database(source: Path, target: Path) -> None:
@@ -48,6 +49,24 @@ def revision_of(database: Path) -> str | None:
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
     return None if row is None else str(row[0])
+
+
+def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
+    """Removes what the migrations to this revision do not make, such as triggers, which would act with the service's
+    rights. Returns its names. Raises BackupError if something that they make is missing, or of another form."""
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            found = schema_of(connection.execute)
+            own = {} if revision is None else expected_schema(revision)
+            wrong = difference(found, own) or ("its tables have no version" if found and not own else None)
+            if wrong is not None:
+                raise BackupError(f"database {database.name}: {wrong}: the backup is damaged")
+            strange = foreign(found, own)
+            for kind, name in strange:
+                remove(connection.execute, kind, name)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+    return tuple(f"{kind} {name}" for kind, name in strange)
 
 
 def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:

@@ -9,13 +9,11 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from importlib import resources
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from alembic import command
-from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from pydantic import ValidationError
@@ -29,6 +27,7 @@ from sqlalchemy.sql.util import find_tables
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
+from server.store.schema import migrations
 
 BUSY_TIMEOUT_MS = 5000
 """Time to wait for a lock: another process (`daq token`, a backup) may hold the write lock for a moment."""
@@ -181,13 +180,6 @@ class Store:
     def close(self) -> None:
         """Closes all connections."""
         self.engine.dispose()
-
-
-def migrations() -> Config:
-    """Returns Alembic's configuration for the migrations of this package."""
-    config = Config()
-    config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
-    return config
 
 
 def _is_of_a_row(error: Exception) -> bool:

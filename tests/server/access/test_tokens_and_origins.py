@@ -301,7 +301,7 @@ def test_every_answer_tells_browsers_what_they_may_not_do(service: Service) -> N
 def test_a_page_of_another_origin_cannot_stop_or_start_anything(service: Service) -> None:
     for path in ("/stop", "/experiments", "/queue/pause"):
         answer = service.robot.post(path, json={}, headers={"Origin": "http://attacker.example"})
-        assert (answer.status_code, answer.json()["type"]) == (403, "docs/service.md#other-origin")
+        assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#other-origin")
     assert service.robot.get("/queue").json()["queued"] == 0
 
 
@@ -313,12 +313,12 @@ def test_a_page_of_another_origin_cannot_watch(service: Service) -> None:
 
 def test_a_name_that_points_here_is_not_enough(service: Service) -> None:
     answer = service.client.get("/robots", headers={"Host": "attacker.example"})
-    assert (answer.status_code, answer.json()["type"]) == (403, "docs/service.md#unknown-name")
+    assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#unknown-name")
 
 
 def test_a_body_that_is_too_large_is_not_read(service: Service) -> None:
     answer = service.robot.post("/experiments", content=b"x" * (17 << 20), headers={"Content-Type": "application/json"})
-    assert (answer.status_code, answer.json()["type"]) == (413, "docs/service.md#too-large")
+    assert (answer.status_code, answer.json()["type"]) == (413, "/api/v1/problems#too-large")
 
 
 @pytest.fixture
@@ -360,7 +360,7 @@ def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path, daq: Comman
             me = nobody.get("/me", headers=anna).json()
             assert (me["name"], me["role"], me["owner_of"]) == ("anna", "viewer", [])
             refused = nobody.post("/robots/ma2000/experiments", json={}, headers=anna)
-            assert (refused.status_code, refused.json()["type"]) == (403, "docs/service.md#operator-needed")
+            assert (refused.status_code, refused.json()["type"]) == (403, "/api/v1/problems#operator-needed")
             bert = {"Authorization": f"Bearer {operator}"}
             assert nobody.post("/robots/ma2000/connect", headers=bert).status_code == 200
             assert nobody.post("/robots/ma2000/stop", headers=anna).json()["confirmed"] is True

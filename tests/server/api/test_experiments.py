@@ -65,7 +65,7 @@ def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Serv
     answer = service.robot.post("/experiments", json={"spec": {"trajectory": {"kind": "ramp", "amplitude": 3.4}}})
     assert answer.status_code == 422
     assert answer.headers["Content-Type"] == "application/problem+json"
-    assert answer.json()["type"] == "docs/service.md#beyond-limits"
+    assert answer.json()["type"] == "/api/v1/problems#beyond-limits"
     assert service.robot.get("/queue").json()["queued"] == 0
 
 

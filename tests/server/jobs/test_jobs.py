@@ -80,7 +80,7 @@ def test_a_model_is_compared_with_a_trace_and_the_trace_is_kept(service: Service
     assert report.headers["Content-Security-Policy"].endswith("sandbox")
     assert "<script" not in report.text
     refused = service.robot.delete(f"/traces/{trace}")
-    assert (refused.status_code, refused.json()["type"]) == (409, "docs/service.md#trace-in-use")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/api/v1/problems#trace-in-use")
     assert service.robot.delete(f"/jobs/{job['id']}").status_code == 204
     assert service.robot.delete(f"/traces/{trace}").status_code == 204
     assert service.robot.get(f"/traces/{trace}").status_code == 404
@@ -139,7 +139,7 @@ def test_a_model_from_elsewhere_is_taken_in_once_and_one_with_a_program_is_refus
     with_program = json.loads(model.model_dump_json())
     with_program["effects"] = [{"name": "own", "joints": [1], "file": {"name": "own.py", "text": "import os"}}]
     answer = service.robot.post("/models", content=json.dumps(with_program), params={"name": "own"})
-    assert (answer.status_code, answer.json()["type"]) == (422, "docs/service.md#not-a-model")
+    assert (answer.status_code, answer.json()["type"]) == (422, "/api/v1/problems#not-a-model")
     for text in (b"", b"{}", b"[1]", b'"a"', b"\xff"):
         assert service.robot.post("/models", content=text, params={"name": "x"}).status_code == 422
     assert service.robot.delete(f"/models/{model.identity}").status_code == 204

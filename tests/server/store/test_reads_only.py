@@ -105,7 +105,7 @@ def test_one_service_owns_the_arm_and_the_other_reads(postgresql: PostgresServer
             reader.robot.get("/live/frame"),
         ):
             assert answer.status_code == 409, answer.request.url
-            assert answer.json()["type"] == "docs/service.md#reads-only"
+            assert answer.json()["type"] == "/api/v1/problems#reads-only"
             assert _place(owner) in answer.json()["advice"]
         # Where clients ask for a stop as well, it is this service that refuses it, and no other one can listen.
         first, second = stop_addresses(reader.url)

@@ -1,7 +1,7 @@
 import { describe, expect, it, vi } from 'vitest';
 
 vi.stubGlobal('sessionStorage', { getItem: () => null });
-vi.stubGlobal('location', { origin: 'http://127.0.0.1:8300' });
+vi.stubGlobal('location', { origin: 'https://lab', pathname: '/arm/' });
 const { problemOfSignIn, roleText, signInAddress } = await import('./sign_in');
 
 describe('signing in', () => {
@@ -16,7 +16,9 @@ describe('signing in', () => {
 
   it('comes back to the robot that was shown', () => {
     expect(signInAddress('/api/v1/login/start', '')).toBe('/api/v1/login/start');
-    expect(signInAddress('/api/v1/login/start', 'left')).toBe('/api/v1/login/start?robot=left');
+    expect(signInAddress('/api/v1/login/start', 'left')).toBe(
+      'https://lab/arm/api/v1/login/start?robot=left',
+    );
   });
 
   it('says what somebody may do at this arm', () => {
