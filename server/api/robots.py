@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Body
 
 from daq.contracts.machine import Machine
 from daq.contracts.service.base import Page
@@ -78,7 +80,11 @@ async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> St
 
 @router.post("/{robot}/reset")
 def reset_robot(
-    request: ResetRequest, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
+    request: Annotated[ResetRequest, Body(default_factory=ResetRequest)],
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
+    lease: LeaseHeader = None,
 ) -> Done:
     """Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed."""
     rig.control.require_free_of_others(lease)

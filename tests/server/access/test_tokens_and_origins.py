@@ -75,11 +75,22 @@ def test_a_name_that_somebody_else_lets_point_here_is_not_known(
         ({"host": "127.0.0.1:8300", "sec-fetch-site": "cross-site"}, True),
         ({"host": "127.0.0.1:8300", "sec-fetch-site": "same-site"}, True),
         ({"host": "127.0.0.1:8300", "sec-fetch-site": "none"}, False),
+        # An origin leaves out the usual port of its scheme, and a proxy may not.
+        ({"host": "arm.lab:443", "origin": "https://arm.lab"}, False),
+        ({"host": "ARM.lab", "origin": "https://arm.lab:443"}, False),
+        ({"host": "arm.lab:443", "origin": "http://arm.lab"}, True),
+        ({"host": "arm.lab:8443", "origin": "https://arm.lab"}, True),
+        # A proxy has put its own name for the service into Host.
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab"}, False),
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab:9999"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "https://attacker.example"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab", "sec-fetch-site": "cross-site"}, True),
+        ({"host": "arm.lab:8300", "origin": "https://arm.lab"}, True),
     ],
 )
 def test_pages_of_another_origin_change_nothing(headers: dict[str, str], elsewhere: bool) -> None:
-    assert is_from_elsewhere(headers, changes_something=True) is elsewhere
-    assert not is_from_elsewhere(headers, changes_something=False)
+    assert is_from_elsewhere(headers, ("arm.lab",), changes_something=True) is elsewhere
+    assert not is_from_elsewhere(headers, ("arm.lab",), changes_something=False)
 
 
 @pytest.mark.parametrize(
@@ -95,6 +106,9 @@ def test_pages_of_another_origin_change_nothing(headers: dict[str, str], elsewhe
         ({"host": "127.0.0.1:8300", "x-forwarded-proto": "https"}, False),
         ({"host": "localhost:8300", "forwarded": "for=10.0.0.9"}, False),
         ({"host": "localhost:8300", "via": "1.1 proxy"}, False),
+        ({"host": "127.0.0.1:8300", "origin": "http://localhost:8300"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab"}, False),
+        ({"host": "127.0.0.1:8300", "origin": "null"}, False),
     ],
 )
 def test_what_a_proxy_hands_on_is_no_user_of_this_computer(headers: dict[str, str], local: bool) -> None:

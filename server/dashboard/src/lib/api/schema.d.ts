@@ -843,7 +843,8 @@ export interface paths {
         put?: never;
         /**
          * Create Schedule
-         * @description Creates a schedule that submits an experiment periodically. It is checked now and before every run.
+         * @description Creates a schedule that submits an experiment at even intervals or by the wall clock. It is checked now and
+         *     before every run.
          */
         post: operations["create_schedule"];
         delete?: never;
@@ -5587,7 +5588,11 @@ export interface components {
             robot: string;
             spec: components["schemas"]["ExperimentSpec"];
             /** Every */
-            every: number;
+            every: number | null;
+            /** Cron */
+            cron?: string | null;
+            /** Zone */
+            zone?: string | null;
             /**
              * Starts
              * Format: date-time
@@ -5629,7 +5634,8 @@ export interface components {
         };
         /**
          * ScheduleRequest
-         * @description An experiment to run at regular intervals, for studies of wear and drift.
+         * @description An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
+         *     clock (`cron`).
          */
         ScheduleRequest: {
             /**
@@ -5654,7 +5660,11 @@ export interface components {
              */
             spec?: components["schemas"]["ExperimentSpec"];
             /** Every */
-            every: number;
+            every?: number | null;
+            /** Cron */
+            cron?: string | null;
+            /** Zone */
+            zone?: string | null;
             /** Starts */
             starts?: string | null;
             /** Count */
