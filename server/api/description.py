@@ -102,7 +102,9 @@ def problems_page() -> str:
 
 
 def completed(document: Document) -> Document:
-    """Adds the schema of problems and the examples to `document`, in place, and returns it."""
+    """Adds the schema of problems and the examples to `document`, in place, and returns it. The addresses in it begin
+    two levels above its own: a proxy may serve all this below a path."""
+    document["servers"] = [{"url": "../.."}]
     document["components"]["schemas"] = dict(sorted((document["components"]["schemas"] | _problem_schemas()).items()))
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
