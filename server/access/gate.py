@@ -111,8 +111,8 @@ class Gate:
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-Id"] = request_id
                 secure(headers, scope["path"], stop_listener)
-                if headers.get("Location", "").startswith("/"):
-                    headers["Location"] = state["prefix"] + headers["Location"]
+                if "Location" in headers:
+                    headers["Location"] = _led(headers["Location"], host, state["prefix"])
             await send(message)
 
         uploads = _is_post(scope, UPLOADS)
@@ -287,6 +287,14 @@ class Gate:
         name = caller.name if caller else None
         extra = {"caller": name, "status": status, "ms": round(1000 * seconds, 1)}
         log.log(level, "%s %s", scope["method"], scope["path"], extra=extra)
+
+
+def _led(location: str, host: str, prefix: str) -> str:
+    """Returns an address of this service as a path below a proxy's prefix; any other address as it is."""
+    for own in ("", f"http://{host}", f"https://{host}"):
+        if location.startswith(f"{own}/"):
+            return prefix + location.removeprefix(own)
+    return location
 
 
 def _is_post(scope: Scope, address: re.Pattern[str]) -> bool:

@@ -105,4 +105,4 @@ def is_from_elsewhere(headers: Mapping[str, str], names: Collection[str] = (), *
     scheme, page, host = origin.partition(":")[0], place_of(origin), headers.get("host", "")
     if page is None or page == place_of(f"{scheme}://{host}"):
         return page is None
-    return page[0] == name_of(host) or page[0] not in names or page[1] != DEFAULT_PORTS[scheme]
+    return page[0] == name_of(host) or page[0] not in names or page[1] != DEFAULT_PORTS.get(scheme)

@@ -86,6 +86,7 @@ def test_a_name_that_somebody_else_lets_point_here_is_not_known(
         ({"host": "127.0.0.1:8300", "origin": "https://attacker.example"}, True),
         ({"host": "127.0.0.1:8300", "origin": "https://arm.lab", "sec-fetch-site": "cross-site"}, True),
         ({"host": "arm.lab:8300", "origin": "https://arm.lab"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "ftp://arm.lab:21"}, True),
     ],
 )
 def test_pages_of_another_origin_change_nothing(headers: dict[str, str], elsewhere: bool) -> None:

@@ -75,7 +75,9 @@ def test_a_preset_may_be_named_and_actions_need_no_body(service: Service) -> Non
     assert service.robot.post(f"/experiments/{made.json()['id']}/cancel").status_code == 200
     assert service.robot.post("/reset").status_code == 200
     assert service.robot.post("/queue/resume").status_code == 200
-    assert service.robot.post("/control").status_code == 201
+    taken = service.robot.post("/control")
+    assert taken.status_code == 201
+    assert service.robot.delete("/control", headers={"Control-Lease": taken.json()["lease"]}).status_code == 204
 
 
 def test_a_bound_is_told_with_its_unit(service: Service) -> None:

@@ -2775,6 +2775,8 @@ export interface components {
              *     }
              */
             spec?: components["schemas"]["ExperimentSpec"];
+            /** Preset */
+            preset?: string | null;
             /** At */
             at?: string | null;
             /**
@@ -5659,6 +5661,8 @@ export interface components {
              *     }
              */
             spec?: components["schemas"]["ExperimentSpec"];
+            /** Preset */
+            preset?: string | null;
             /** Every */
             every?: number | null;
             /** Cron */
@@ -6844,7 +6848,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["ResetRequest"];
             };
@@ -7839,7 +7843,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["QueueResume"];
             };
@@ -8119,7 +8123,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["ControlRequest"];
             };
@@ -8435,7 +8439,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["ArchiveOrder"];
             };
