@@ -10,6 +10,7 @@ import socket
 import tty
 from abc import ABC, abstractmethod
 from pathlib import Path
+from urllib.parse import quote
 
 _READ_SIZE = 65536
 UNSENT_LIMIT = 65536
@@ -95,7 +96,7 @@ class PtyPort(Port):
 
     @property
     def url(self) -> str:
-        return f"serial://{self._link.absolute() if self._link else os.ttyname(self._far)}"
+        return f"serial://{quote(str(self._link.absolute() if self._link else os.ttyname(self._far)))}"
 
     @property
     def watched(self) -> list[int]:

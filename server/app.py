@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
@@ -62,8 +63,11 @@ def bare_app(services: Services | None) -> FastAPI:
         for rig in services.robots():
             rig.hub.open(lambda robot=rig.robot: robot.experiment)  # type: ignore[misc]
         await run_in_threadpool(services.start)
+        described.begin_soon()
         yield
-        await run_in_threadpool(services.close)
+        described.close()
+        # With a thread of its own: those of requests may all be taken by some that cannot be interrupted.
+        await asyncio.to_thread(services.close)
         for rig in services.robots():
             await rig.hub.close()
 
@@ -104,7 +108,7 @@ def bare_app(services: Services | None) -> FastAPI:
     app.include_router(page_router())
     serve_site(app, site_index())
     description.install(app)
-    description.serve(app, f"{API}/openapi.json")
+    described = description.serve(app, f"{API}/openapi.json")
     return app
 
 

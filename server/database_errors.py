@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sqlite3
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts import exit_codes
@@ -27,6 +28,11 @@ class DamagedError(DaqError):
     """The database is damaged: this program cannot have written what it holds."""
 
     exit_code = exit_codes.WRONG_INPUT
+
+
+def open_to_read(file: Path, busy: float = 5.0) -> sqlite3.Connection:
+    """Opens a SQLite file that must exist, and changes nothing in it. busy: time (s) to wait for a lock."""
+    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=busy)
 
 
 def table_of(statement: str | None) -> str:

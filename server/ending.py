@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 
@@ -24,10 +25,12 @@ log = logging.getLogger("server")
 
 class EndInTime:
     """A time limit for the end of this process, armed once. `children` ends this service's processes before a
-    forced end."""
+    forced end; `in_order` says whether everything that had to end in order has ended: then only threads are left that
+    nobody waits for, and the exit code is 0."""
 
-    def __init__(self, children: Callable[[], None]) -> None:
+    def __init__(self, children: Callable[[], None], in_order: Callable[[], bool]) -> None:
         self._children = children
+        self._in_order = in_order
         self._armed = threading.Lock()
 
     def arm(self) -> None:
@@ -40,7 +43,16 @@ class EndInTime:
         timer.daemon = True
         timer.start()
 
+    def finish(self) -> None:
+        """Ends this process now if everything has ended in order after a signal. Python would wait for threads that
+        still compute, until the time limit."""
+        if self._armed.locked() and self._in_order():
+            logging.shutdown()
+            sys.stdout.flush()
+            os._exit(0)
+
     def _end(self) -> None:
+        self.finish()
         running = [thread.name for thread in threading.enumerate() if not thread.daemon]
         log.warning("the service did not end in order within %g s and ends now: %s", END_WITHIN, ", ".join(running))
         try:

@@ -7,12 +7,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
-from fastapi.responses import PlainTextResponse
+from fastapi.responses import PlainTextResponse, RedirectResponse
 
 FOLDER = Path(__file__).parent / "dashboard" / "dist"
 INDEX = "index.html"
 REFERENCE = "reference.html"
-"""The reference of the API, served at `/api/docs`."""
+"""The reference of the API; `/api/docs` leads to it."""
 NOT_BUILT = "the dashboard's page is not built: run `make page` in the source tree (it needs no Node of your own)"
 TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -71,8 +71,8 @@ def is_built(folder: Path = FOLDER) -> bool:
 
 
 def page_router(folder: Path = FOLDER) -> APIRouter:
-    """Returns the routes of all files of the page; `/` is its index, `/api/docs` the reference of the API. If the page
-    is not built, both say how to build it."""
+    """Returns the routes of all files of the page. `/` is its index, and `/api/docs` leads to the reference of the
+    API; if the page is not built, both say how to build it."""
     router = APIRouter(include_in_schema=False)
     files = _files(folder) if is_built(folder) else {}
 
@@ -83,10 +83,10 @@ def page_router(folder: Path = FOLDER) -> APIRouter:
         return files[INDEX].response(request)
 
     @router.get("/api/docs")
-    async def reference(request: Request) -> Response:
+    async def reference() -> Response:
         if REFERENCE not in files:
             return PlainTextResponse(NOT_BUILT + "\n", 503)
-        return files[REFERENCE].response(request)
+        return RedirectResponse(f"../{REFERENCE}")  # beside its files, which it names by relative addresses
 
     def add(name: str, file: PageFile) -> None:
         async def get(request: Request) -> Response:

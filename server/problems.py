@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from starlette.exceptions import HTTPException
 
 MEDIA_TYPE = "application/problem+json"
+PATH = "/api/v1/problems"
+"""The page on all kinds of problems. The type of a problem is its place there."""
 SCHEMA = {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}
 log = logging.getLogger("server")
 
@@ -55,7 +57,7 @@ NO_FIELD = re.compile(r"(constrained|function)-.*|(dict|list|set|tuple)\[.*\]|\[
 
 
 class ProblemError(Exception):
-    """A request is not carried out. `kind` is the anchor of the problem's type in docs/service.md."""
+    """A request is not carried out. `kind` is the last part of the problem's type."""
 
     def __init__(
         self,
@@ -133,10 +135,10 @@ def of_exit_code(exit_code: int, line: str) -> ProblemError:
     return ProblemError(409, "not-safe", line, "remove the cause, then try again")
 
 
-def details_of(problem: ProblemError, request_id: str | None = None) -> ProblemDetails:
-    """Returns the body of a problem's answer."""
+def details_of(problem: ProblemError, request_id: str | None = None, base: str = "") -> ProblemDetails:
+    """Returns the body of a problem's answer. base: what precedes the path of the service's addresses."""
     return ProblemDetails(
-        type=f"docs/service.md#{problem.kind}",
+        type=f"{base}{PATH}#{problem.kind}",
         title=TITLES.get(problem.status, "Problem"),
         status=problem.status,
         detail=problem.detail,
@@ -150,7 +152,8 @@ def response(request: Request, problem: ProblemError) -> JSONResponse:
     """Returns the answer for a problem."""
     from fastapi.responses import JSONResponse
 
-    details = details_of(problem, getattr(request.state, "request_id", None))
+    state = request.state
+    details = details_of(problem, getattr(state, "request_id", None), getattr(state, "prefix", ""))
     return JSONResponse(details.model_dump(mode="json"), problem.status, headers=problem.headers, media_type=MEDIA_TYPE)
 
 

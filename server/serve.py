@@ -30,6 +30,7 @@ from server.services import Services
 from server.steady import keep_steady
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
+from server.store.address import address_of
 from server.store.lock import sole_use, sqlite_file
 
 KEEP_ALIVE = 60
@@ -44,7 +45,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     SpecError, StopDoorError."""
     section = settings.server
     with (
-        sole_use(section.database_url),
+        sole_use(address_of(section)),
         listening(section) as (listener, beside),
         # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
@@ -69,8 +70,10 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         # The web server raises the signal again when it has ended; the with-blocks then end everything else.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         door.wait_ready()
+        end = EndInTime(services.end_processes, lambda: services.closed)
         with suppress(KeyboardInterrupt):  # by then the web server has ended in order
-            _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
+            _Server(config, lambda: ready(address), ending, end.arm).run([listener])
+    end.finish()
 
 
 def _configuration(app: FastAPI) -> uvicorn.Config:
@@ -130,6 +133,7 @@ def _is_open_here(section: ServiceSettings) -> bool:
 def _begin(settings: Settings, listener: socket.socket) -> Begin:
     """Returns the first message to the stop listener."""
     section = settings.server
+    database = address_of(section)
     return Begin(
         descriptor=-1,  # the door sets it
         service_port=listener.getsockname()[1],
@@ -137,8 +141,8 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         names=tuple(name.lower() for name in section.names),
         cookie=session_cookie(section.oidc.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
-        database_url=section.database_url,
-        sqlite=sqlite_file(section.database_url),
+        database_url=database.render_as_string(hide_password=False),
+        sqlite=sqlite_file(database),
     )
 
 

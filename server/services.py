@@ -68,6 +68,7 @@ from server.robot.robot import Robot, RobotPlace
 from server.robot.status import status_of
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService, Word
+from server.store.address import address_of
 from server.store.archived import ArchivedStore
 from server.store.engine import Store
 from server.store.events import EventStore
@@ -164,7 +165,9 @@ class Services:
         parse_service_address(settings.server.executor)
         bucket = open_bucket(settings.archive)
         destinations = destinations_of(settings.notifications)
-        self.store = Store(settings.server.database_url)
+        self.closed = False
+        """Whether `close` has done everything."""
+        self.store = Store(address_of(settings.server))
         self.store.migrate()
         self.store.require_sound()
         self.experiments = ExperimentStore(self.store)
@@ -248,6 +251,7 @@ class Services:
         )
         _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)])
         self.store.close()
+        self.closed = True
 
     def end_processes(self) -> None:
         """Ends the processes that read uploads and plan motions, at once. The owner of a robot's port ends by itself,

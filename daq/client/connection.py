@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
+from urllib.parse import quote
 
 import httpx
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -116,7 +117,7 @@ class Connection:
         """A file, whole or not at all. Raises OSError when it cannot be written."""
         part = target.with_name(f".{target.name}.download")
         try:
-            with self._http.stream("GET", path) as response:
+            with self._http.stream("GET", quote(path)) as response:
                 if not response.is_success:  # a redirection, such as a proxy's, is no file
                     response.read()
                     raise ServiceError(_problem(response))
@@ -156,7 +157,7 @@ class Connection:
             headers["Content-Type"] = "application/json"
         return self._http.request(
             request.method,
-            request.path,
+            quote(request.path),  # a name that somebody typed may have `?`, `#` or `%` in it
             content=content,
             params=dict(request.query),
             headers=headers,

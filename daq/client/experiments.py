@@ -158,14 +158,19 @@ class Schedules:
     def create(
         self,
         spec: ExperimentSpec,
-        every: float,
+        every: float | None = None,
         *,
+        cron: str | None = None,
+        zone: str | None = None,
         starts: datetime | None = None,
         count: int | None = None,
         priority: int = 0,
     ) -> Schedule:
-        """Every `every` s, from `starts` (None: now), `count` times (None: without end)."""
-        body = ScheduleRequest(spec=spec, every=every, starts=starts, count=count, priority=priority)
+        """Every `every` s, or whenever `cron` (`0 2 * * *`: daily at 02:00) fits the clock of `zone` (None: that of the
+        service's computer); from `starts` (None: now), `count` times (None: without end)."""
+        body = ScheduleRequest(
+            spec=spec, every=every, cron=cron, zone=zone, starts=starts, count=count, priority=priority
+        )
         return self._connection.ask(Schedule, Request("POST", self._path, body))
 
     def get(self, schedule: str) -> Schedule:

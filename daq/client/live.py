@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import Self
+from urllib.parse import quote
 from urllib.request import getproxies, proxy_bypass
 
 import httpx
@@ -26,7 +27,7 @@ class LiveStream:
 
     def __init__(self, connection: Connection, robot: str) -> None:
         """Raises ServiceNotReachedError, also when the service refuses this client; MissingExtraError."""
-        self._url = f"{_websocket(connection.url)}{API}/{robot}/live"
+        self._url = f"{_websocket(connection.url)}{API}/{quote(robot)}/live"
         proxy = proxy_to(connection.url)
         self._socket = WebSocket(self._url, connection.token, CONNECT_WITHIN, LARGEST_FRAME, proxy)
 

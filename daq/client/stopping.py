@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from urllib.parse import quote
 
 import httpx
 from pydantic import ValidationError
@@ -47,7 +48,7 @@ def stop(addresses: Sequence[str], path: str, token: str | None, kind: type[Stop
     headers = {} if token is None else {"Authorization": f"Bearer {token}"}
     pool = ThreadPoolExecutor(len(addresses), thread_name_prefix="stop")
     asked: set[Future[StopResult]] = {
-        pool.submit(_ask, f"{address}{API}/{path}/stop", headers, kind) for address in addresses
+        pool.submit(_ask, f"{address}{API}/{quote(path)}/stop", headers, kind) for address in addresses
     }
     answers: list[StopResult] = []
     try:

@@ -65,8 +65,3 @@ class ServiceSettings(FrozenRecord):
     @classmethod
     def _expanded(cls, folder: Path) -> Path:
         return folder.expanduser()
-
-    @property
-    def database_url(self) -> str:
-        """Database URL for SQLAlchemy."""
-        return self.database or f"sqlite:///{self.folder.absolute() / 'service.sqlite'}"

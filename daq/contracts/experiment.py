@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError,
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.in_unit import InUnit
 from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
@@ -29,10 +30,10 @@ LONGEST_SHOWN = 60
 MOST_POINTS = 1_000_000
 """Most points of a path: four hours of set points at 50 Hz are 720 000."""
 
-Duration = Annotated[FiniteFloat, Field(gt=0, le=3600)]
-Hold = Annotated[FiniteFloat, Field(ge=0, le=3600)]
+Duration = Annotated[FiniteFloat, Field(gt=0, le=3600), InUnit("s")]
+Hold = Annotated[FiniteFloat, Field(ge=0, le=3600), InUnit("s")]
 JointNumber = Annotated[int, Field(ge=1, le=JOINTS)]
-Angle = Annotated[FiniteFloat, Field(ge=-2 * math.pi, le=2 * math.pi)]
+Angle = Annotated[FiniteFloat, Field(ge=-2 * math.pi, le=2 * math.pi), InUnit("rad")]
 Row = Annotated[tuple[Angle, ...], Field(fail_fast=True)]
 """Angles of joints at one moment. Reading a long list ends at its first error (`fail_fast`): to collect a million of
 them takes minutes."""
@@ -322,7 +323,7 @@ def _one_line(error: ValidationError) -> str:
     where = [
         part
         for i, part in enumerate(where)
-        if not part.startswith("constrained-") and (i != 1 or where[0] != "trajectory")
+        if not part.startswith(("constrained-", "function-")) and (i != 1 or where[0] != "trajectory")
     ]
     if "gains" in where[:1] and len(where) == GAIN_PLACE:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from daq.transport.url import TransportError
+from daq.transport.url import TransportError, serial_url
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ def ports(found_by: Callable[[], Iterable[ListPortInfo]] = list_ports.comports) 
     found = sorted(found_by(), key=lambda port: port.device)
     return tuple(
         FoundPort(
-            f"serial://{port.device}",
+            serial_url(port.device),
             _shown(port.description) or port.name,
             port.manufacturer,
             port.serial_number,

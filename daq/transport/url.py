@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
@@ -112,10 +112,15 @@ SERVO_VALUES = ("ids", "supply", "load", "coulomb", "secret")
 """Options of mock://?dialect=dynamixel that are handed to the mock of servos with their value."""
 
 
+def serial_url(device: str) -> str:
+    """The URL of a serial device at this path."""
+    return f"serial://{quote(device)}"
+
+
 def parse_port_url(text: str) -> PortUrl:
     """The port that a URL names. Raises TransportError with one line: what is wrong and what is allowed."""
     if "://" not in text:
-        hint = f"; for a device write serial://{text}" if text.startswith("/") else ""
+        hint = f"; for a device write {serial_url(text)}" if text.startswith("/") else ""
         raise PortUrlError(f"port {text!r}: must begin with serial://, tcp:// or mock://{hint}")
     try:
         parts = urlsplit(text)
@@ -123,7 +128,7 @@ def parse_port_url(text: str) -> PortUrl:
     except ValueError as error:
         raise PortUrlError(f"port {text!r}: no URL: {error}") from error
     if parts.scheme == "serial":
-        return _serial(text, parts.netloc + parts.path, _single(text, options, _SERIAL_OPTIONS))
+        return _serial(text, unquote(parts.netloc + parts.path), _single(text, options, _SERIAL_OPTIONS))
     if parts.scheme == "tcp":
         return _tcp(text, parts.netloc, parts.path, _single(text, options, _TCP_OPTIONS))
     if parts.scheme == "mock":

@@ -131,8 +131,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _drop_output()
         code = exit_codes.WRONG_INPUT if error.errno in WRONG_NAMES else exit_codes.PROGRAM_FAULT
         fail(f"{file}{error.strerror or error}", code)
+    except Exception as error:
+        if (line := _line_of_database(error)) is None:
+            raise
+        fail(line, exit_codes.WRONG_INPUT)
     # typer hands back either an exit code or what the command returned.
     raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
+
+
+def _line_of_database(error: Exception) -> str | None:
+    """Returns an error of a service's database in one line; None for any other error. A command that has none of these
+    errors never imports their library."""
+    library = sys.modules.get("sqlalchemy.exc")
+    if library is None or not isinstance(error, library.DatabaseError):
+        return None
+    from server.database_errors import advice_of, line_of
+
+    return f"database: {line_of(error)}; {advice_of(error)}"
 
 
 def _flush() -> None:

@@ -11,12 +11,12 @@ from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
-    from daq.contracts.service.experiments import Experiment
+    from daq.contracts.service.experiments import Experiment, Schedule
     from daq.contracts.service.queue import QueueStatus
 
 app = typer.Typer(
     add_completion=False,
-    help="Show, pause and resume the queue of a server's robot; approve experiments.",
+    help="Show, pause and resume the queue of a server's robot; approve experiments; list and delete schedules.",
     no_args_is_help=True,
 )
 
@@ -83,11 +83,35 @@ def resume(context: typer.Context, yes: YesOption = False) -> None:
         _print_status(robot.queue.resume(moves_real_arm=real))
 
 
-def _name(experiment: Experiment) -> str:
+@app.command()
+def schedules(context: typer.Context, json: JsonOption = False) -> None:
+    """List what the server runs again and again, the newest first. `daq run … --daily 02:00` adds to it."""
+    with robot_of(context).service("queue") as robot:
+        found = list(robot.schedules.list())
+    if json:
+        print_json([one.model_dump(mode="json") for one in found])
+        return
+    for one in found:
+        when = f"every {one.every:g} s" if one.every is not None else f"{one.cron} ({one.zone})"
+        coming = "off or complete" if one.next is None else f"next on {one.next.astimezone():%Y-%m-%d at %H:%M %Z}"
+        print(f"{one.id}  {_name(one)}, by {one.created_by}: {when}; {one.submitted_runs} runs, {coming}{_review(one)}")
+
+
+@app.command()
+def unschedule(
+    context: typer.Context, schedule: Annotated[str, typer.Argument(help="Number, as `queue schedules` prints it.")]
+) -> None:
+    """Delete a schedule. Its experiments that wait or have run are kept."""
+    with robot_of(context).service("queue") as robot:
+        robot.schedules.delete(schedule)
+    print(f"schedule {schedule} deleted")
+
+
+def _name(experiment: Experiment | Schedule) -> str:
     return experiment.spec.name or experiment.spec.trajectory.kind
 
 
-def _review(experiment: Experiment) -> str:
+def _review(experiment: Experiment | Schedule) -> str:
     """Returns what a line says about an experiment's approval."""
     if experiment.needs_approval_of is not None:
         who = "an operator" if experiment.needs_approval_of == "operator" else "an owner of the robot"

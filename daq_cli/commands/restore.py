@@ -33,6 +33,7 @@ def restore(
     if file.exists() and not file.is_file():
         raise SpecError(f"{file}: is not a file, so not a backup")
     put_aside: list[str] = []
+    removed: tuple[str, ...] = ()
     if check:
         with shown_progress("checking") as progress:
             found = verify(file, progress)
@@ -41,14 +42,18 @@ def restore(
         places = places_of(invocation(context).configuration)
         with shown_progress("restore") as progress:
             done = bring_back(file, places, SystemClock().utc(), progress, overwrite=overwrite)
-        put_aside = [str(folder) for folder in done.put_aside]
+        put_aside, removed = [str(folder) for folder in done.put_aside], done.removed
         found, what = done.manifest, "was brought back"
     if json:
         counted = {"bytes": found.size, "traces": found.count("traces"), "models": found.count("models")}
         manifest = found.model_dump(mode="json", exclude={"files"})
-        print_json({"file": file, "restored": not check, "put_aside": put_aside, **manifest, **counted})
+        print_json(
+            {"file": file, "restored": not check, "put_aside": put_aside, "removed": removed, **manifest, **counted}
+        )
         return
     for folder in put_aside:
         console().print(f"existing data were moved to {folder}", markup=False)
+    for name in removed:
+        console().print(f"not brought back, since this program does not make it: {name} of the database", markup=False)
     counts = f"{found.count('traces')} traces, {found.count('models')} models, {found.size / 1e6:.1f} MB"
     print(f"{file} of {found.created:%Y-%m-%d %H:%M:%S %Z} {what}: {counts}")

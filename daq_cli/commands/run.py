@@ -21,7 +21,7 @@ from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
 from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles, require_units
 from daq_cli.models.model_input import MODEL_HELP
 from daq_cli.robot.access import robot_of
-from daq_cli.robot.experiment import Computation, RunOptions, carry_out
+from daq_cli.robot.experiment import Computation, RunOptions, carry_out, cron_of
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
@@ -99,6 +99,12 @@ LearnFromOption = Annotated[
 LearnShareOption = Annotated[
     float, typer.Option("--learn-share", min=0.01, max=1.0, help="Share of the correction that --learn-from makes.")
 ]
+DailyOption = Annotated[
+    str | None, typer.Option("--daily", help="Have the server run it every day at this time of its clock: 02:00.")
+]
+CronOption = Annotated[
+    str | None, typer.Option("--cron", help="The same by minute, hour, day, month, weekday: '0 2 * * 1-5'.")
+]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only check and show the motion; connect to nothing.")]
 
 COMMON: dict[str, tuple[Any, Any]] = {
@@ -118,6 +124,8 @@ EXECUTION: dict[str, tuple[Any, Any]] = {
     "learn_from": (LearnFromOption, None),
     "learn_share": (LearnShareOption, 1.0),
     "folder": (FolderOption, None),
+    "daily": (DailyOption, None),
+    "cron": (CronOption, None),
     "dry_run": (DryRunOption, False),
     "yes": (YesOption, False),
     "json": (JsonOption, False),
@@ -215,7 +223,8 @@ def _command(kind: type[BaseModel]) -> Callable[..., None]:
         trajectory = _trajectory(kind, values)
         spec = spec_from_options(trajectory, values, operator)
         _require_units(trajectory, values["start"], robot_of(context).machine, spec.joints)
-        options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
+        cron = cron_of(values["daily"], values["cron"])
+        options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"], cron)
         computation = Computation(values["feedforward"], values["learn_from"], values["learn_share"])
         _carry_out(context, spec, options, computation)
 
@@ -244,6 +253,8 @@ def from_file(
     learn_from: LearnFromOption = None,
     learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
+    daily: DailyOption = None,
+    cron: CronOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
@@ -252,7 +263,7 @@ def from_file(
     from daq_cli.robot.experiment import read_spec
 
     computation = Computation(feedforward, learn_from, learn_share)
-    _carry_out(context, read_spec(file), RunOptions(folder, dry_run, yes, json), computation)
+    _carry_out(context, read_spec(file), RunOptions(folder, dry_run, yes, json, cron_of(daily, cron)), computation)
 
 
 @app.command("preset")
@@ -265,6 +276,8 @@ def by_name(
     learn_from: LearnFromOption = None,
     learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
+    daily: DailyOption = None,
+    cron: CronOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
@@ -280,7 +293,7 @@ def by_name(
             print(f"{known:14s} {one.description}")
         return
     computation = Computation(feedforward, learn_from, learn_share)
-    _carry_out(context, preset(name).spec, RunOptions(folder, dry_run, yes, json), computation)
+    _carry_out(context, preset(name).spec, RunOptions(folder, dry_run, yes, json, cron_of(daily, cron)), computation)
 
 
 @app.command()
@@ -290,9 +303,11 @@ def diagnostic(
     learn_from: LearnFromOption = None,
     learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
+    daily: DailyOption = None,
+    cron: CronOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
     """Run the preset `diagnostic`: about 55 s of motion that distinguishes hidden effects."""
-    by_name(context, "diagnostic", feedforward, learn_from, learn_share, folder, dry_run, yes, json)
+    by_name(context, "diagnostic", feedforward, learn_from, learn_share, folder, daily, cron, dry_run, yes, json)

@@ -110,8 +110,9 @@ def _tokens(call: Invocation) -> TokenStore:
 
 
 def _store(call: Invocation) -> Store:
+    from server.store.address import address_of
     from server.store.engine import Store
 
-    store = Store(call.configuration.server.database_url)
+    store = Store(address_of(call.configuration.server))
     store.migrate()
     return store

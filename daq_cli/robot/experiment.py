@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from daq.contracts import exit_codes
-from daq.contracts.errors import SafetyError
+from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import print_json
 from daq_cli.robot.answers import AcquisitionFailedError
@@ -31,6 +32,8 @@ class RunOptions:
     dry_run: bool
     yes: bool
     json: bool
+    cron: str | None = None
+    """When a service shall run it, again and again; None for now."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,9 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
     if options.dry_run:
         preview(spec, robot.machine, options.json)
         return
+    if options.cron is not None:
+        _schedule(robot, spec, options.cron, as_json=options.json)
+        return
     folder = options.folder or robot.call.trace_folder
     finished = robot.acquire(spec, robot.machine, folder, ConsentPrompt(options.yes))
     if options.json:
@@ -70,6 +76,27 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
         print_result(finished, server=robot.call.server)
     if finished.outcome != "complete":
         raise typer.Exit(exit_codes.OF_OUTCOME[finished.outcome])
+
+
+def cron_of(daily: str | None, cron: str | None) -> str | None:
+    """The cron expression of `--daily HH:MM` or `--cron`; None without either. Raises SpecError."""
+    if daily is None:
+        return cron
+    found = re.fullmatch(r"([01]?\d|2[0-3]):([0-5]\d)", daily, re.ASCII)
+    if found is None or cron is not None:
+        raise SpecError(f"--daily {daily!r}: write HH:MM, such as 02:00, without --cron")
+    return f"{int(found[2])} {int(found[1])} * * *"
+
+
+def _schedule(robot: RobotAccess, spec: ExperimentSpec, cron: str, *, as_json: bool) -> None:
+    """Has the service run `spec` whenever `cron` fits the clock of its computer. Moves nothing now."""
+    with robot.service("run --daily or --cron") as service:
+        made = service.schedules.create(spec, cron=cron)
+    if as_json:
+        print_json(made.model_dump(mode="json"))
+        return
+    first = "" if made.next is None else f"; first on {made.next.astimezone():%Y-%m-%d at %H:%M %Z}"
+    print(f"schedule {made.id}: {made.cron} ({made.zone}){first}. `daq queue schedules` lists, `unschedule` cancels")
 
 
 def acquire_complete(

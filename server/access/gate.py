@@ -23,7 +23,14 @@ from server import logs
 from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, MOST_FIELDS, MOST_OF_A_PROGRAM, Buckets, counted
-from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
+from server.access.origin import (
+    SAFE_METHODS,
+    beside,
+    is_from_elsewhere,
+    is_known_name,
+    is_this_computers_user,
+    prefix_of,
+)
 from server.access.session_cookie import says_where_it_is_from, session_cookie, session_of
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
@@ -94,7 +101,8 @@ class Gate:
         state["request_id"] = request_id = secrets.token_hex(8)
         logs.request_id.set(request_id)
         status = 500
-        host = Headers(scope=scope).get("host", "")
+        asked_with = Headers(scope=scope)
+        host, state["prefix"] = asked_with.get("host", ""), prefix_of(asked_with)
         stop_listener = None if self.stop_port is None else beside(host, self.stop_port)
 
         async def secured(message: Message) -> None:
@@ -104,6 +112,8 @@ class Gate:
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-Id"] = request_id
                 secure(headers, scope["path"], stop_listener)
+                if "Location" in headers:
+                    headers["Location"] = _led(headers["Location"], host, state["prefix"])
             await send(message)
 
         uploads = _is_post(scope, UPLOADS)
@@ -187,7 +197,7 @@ class Gate:
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
             line = f"this service is not called {headers.get('host', '')!r:.100}"
             raise ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
-        if is_from_elsewhere(headers, changes_something=changes):
+        if is_from_elsewhere(headers, self.names, changes_something=changes):
             line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
             raise ProblemError(403, "other-origin", line, "use the page that this service serves")
         caller = await self._caller(scope, headers)
@@ -279,6 +289,14 @@ class Gate:
         name = caller.name if caller else None
         extra = {"caller": name, "status": status, "ms": round(1000 * seconds, 1)}
         log.log(level, "%s %s", scope["method"], scope["path"], extra=extra)
+
+
+def _led(location: str, host: str, prefix: str) -> str:
+    """Returns an address of this service as a path below a proxy's prefix; any other address as it is."""
+    for own in ("", f"http://{host}", f"https://{host}"):
+        if location.startswith(f"{own}/"):
+            return prefix + location.removeprefix(own)
+    return location
 
 
 def _is_post(scope: Scope, address: re.Pattern[str]) -> bool:

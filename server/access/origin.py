@@ -14,6 +14,8 @@ from urllib.parse import urlsplit
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 NAME = re.compile(r"[a-z0-9.-]+|\[[0-9a-f:.]+\]")
+DEFAULT_PORTS = {"http": 80, "https": 443}
+PREFIX = re.compile(r"(/[A-Za-z0-9._~-]{1,64}){1,8}")
 LOOPBACK_NAMES = ("localhost", "localhost.localdomain")
 HANDED_ON = ("forwarded", "via", "x-real-ip")
 """Headers that a proxy adds, besides all that begin with X-Forwarded-."""
@@ -37,6 +39,12 @@ def name_of(host_header: str) -> str:
         return ""
 
 
+def prefix_of(headers: Mapping[str, str]) -> str:
+    """Returns the path below which a proxy serves this service, without a slash at its end; mostly empty."""
+    given = headers.get("x-forwarded-prefix", "").rstrip("/")
+    return given if PREFIX.fullmatch(given) else ""
+
+
 def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bool) -> bool:
     """Whether a Host header names this service: by a loopback name or address, by one of `names`, or, unless the
     service listens on loopback only, by an address, or by any name if there are no `names`."""
@@ -56,9 +64,10 @@ def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bo
 
 def is_this_computers_user(headers: Mapping[str, str]) -> bool:
     """Whether a request that came over loopback is from this computer: it names a loopback host, and has no header of
-    a proxy. `headers`: by name in lower case."""
+    a proxy, nor the origin of a page that came by one. `headers`: by name in lower case."""
     proxied = any(name in HANDED_ON or name.startswith("x-forwarded-") for name in headers)
-    return is_loopback(name_of(headers.get("host", ""))) and not proxied
+    page = place_of(headers.get("origin", "http://localhost"))
+    return is_loopback(name_of(headers.get("host", ""))) and not proxied and page is not None and is_loopback(page[0])
 
 
 def beside(host_header: str, port: int) -> str | None:
@@ -70,8 +79,22 @@ def beside(host_header: str, port: int) -> str | None:
     return f"http://{name}:{port}" if NAME.fullmatch(name) else None
 
 
-def is_from_elsewhere(headers: Mapping[str, str], *, changes_something: bool) -> bool:
-    """Whether a browser sends this for a page of another origin. Programs other than browsers send no origin."""
+def place_of(origin: str) -> tuple[str, int] | None:
+    """Returns name and port of an origin, which leaves out the usual port of its scheme; None if it has none."""
+    try:
+        page = urlsplit(origin)
+        port = page.port or DEFAULT_PORTS.get(page.scheme)
+    except ValueError:
+        return None
+    return None if port is None or page.hostname is None else (page.hostname, port)
+
+
+def is_from_elsewhere(headers: Mapping[str, str], names: Collection[str] = (), *, changes_something: bool) -> bool:
+    """Whether a browser sends this for a page of another origin. Programs other than browsers send no origin.
+
+    Where a proxy has put another name into Host, the page's own must be one of the service's `names`, at the usual port
+    of http or https: other ports of a name may be other people's.
+    """
     if not changes_something:
         return False
     if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
@@ -79,7 +102,7 @@ def is_from_elsewhere(headers: Mapping[str, str], *, changes_something: bool) ->
     origin = headers.get("origin")
     if origin is None:
         return False
-    try:
-        return urlsplit(origin).netloc.lower() != headers.get("host", "").lower()
-    except ValueError:
-        return True
+    scheme, page, host = origin.partition(":")[0], place_of(origin), headers.get("host", "")
+    if page is None or page == place_of(f"{scheme}://{host}"):
+        return page is None
+    return page[0] == name_of(host) or page[0] not in names or page[1] != DEFAULT_PORTS.get(scheme)

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from urllib.parse import urlsplit
 
+from server.access.origin import DEFAULT_PORTS
+
 TLS_PREFIX = "__Host-"
 """Beginning of a name that browsers take from its host over TLS only. On loopback, names are without it."""
 SESSION, SIGN_IN = "daq-session", "daq-sign-in"
-DEFAULT_PORTS = {"http": 80, "https": 443}
 STOPS_FOR = 3600.0
 """Time (s) for which an ended session still stops the robot, and nothing else: nobody shall find at the wrong moment
 that they must sign in again. A session that somebody has left stops nothing."""

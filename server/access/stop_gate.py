@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
-from urllib.parse import urlsplit
 
 from server.access.caller import LOCAL, Caller
-from server.access.origin import is_known_name, is_this_computers_user, name_of
+from server.access.origin import is_known_name, is_this_computers_user, name_of, place_of
 from server.access.session_cookie import says_where_it_is_from, session_cookie, session_of
 from server.problems import ProblemError
 
@@ -84,8 +83,4 @@ class StopGate:
         origin = headers.get("origin")
         if origin is None:
             return headers.get("sec-fetch-site", "none") in ("none", "same-origin")
-        try:
-            page = urlsplit(origin)
-            return page.hostname == name_of(headers.get("host", "")) and page.port == self.service_port
-        except ValueError:
-            return False
+        return place_of(origin) == (name_of(headers.get("host", "")), self.service_port)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Body
 
 from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive
 from server.api.dependencies import Identity, Operator, RobotDep, ServicesDep, Viewer
@@ -27,7 +29,11 @@ def get_trace_archive(trace: Identity, rig: RobotDep, _: Viewer) -> TraceArchive
 
 @router.post("/traces/{trace}/archive", status_code=202)
 def archive_trace(
-    trace: Identity, order: ArchiveOrder, rig: RobotDep, services: ServicesDep, caller: Operator
+    trace: Identity,
+    order: Annotated[ArchiveOrder, Body(default_factory=ArchiveOrder)],
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
 ) -> TraceArchive:
     """Sends a trace to the archive now; with `drop`, its local copy goes when it is there."""
     services.traces.file_of(rig.robot.name, trace)  # raises a 404 for a trace that there is not

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
+from concurrent.futures import Future
+from functools import cache
+from html import escape
 from typing import Any
 
 from fastapi import FastAPI, Request, Response
-from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import HTMLResponse
 
 from daq.contracts.service.problems import ProblemDetails
 from server.api.examples import examples, untyped
 from server.api.problem_examples import PROBLEM_EXAMPLES
-from server.problems import MEDIA_TYPE, SCHEMA
+from server.problems import MEDIA_TYPE, PATH, SCHEMA
 
 JSON = "application/json"
 FIRST_ERROR = 400
 IN_COMPONENTS = "#/components/schemas/{model}"
+AFTER = 5.0
+"""Time (s) after the start of the service at which the description is built: not while others start beside it."""
 Document = dict[str, Any]
 
 
@@ -31,27 +37,74 @@ def install(app: FastAPI) -> None:
     app.openapi = openapi  # type: ignore[method-assign]
 
 
-def serve(app: FastAPI, address: str) -> None:
-    """Serves the description at `address`. It takes seconds to build, so a thread builds it at the first request."""
-    encoded: bytes | None = None
-    building = asyncio.Lock()
+class Described:
+    """The description, encoded once by a thread, since that takes seconds. The end of the service does not wait for
+    it."""
 
-    async def get(_request: Request) -> Response:
-        nonlocal encoded
-        async with building:
-            if encoded is None:
-                encoded = await run_in_threadpool(_encoded, app)
-        return Response(encoded, media_type=JSON)
+    def __init__(self, app: FastAPI) -> None:
+        self._app = app
+        self._begun = threading.Lock()
+        self._encoded: Future[bytes] = Future()
+        self._later = threading.Timer(AFTER, self.begin)
+        self._later.daemon = True
 
-    app.add_route(address, get, include_in_schema=False)
+    def begin_soon(self) -> None:
+        """Begins in a moment, so that the first who asks need not wait."""
+        self._later.start()
+
+    def begin(self) -> Future[bytes]:
+        """Begins unless it has been begun, and returns a future of the encoded description."""
+        if self._begun.acquire(blocking=False):
+            threading.Thread(target=self._encode, name="description", daemon=True).start()
+        return self._encoded
+
+    async def get(self, _request: Request) -> Response:
+        """Answers with the description."""
+        return Response(await asyncio.shield(asyncio.wrap_future(self.begin())), media_type=JSON)
+
+    def close(self) -> None:
+        """Does not begin any more by itself."""
+        self._later.cancel()
+
+    def _encode(self) -> None:
+        try:
+            text = json.dumps(self._app.openapi(), ensure_ascii=False, separators=(",", ":"))
+            self._encoded.set_result(text.encode())
+        except Exception as error:  # noqa: BLE001 - whoever waits is told
+            self._encoded.set_exception(error)
 
 
-def _encoded(app: FastAPI) -> bytes:
-    return json.dumps(app.openapi(), ensure_ascii=False, separators=(",", ":")).encode()
+def serve(app: FastAPI, address: str) -> Described:
+    """Serves the description at `address`, and a page on all kinds of problems at that of their types."""
+    described = Described(app)
+    app.add_route(address, described.get, include_in_schema=False)
+
+    async def problems(_request: Request) -> Response:
+        return HTMLResponse(problems_page())
+
+    app.add_route(PATH, problems, include_in_schema=False)
+    return described
+
+
+@cache
+def problems_page() -> str:
+    """Returns a page with an example of every kind of problem, and what to do, at the place that its type names."""
+    parts: dict[str, str] = {}
+    for met in sorted(PROBLEM_EXAMPLES, key=lambda one: one.problem.kind):
+        problem = met.problem
+        head = f'<h2 id="{problem.kind}">{problem.kind} ({problem.status})</h2>'
+        example = f"<p>For example: {escape(problem.detail)}.</p><p>What to do: {escape(problem.advice)}.</p>"
+        parts.setdefault(problem.kind, head + example)
+    title = "Why this service refuses a request"
+    return f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><h1>{title}</h1>' + "\n".join(
+        parts.values()
+    )
 
 
 def completed(document: Document) -> Document:
-    """Adds the schema of problems and the examples to `document`, in place, and returns it."""
+    """Adds the schema of problems and the examples to `document`, in place, and returns it. The addresses in it begin
+    two levels above its own: a proxy may serve all this below a path."""
+    document["servers"] = [{"url": "../.."}]
     document["components"]["schemas"] = dict(sorted((document["components"]["schemas"] | _problem_schemas()).items()))
     for path, operations in document["paths"].items():
         for method, operation in operations.items():

@@ -136,7 +136,7 @@ def _experiments() -> list[BaseModel]:
         ApprovalRequest(content=CONTENT),
         experiment,
         ExperimentPreset(name="ramp", description="the ramp of the 1991 thesis", spec=SPEC),
-        ScheduleRequest(spec=SPEC, every=86400, starts=NOON, count=30),
+        ScheduleRequest(spec=SPEC, cron="0 2 * * *", zone="Europe/London", count=30),
         ScheduleChange(active=False),
         Schedule(
             id="51c0ffee0a1b",

@@ -30,6 +30,7 @@ from server.api.dependencies import (
     Turn,
     Viewer,
 )
+from server.api.presets import with_preset
 from server.bounded.messages import WorkOutMotion
 from server.bounded.motion import preview_of
 from server.bounded.workers import ExhaustedError
@@ -61,6 +62,7 @@ def submit_experiment(
 
     The same Idempotency-Key returns the same experiment (200) and never queues a second one.
     """
+    request = with_preset(request)
     experiment, new = services.experiments.made_before(rig.robot.name, request, idempotency_key), False
     if experiment is None:  # one that was accepted stays accepted, even if the disk is full by now
         require_possible(services, rig, request.spec)
@@ -92,7 +94,7 @@ def preview_experiment(
     request: ExperimentRequest, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn
 ) -> MotionPreview:
     """Plans an experiment and returns its motion and all violations of limits. Nothing is queued, nothing moves."""
-    return _preview(services, rig, request.spec, MOST_SHOWN)
+    return _preview(services, rig, with_preset(request).spec, MOST_SHOWN)
 
 
 @router.get("/{experiment}")

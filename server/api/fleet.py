@@ -19,6 +19,7 @@ from daq.contracts.service.fleet import (
 from daq.contracts.service.robot import FleetStopResult
 from server.api.dependencies import IdempotencyKey, Operator, ServicesDep, Turn, Viewer
 from server.api.experiments import require_possible
+from server.api.presets import with_preset
 from server.catalogue.room import require_room
 from server.fleet.comparison import Arm
 from server.jobs.mailbox import RESULT
@@ -65,6 +66,7 @@ def submit_fleet_experiment(
     gets it once.
     """
     rigs = _chosen(services, body.robots)
+    body = body.model_copy(update={"request": with_preset(body.request)})
     new = [
         rig for rig in rigs if services.experiments.made_before(rig.robot.name, body.request, idempotency_key) is None
     ]

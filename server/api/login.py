@@ -20,6 +20,8 @@ from server.problems import PROBLEMS, ProblemError, not_found
 from server.services import Services
 
 START = "/api/v1/login/start"
+HOME = "../../../"
+"""The page, from the addresses below. A relative one: a proxy may serve the service below a path of its own."""
 router = APIRouter(tags=["system"], responses=PROBLEMS)
 log = logging.getLogger("server.access")
 
@@ -77,7 +79,7 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))
-    answer = RedirectResponse(f"/?robot={way.robot}" if way.robot else "/", 303)
+    answer = RedirectResponse(f"{HOME}?robot={way.robot}" if way.robot else HOME, 303)
     _forget_cookie(answer, services, sign_in_cookie(_address(services)))
     _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict")
     return answer
@@ -149,4 +151,4 @@ def _told(request: Request, services: Services, problem: ProblemError) -> Respon
             detail=problem.kind,
         )
     )
-    return RedirectResponse(f"/?sign-in={problem.kind}", 303)
+    return RedirectResponse(f"{HOME}?sign-in={problem.kind}", 303)

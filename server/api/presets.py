@@ -7,10 +7,21 @@ from typing import Any
 from fastapi import APIRouter
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.experiments import ExperimentPreset
+from daq.contracts.service.experiments import ExperimentPreset, Submission
 from daq.trajectories.presets import PRESETS
 from server.api.dependencies import RobotDep, Viewer
-from server.problems import PROBLEMS
+from server.problems import PROBLEMS, ProblemError
+
+
+def with_preset(request: Submission) -> Submission:
+    """Returns a request whose specification is that of the preset that it names, if it names one. Raises a 422."""
+    if request.preset is None:
+        return request
+    if request.preset not in PRESETS:
+        detail = f"preset: is none of {', '.join(PRESETS)} (got {request.preset!r:.80})"
+        raise ProblemError(422, "not-valid", detail, "name one of them, or give a `spec`")
+    return request.model_copy(update={"spec": PRESETS[request.preset].spec, "preset": None})
+
 
 router = APIRouter(prefix="/robots/{robot}", tags=["experiments"], responses=PROBLEMS)
 

@@ -9,6 +9,7 @@ from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from server.problems import ProblemError, details_of
 
 CHANGES = "(post|put|patch|delete) "
+NOWHERE = r"(?!)"
 MOVES = f"{CHANGES}.*/(teaching/.*|programs/.*/run|gains|process/.*|gripper)"
 
 
@@ -257,4 +258,26 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "the disk: Read-only file system",
         "the operating system's log says why; make it writable, then try again",
     ),
+    # At addresses that are not in the description, or at every address and never.
+    _met(
+        NOWHERE,
+        401,
+        "ticket-unknown",
+        "this ticket was used, is too old, or its token was revoked",
+        "ask for a new one",
+    ),
+    _met(
+        NOWHERE, 405, "no-such-method", "PUT /api/v1/me: Method Not Allowed", "/api/v1/openapi.json lists every address"
+    ),
+    _met(NOWHERE, 431, "head-too-large", "a request may have 100 headers", "send fewer and shorter headers"),
+    _met(NOWHERE, 500, "fault", "KeyError: an error of this program", "the log has details under the request's id"),
+    _met(NOWHERE, 403, "sign-in-unknown", "this answer of the provider was used, or is too old", "begin anew"),
+    _met(NOWHERE, 403, "sign-in-refused", "the provider refused: access_denied", "see its own message"),
+    _met(NOWHERE, 403, "sign-in-not-proven", "the ID token is not for this service", "see the service's log"),
+    _met(NOWHERE, 403, "no-role", "none of the person's groups has a role", "see `server.oidc.roles`"),
+    _met(NOWHERE, 403, "no-name", "the claim has no usable name", "see `server.oidc.name_claim`"),
+    _met(
+        NOWHERE, 403, "name-taken", "somebody else has had the name anna first", "ask whoever looks after the service"
+    ),
+    _met(NOWHERE, 503, "provider-away", "the provider does not answer", "try again, or use a token"),
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Response
 
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import ApprovalRequest, Experiment, Schedule, ScheduleChange, ScheduleRequest
@@ -21,6 +23,7 @@ from server.api.dependencies import (
     Viewer,
 )
 from server.api.experiments import require_possible
+from server.api.presets import with_preset
 from server.problems import PROBLEMS
 from server.services import RobotServices, Services
 
@@ -47,7 +50,12 @@ def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
 
 
 @router.post("/queue/resume", tags=["queue"])
-def resume_queue(request: QueueResume, rig: RobotDep, arrived: Arrived, caller: Operator) -> QueueStatus:
+def resume_queue(
+    request: Annotated[QueueResume, Body(default_factory=QueueResume)],
+    rig: RobotDep,
+    arrived: Arrived,
+    caller: Operator,
+) -> QueueStatus:
     """Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then resume with moves_real_arm")
     rig.queue.resume(caller.name, moves_real_arm=request.moves_real_arm, asked=arrived)
@@ -65,10 +73,13 @@ def attend_queue(rig: RobotDep, _: Operator) -> QueueStatus:
 def create_schedule(
     request: ScheduleRequest, rig: RobotDep, services: ServicesDep, caller: Operator, _turn: Turn
 ) -> Schedule:
-    """Creates a schedule that submits an experiment periodically. It is checked now and before every run."""
+    """Creates a schedule that submits an experiment at even intervals or by the wall clock. It is checked now and
+    before every run."""
+    request = with_preset(request)
     require_possible(services, rig, request.spec)
     made = services.schedules.create(rig.robot.name, request, services.clock.utc(), caller.name)
-    services.record_event(rig.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=caller.name)
+    when = f"every {made.every:g} s" if made.every is not None else f"at {made.cron} of {made.zone}"
+    services.record_event(rig.robot.name, "schedule", f"schedule {made.id}: {when}", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(made)
 
@@ -145,7 +156,12 @@ async def get_control(rig: RobotDep, _: Viewer) -> Control:
 
 
 @router.post("/control", tags=["control"], status_code=201)
-def take_control(request: ControlRequest, rig: RobotDep, services: ServicesDep, caller: Operator) -> ControlLease:
+def take_control(
+    request: Annotated[ControlRequest, Body(default_factory=ControlRequest)],
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
+) -> ControlLease:
     """Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then try again with moves_real_arm")
     lease = rig.control.take(caller.name, moves_real_arm=request.moves_real_arm)

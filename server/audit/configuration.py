@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from daq.config.settings import Settings
 from daq.contracts.service.audit import AuditNote
 from server.audit.log import AuditLog
-from server.store.address import masked, parse_address
+from server.store.address import address_of, masked
 
 STARTED = "start_service"
 
@@ -42,7 +42,7 @@ def _digests(settings: Settings) -> dict[str, str]:
         said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
         if name == "server":
             # Without its password, which somebody could guess and try against the digest.
-            said |= {"database": masked(parse_address(settings.server.database_url))}
+            said |= {"database": masked(address_of(settings.server))}
         if name == "notifications":
             said |= {"hosts": {one: webhook.host for one, webhook in settings.notifications.webhooks.items()}}
         text = json.dumps(said, sort_keys=True, default=_plain)

@@ -15,8 +15,10 @@ from daq.contracts.service.audit import AuditNote
 from server.audit.chain import Head
 from server.audit.log import AuditLog
 from server.backup.places import BackupError
-from server.database_errors import line_of
-from server.store.engine import BUSY_TIMEOUT_MS, Store, migrations
+from server.database_errors import line_of, open_to_read
+from server.store.address import file_address
+from server.store.engine import BUSY_TIMEOUT_MS, Store
+from server.store.schema import difference, expected_schema, foreign, migrations, remove, schema_of
 
 
 def copy_database(source: Path, target: Path) -> None:
@@ -38,7 +40,7 @@ def copy_database(source: Path, target: Path) -> None:
 def revision_of(database: Path) -> str | None:
     """Returns the revision of a database's tables; None if it has none. Raises BackupError when it is damaged."""
     try:
-        with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
+        with closing(open_to_read(database)) as connection:
             found = connection.execute("PRAGMA integrity_check").fetchone()[0]
             if found != "ok":
                 raise BackupError(f"database {database.name}: is damaged: {str(found).splitlines()[0]}")
@@ -47,6 +49,24 @@ def revision_of(database: Path) -> str | None:
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
     return None if row is None else str(row[0])
+
+
+def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
+    """Removes what the migrations to this revision do not make, such as triggers, which would act with the service's
+    rights. Returns its names. Raises BackupError if something that they make is missing, or of another form."""
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            found = schema_of(connection.execute)
+            own = {} if revision is None else expected_schema(revision)
+            wrong = difference(found, own) or ("its tables have no version" if found and not own else None)
+            if wrong is not None:
+                raise BackupError(f"database {database.name}: {wrong}: the backup is damaged")
+            strange = foreign(found, own)
+            for kind, name in strange:
+                remove(connection.execute, kind, name)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+    return tuple(f"{kind} {name}" for kind, name in strange)
 
 
 def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
@@ -109,7 +129,7 @@ def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
 def robots_of_traces(database: Path) -> dict[str, str]:
     """Returns the robot of each trace. Raises BackupError."""
     try:
-        with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
+        with closing(open_to_read(database)) as connection:
             found = connection.execute("SELECT id, robot FROM traces") if _has_table(connection, "traces") else ()
             return dict(found)
     except sqlite3.Error as error:
@@ -118,7 +138,7 @@ def robots_of_traces(database: Path) -> dict[str, str]:
 
 def head_of_audit(database: Path) -> str:
     """Returns the last row of a database's audit log, `NUMBER:DIGEST`; `nothing` if it has none, or is damaged."""
-    with suppress(sqlite3.Error), closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
+    with suppress(sqlite3.Error), closing(open_to_read(database)) as connection:
         row = connection.execute("SELECT sequence, digest FROM audit ORDER BY sequence DESC LIMIT 1").fetchone()
         if row is not None:
             return str(Head(*row))
@@ -131,7 +151,7 @@ def add_to_audit(database: Path, note: AuditNote) -> None:
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
             return
-    store = Store(f"sqlite:///{database}")
+    store = Store(file_address(database))
     try:
         AuditLog(store).append([note])
     except DatabaseError as error:

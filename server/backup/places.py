@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from sqlalchemy import URL
+
 from daq.config.settings import Settings
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.traces.layout import SUFFIX
+from server.store.address import address_of, file_address
 from server.store.lock import sqlite_file
 
 DATABASE = "database/service.sqlite"
@@ -35,13 +38,17 @@ class BackupError(DaqError):
 
 @dataclass(frozen=True)
 class Places:
-    """Places of one configuration's files. `url` is the database's address, `database` its file; `traces` are the
-    folders by the name of each robot."""
+    """Places of one configuration's files. `database` is the database's file; `traces` are the folders by the name of
+    each robot."""
 
-    url: str
     database: Path
     traces: dict[str, Path]
     service: Path
+
+    @property
+    def url(self) -> URL:
+        """The database's address."""
+        return file_address(self.database)
 
     @property
     def robot(self) -> str:
@@ -88,11 +95,11 @@ class Places:
 
 def places_of(settings: Settings) -> Places:
     """Returns the places of a configuration. Raises BackupError if its database is not a file."""
-    url = settings.server.database_url
-    database = sqlite_file(url)
+    address = address_of(settings.server)
+    database = sqlite_file(address)
     if database is None:
         raise BackupError(
-            f"database {url.partition(':')[0]}: is not a file; back it up with its own tools, and copy the folders"
+            f"database {address.drivername}: is not a file; back it up with its own tools, and copy the folders"
         )
     traces = {own.robot.name: own.traces.folder.absolute() for own in settings.each_robot()}
-    return Places(url, database, traces, settings.server.folder.absolute())
+    return Places(database, traces, settings.server.folder.absolute())

@@ -6,7 +6,6 @@ Existing files are moved aside, and never deleted.
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
 import zipfile
@@ -14,6 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
@@ -23,6 +24,7 @@ from server.backup.database import (
     forget_what_may_have_ended,
     head_of_audit,
     hold_queue,
+    keep_own_objects,
     require_known,
     revision_of,
     robots_of_traces,
@@ -39,10 +41,22 @@ CHECK_SHARE, WRITE_SHARE = 0.4, 0.98
 
 @dataclass(frozen=True)
 class Restored:
-    """What was restored, and the folders into which the files that existed before were moved."""
+    """What was restored, and the folders into which the files that existed before were moved. `removed`: objects of the
+    backup's database that this program does not make, such as triggers."""
 
     manifest: Manifest
     put_aside: tuple[Path, ...]
+    removed: tuple[str, ...]
+
+
+class _Led(BaseModel):
+    """The paths in a job's request."""
+
+    model_config = ConfigDict(extra="allow")
+
+    traces: dict[str, Path] = {}
+    models: dict[str, Path] = {}
+    continues: Path | None = None
 
 
 def restore(
@@ -80,7 +94,7 @@ def restore(
             raise BackupError(f"restore: {error.filename or archive}: {error.strerror or error}") from error
         finally:
             staged.clear()
-    return Restored(manifest, aside)
+    return Restored(manifest, aside, staged.removed)
 
 
 def occupied(places: Places) -> list[Path]:
@@ -106,6 +120,7 @@ class _Staged:
         """Place of each trace, by the name of its file, which no two robots have in common."""
         self._robots: dict[str, str] = {}
         """Robot of each trace, by its number, also of those that only the archive has."""
+        self.removed: tuple[str, ...] = ()
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
         """Extracts all files, and checks the digest of each once more. Raises BackupError, OSError."""
@@ -126,6 +141,7 @@ class _Staged:
                 done += entry.size
         if revision_of(self._staged(DATABASE)) != manifest.revision:
             raise BackupError(f"{self._archive}: its database is not the one that its list names")
+        self.removed = keep_own_objects(self._staged(DATABASE), manifest.revision)
         if manifest.revision is not None:
             line = "restored from a backup: look at the arm, then resume the queue"
             for robot in self._places.traces:
@@ -173,16 +189,19 @@ class _Staged:
         self._moves.append((path, self._places.target(entry.name)))
 
     def _lead_to_places(self, request: Path) -> None:
-        """Changes the paths of traces, models and another job in a job's request to this configuration's folders."""
-        task = json.loads(request.read_text("utf-8"))
+        """Changes the paths of traces, models and another job in a job's request to this configuration's folders. A
+        request that is none stays as it is: no worker accepts it."""
+        try:
+            task = _Led.model_validate_json(request.read_bytes())
+        except ValidationError:
+            return
         models = self._places.service / "models"
-        traces = {number: Path(file).name for number, file in task.get("traces", {}).items()}
-        task["traces"] = {number: str(self._place_of(number, name)) for number, name in traces.items()}
-        task["models"] = {number: str(models / Path(file).name) for number, file in task.get("models", {}).items()}
-        if before := task.get("continues"):
-            task["continues"] = str(self._places.service / "jobs" / Path(before).name)
+        task.traces = {number: self._place_of(number, file.name) for number, file in task.traces.items()}
+        task.models = {number: models / file.name for number, file in task.models.items()}
+        if task.continues is not None:
+            task.continues = self._places.service / "jobs" / task.continues.name
         with request.open("w", encoding="utf-8") as stream:
-            json.dump(task, stream)
+            stream.write(task.model_dump_json())
             stream.flush()
             os.fsync(stream.fileno())
 

@@ -19,8 +19,8 @@ function preloaded(program: string): Plugin {
         const scripts = [main.fileName, ...main.imports].filter((name) => name !== entry?.fileName);
         const styles = [...(main.viteMetadata?.importedCss ?? [])];
         const tags = [
-          ...scripts.map((name) => ({ rel: 'modulepreload', crossorigin: true, href: `/${name}` })),
-          ...styles.map((name) => ({ rel: 'stylesheet', crossorigin: true, href: `/${name}` })),
+          ...scripts.map((name) => ({ rel: 'modulepreload', crossorigin: true, href: `./${name}` })),
+          ...styles.map((name) => ({ rel: 'stylesheet', crossorigin: true, href: `./${name}` })),
         ];
         return tags
           .filter(({ href }) => !html.includes(`"${href}"`))
@@ -44,6 +44,8 @@ function taken(fileName: string): Plugin {
 }
 
 export default defineConfig({
+  // Relative addresses: a proxy may serve the page below a path of its own.
+  base: './',
   plugins: [svelte(), preloaded('/src/app.ts'), taken('taken.json')],
   build: {
     target: 'es2022',

@@ -1,29 +1,63 @@
-"""Computes when a schedule submits its next run. Pure."""
+"""Computes when a schedule submits its next run. Pure, but for the table of time zones."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+from cronsim import CronSim, CronSimError
+from tzlocal import get_localzone_name
+
+from server.problems import ProblemError
+
+MOMENT = timedelta(microseconds=1)
+FIELDS = 5
+"""Minute, hour, day, month, weekday. A sixth field, of seconds, would let runs come too fast."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A schedule's rule: from `starts`, every `every` s, `count` times (None: without end)."""
+    """A schedule's rule: from `starts`, `count` times (None: without end), every `every` s; or, with a `cron`
+    expression, whenever that fits the wall clock of the time zone `zone`."""
 
     starts: datetime
     every: float
     count: int | None
+    cron: str | None = None
+    zone: str | None = None
+
+
+def first(plan: Plan) -> datetime | None:
+    """Returns the time of the first run; None if there is none. Raises a 422 for an expression or a zone that is
+    none."""
+    if plan.cron is None:
+        return plan.starts
+    if len(plan.cron.split()) != FIELDS:
+        raise _not_valid("cron", "needs five fields: minute, hour, day, month, weekday, such as `0 2 * * *`")
+    try:
+        moment = _after(plan.cron, plan.zone, plan.starts - MOMENT)
+    except CronSimError as error:
+        line = f"{error}; write minute, hour, day, month, weekday, such as `0 2 * * *` (daily at 02:00)"
+        raise _not_valid("cron", line) from error
+    except (ZoneInfoNotFoundError, ValueError, OSError) as error:
+        raise _not_valid("zone", "is no time zone that this computer knows; write one such as Europe/London") from error
+    if moment is None:
+        raise _not_valid("cron", "never happens")
+    return moment
 
 
 def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> datetime | None:
     """Returns the time of the run after the one due at `last`, after `submitted` runs; None if that was the last run.
 
-    It is the first of the times `starts + n · every` that is after `last` and after `now`: runs that were due while
-    the service was not running are left out. A clock that is set back does not make the run at `last` due again.
+    It is the first of the plan's times that is after `last` and after `now`: runs that were due while the service was
+    not running are left out. A clock that is set back does not make the run at `last` due again.
     """
     if plan.count is not None and submitted >= plan.count:
         return None
+    if plan.cron is not None:
+        return _after(plan.cron, plan.zone, max(last, now))
     passed = (max(last, now) - plan.starts).total_seconds()
     steps = max(0, math.floor(passed / plan.every) + 1)
     moment = plan.starts + timedelta(seconds=steps * plan.every)
@@ -36,3 +70,19 @@ def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> date
 def is_due(next_run: datetime | None, now: datetime) -> bool:
     """Whether a run must be submitted now."""
     return next_run is not None and next_run <= now
+
+
+def zone_here() -> str:
+    """Returns the name of this computer's time zone."""
+    return get_localzone_name() or "UTC"
+
+
+def _after(cron: str, zone: str | None, moment: datetime) -> datetime | None:
+    """Returns the first time after `moment` that fits. Where clocks are put forward, a time that is left out comes when
+    they are; where they are put back, a time that comes twice counts once (unless the expression means every hour)."""
+    found = next(CronSim(cron, moment.astimezone(ZoneInfo(zone or "UTC"))), None)
+    return None if found is None else found.astimezone(UTC)
+
+
+def _not_valid(field: str, line: str) -> ProblemError:
+    return ProblemError(422, "not-valid", f"{field}: {line}", "correct the field named")

@@ -19,6 +19,7 @@ from server.access.caller import Caller
 from server.access.digest import digest_of
 from server.access.session_cookie import STOPS_FOR
 from server.access.stop_gate import TokensCannotBeReadError
+from server.database_errors import open_to_read
 
 READ_AGAIN_AFTER = 2.0
 """Time (s) between two reads, after which a revoked token is refused."""
@@ -167,8 +168,7 @@ def _ended() -> datetime:
 def _of_file(file: Path) -> tuple[Callers, Callers | None]:
     """Reads tokens and sessions (None: these cannot be read) over a new connection. A suspended service that holds the
     write lock does not block readers (WAL)."""
-    uri = f"{file.absolute().as_uri()}?mode=ro"
-    with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_WITHIN)) as connection:
+    with closing(open_to_read(file, BUSY_WITHIN)) as connection:
         tokens = _callers(connection.execute(TOKENS).fetchall())
         try:
             sessions = connection.execute(SESSIONS, {"ended": _ended().isoformat(" ", "microseconds")}).fetchall()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from sqlalchemy import Engine, create_engine
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
+from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
 from daq.contracts import exit_codes
 from daq.contracts.documents import shown
@@ -22,7 +25,20 @@ class StoreError(DaqError):
     exit_code = exit_codes.WRONG_INPUT
 
 
-def parse_address(url: str) -> URL:
+def address_of(section: ServiceSettings) -> URL:
+    """Returns the address of a service's database: the configured one, or else that of a file in the service's folder.
+    Raises StoreError."""
+    if section.database is not None:
+        return parse_address(section.database)
+    return file_address(section.folder.absolute() / "service.sqlite")
+
+
+def file_address(file: Path) -> URL:
+    """Returns the address of a SQLite file. In a pasted one, `?`, `#` and `%` of its folders' names would be syntax."""
+    return URL.create("sqlite", database=str(file))
+
+
+def parse_address(url: str | URL) -> URL:
     """Parses a database's address. Raises StoreError if it is not valid, or of an unknown kind of database.
 
     No error repeats a password.
@@ -31,7 +47,7 @@ def parse_address(url: str) -> URL:
         parsed = make_url(url)
         parsed.get_dialect()
     except (ArgumentError, NoSuchModuleError, ValueError) as error:
-        known = shown(url.rpartition("@")[2])
+        known = shown(str(url).rpartition("@")[2])
         raise StoreError(f"server.database {known}: is not the address of a database; write {EXAMPLES}") from error
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error
@@ -56,7 +72,7 @@ def masked_settings(settings: Settings) -> Settings:
     return settings.model_copy(update={"server": section})
 
 
-def open_engine(url: str) -> Engine:
+def open_engine(url: str | URL) -> Engine:
     """Makes the engine of a database, which connects when it is first used. Raises StoreError; if a driver is missing,
     the error says which package to install."""
     parsed = parse_address(url)

@@ -9,17 +9,21 @@ from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.experiments import ExperimentState
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
-from server.store.tables import TABLES_OF_THE_SEARCH, ExperimentRow, JobRow, Table
+from server.store.schema import difference, expected_schema, schema_of
+from server.store.tables import ExperimentRow, JobRow, Table
 
 
 def require_sound(engine: Engine, place: str) -> None:
-    """Raises DamagedError if the file is damaged, a table or column is missing, or a row has an unknown state.
+    """Raises DamagedError if the file is damaged, something that the migrations make is missing or of another form, or
+    a row has an unknown state.
     `place`: the database's address without its password."""
     try:
         with engine.connect() as connection:
             if engine.dialect.name == "sqlite":
                 _require_whole(connection, place)
-            _require_columns(connection, place)
+                _require_schema(connection, place)
+            else:
+                _require_columns(connection, place)
             for rows in (ExperimentRow, JobRow):
                 _require_known_states(connection, rows, place)
     except DatabaseError as error:
@@ -32,6 +36,12 @@ def _require_whole(connection: Connection, place: str) -> None:
         raise DamagedError(f"database {place}: is damaged: {one_line(told)}; {BRING_BACK}")
 
 
+def _require_schema(connection: Connection, place: str) -> None:
+    wrong = difference(schema_of(connection.exec_driver_sql), expected_schema("head"))
+    if wrong is not None:
+        raise DamagedError(f"database {place}: {wrong}; {BRING_BACK}")
+
+
 def _require_columns(connection: Connection, place: str) -> None:
     there = inspect(connection)
     tables = set(there.get_table_names())
@@ -42,9 +52,6 @@ def _require_columns(connection: Connection, place: str) -> None:
         if missing:
             line = f"database {place}: table {name} has no column {', '.join(sorted(missing))}"
             raise DamagedError(f"{line}; {BRING_BACK}")
-    for name in TABLES_OF_THE_SEARCH if connection.dialect.name == "sqlite" else ():
-        if name not in tables:
-            raise DamagedError(f"database {place}: table {name} is missing; {BRING_BACK}")
 
 
 def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], place: str) -> None:

@@ -9,14 +9,12 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from alembic import command
-from alembic.config import Config
 from pydantic import ValidationError
-from sqlalchemy import Engine, event, text
+from sqlalchemy import URL, Engine, event, text
 from sqlalchemy.exc import DatabaseError, DBAPIError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.sql.dml import UpdateBase
@@ -26,6 +24,7 @@ from sqlalchemy.sql.util import find_tables
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
+from server.store.schema import migrations
 
 BUSY_TIMEOUT_MS = 5000
 """Time to wait for a lock: another process (`daq token`, a backup) may hold the write lock for a moment."""
@@ -41,7 +40,7 @@ __all__ = ["Store", "StoreError", "migrations"]
 class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str | URL) -> None:
         """Raises StoreError."""
         parsed = parse_address(url)
         if parsed.get_backend_name() == "sqlite" and parsed.database:
@@ -151,13 +150,6 @@ class Store:
     def close(self) -> None:
         """Closes all connections."""
         self.engine.dispose()
-
-
-def migrations() -> Config:
-    """Returns Alembic's configuration for the migrations of this package."""
-    config = Config()
-    config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
-    return config
 
 
 def _is_of_a_row(error: Exception) -> bool:

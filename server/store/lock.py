@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sqlalchemy import Connection, Engine, text
+from sqlalchemy import URL, Connection, Engine, text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts import exit_codes
@@ -32,14 +32,14 @@ class InUseError(DaqError):
     exit_code = exit_codes.NOT_REACHED
 
 
-def sqlite_file(url: str) -> Path | None:
+def sqlite_file(url: str | URL) -> Path | None:
     """Returns the file of a SQLite database; None for any other, and for one in memory. Raises StoreError."""
     parsed = parse_address(url)
     return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
 
 
 @contextmanager
-def sole_use(url: str) -> Iterator[None]:
+def sole_use(url: str | URL) -> Iterator[None]:
     """Keeps other services and restores from using this database within the block. Raises InUseError, and StoreError
     if a database server cannot be reached.
 
@@ -76,7 +76,7 @@ def _locked_file(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _locked_server(url: str) -> Iterator[None]:
+def _locked_server(url: str | URL) -> Iterator[None]:
     engine = open_engine(url)
     place = masked(parse_address(url))
     try:

@@ -12,7 +12,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Schedule, ScheduleRequest
 from server.experiments.review import Given, Review, digest_of
-from server.experiments.schedule import Plan, following, is_due
+from server.experiments.schedule import Plan, first, following, is_due, zone_here
 from server.problems import not_found
 from server.store.approvals import approval_of, approve, given_to, require_approvable, void
 from server.store.engine import Store
@@ -27,19 +27,22 @@ class ScheduleStore:
         self._store = store
 
     def create(self, robot: str, request: ScheduleRequest, now: datetime, by: str) -> Schedule:
-        """Creates an active schedule."""
-        starts = request.starts or now
+        """Creates an active schedule. Raises a 422 if it would never run."""
+        zone = None if request.cron is None else request.zone or zone_here()
+        plan = Plan(request.starts or now, request.every or 0.0, request.count, request.cron, zone)
         row = ScheduleRow(
             id=secrets.token_hex(6),
             robot=robot,
             spec=request.spec.model_dump(mode="json"),
-            every=request.every,
-            starts=starts,
+            every=plan.every,
+            cron=plan.cron,
+            zone=plan.zone,
+            starts=plan.starts,
             count=request.count,
             priority=request.priority,
             active=True,
             submitted_runs=0,
-            next=starts,
+            next=first(plan),
             created=now,
             created_by=by,
         )
@@ -133,15 +136,19 @@ class ScheduleStore:
         row = _row(session, robot, identity)
         assert row.next is not None
         row.submitted_runs += 1
-        row.next = following(Plan(row.starts, row.every, row.count), row.submitted_runs, row.next, now)
+        row.next = following(_plan(row), row.submitted_runs, row.next, now)
 
 
 def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
     """Moves a run that is due to the first after `now`; returns False if none is due."""
     if row.next is None or not is_due(row.next, now):
         return False
-    row.next = following(Plan(row.starts, row.every, row.count), row.submitted_runs, row.next, now)
+    row.next = following(_plan(row), row.submitted_runs, row.next, now)
     return True
+
+
+def _plan(row: ScheduleRow) -> Plan:
+    return Plan(row.starts, row.every, row.count, row.cron, row.zone)
 
 
 def _schedule(row: ScheduleRow) -> Schedule:
@@ -150,7 +157,9 @@ def _schedule(row: ScheduleRow) -> Schedule:
         id=row.id,
         robot=row.robot,
         spec=spec,
-        every=row.every,
+        every=None if row.cron is not None else row.every,
+        cron=row.cron,
+        zone=row.zone,
         starts=row.starts,
         count=row.count,
         priority=row.priority,

@@ -108,6 +108,9 @@ class ScheduleRow(Approvable, Table):
     robot: Mapped[str] = mapped_column(String(32), index=True)
     spec: Mapped[dict[str, Any]]
     every: Mapped[float]
+    """0 where `cron` says when."""
+    cron: Mapped[str | None] = mapped_column(String(100))
+    zone: Mapped[str | None] = mapped_column(String(64))
     starts: Mapped[datetime]
     count: Mapped[int | None]
     priority: Mapped[int] = mapped_column(default=0)

@@ -141,7 +141,7 @@ def test_a_port_that_another_program_has_and_a_robot_that_is_pulled_out(tmp_path
         with Link.open(mock.url):
             _port_in_use(service)
         while (answer := service.robot.post("/connect")).status_code == 409:  # by an attempt that began before
-            assert answer.json()["type"] == "docs/service.md#port-in-use"
+            assert answer.json()["type"] == "/api/v1/problems#port-in-use"
         _disconnected(service)
         running, waiting = _left_behind(service)
         mock.close()
@@ -177,7 +177,7 @@ def _terminal_of_the_same_number(url: str) -> Iterator[int]:
 
 def _port_in_use(service: Service) -> None:
     answer = service.robot.post("/connect")
-    assert (answer.status_code, answer.json()["type"]) == (409, "docs/service.md#port-in-use")
+    assert (answer.status_code, answer.json()["type"]) == (409, "/api/v1/problems#port-in-use")
     assert "is in use by another program" in service.status()["connection_problem"]
 
 
@@ -186,7 +186,7 @@ def _disconnected(service: Service) -> None:
     status = service.status()
     assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
     answer = service.robot.get("/gains")
-    assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#not-reached")
+    assert (answer.status_code, answer.json()["type"]) == (503, "/api/v1/problems#not-reached")
     assert service.until_connected()["connection"] == "connected"
     queue = service.robot.get("/queue").json()
     assert (queue["paused"], queue["reason"].partition(" (")[0]) == (True, "the connection to the robot has ended")

@@ -94,10 +94,10 @@ def test_a_full_disk_refuses_new_experiments_and_says_so(api: httpx.Client, monk
     again = api.post("experiments", json={"spec": SHORT}, headers={"Idempotency-Key": "1"})
     assert (again.status_code, again.json()["id"]) == (200, waiting)  # accepted once, accepted for good
     refused = api.post("experiments", json={"spec": SHORT})
-    assert (refused.status_code, refused.json()["type"]) == (507, "docs/service.md#no-room")
+    assert (refused.status_code, refused.json()["type"]) == (507, "/api/v1/problems#no-room")
     assert refused.json()["detail"] == "1 MB are free for traces, 20 MB stay free"
     uploaded = api.post("traces", content="time\n0\n", headers={"Content-Type": "text/csv"})
-    assert (uploaded.status_code, uploaded.json()["type"]) == (507, "docs/service.md#no-room")
+    assert (uploaded.status_code, uploaded.json()["type"]) == (507, "/api/v1/problems#no-room")
     ready = api.get(api.base_url.join("/readyz"))
     assert (ready.status_code, ready.json()["checks"]["traces"]) == (503, "1 MB are free, 20 MB stay free")
     assert [one["id"] for one in api.get("queue/experiments").json()] == [waiting]
@@ -134,7 +134,7 @@ def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(
         (errno.EIO, 503, "disk"),
     ):
         answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
-        assert (answer.status_code, answer.json()["type"]) == (status, f"docs/service.md#{kind}"), answer.text
+        assert (answer.status_code, answer.json()["type"]) == (status, f"/api/v1/problems#{kind}"), answer.text
         assert _listed(api, "traces") == []
         assert list((tmp_path / "traces").glob("*.mcap")) == []
 

@@ -23,19 +23,29 @@ from tests.server.service import running_service
 
 WITHIN = 5.0
 HOURS = {"trajectory": {"kind": "sine", "amplitude": 0.1, "period": 1.0, "cycles": 1000}, "joints": [1], "repeats": 10}
-BEGIN = "import server.ending as e; e.END_WITHIN, e.LAST_RESORT = {}, {}; e.EndInTime(lambda: None).arm(); "
+BEGIN = """import re, threading, server.ending as e
+e.END_WITHIN, e.LAST_RESORT = {}, {}
+end = e.EndInTime(lambda: None, lambda: {})
+end.arm()
+{}"""
+WAIT, HOLD = "threading.Event().wait()", "re.match('(a+)+$', 'a' * 60 + 'b')"
+"""The second is a search that holds the interpreter, and lets no other thread run."""
 
 
 @pytest.mark.parametrize(
-    ("limits", "work", "code"),
+    ("limits", "in_order", "work", "code"),
     [
-        ((0.1, 60.0), "import threading; threading.Event().wait()", FORCED),
-        # a search that holds the interpreter, and lets no other thread run
-        ((0.1, 0.5), "import re; re.match('(a+)+$', 'a' * 60 + 'b')", -signal.SIGALRM),
+        ((0.1, 60.0), False, WAIT, FORCED),
+        ((0.1, 0.5), False, HOLD, -signal.SIGALRM),
+        ((0.1, 60.0), True, WAIT, 0),
+        # a thread that computes on, for which Python waits
+        ((50.0, 60.0), True, f"threading.Thread(target=lambda: {WAIT}).start(); end.finish()", 0),
     ],
 )
-def test_what_nobody_can_interrupt_is_ended(limits: tuple[float, float], work: str, code: int) -> None:
-    command = [sys.executable, "-c", BEGIN.format(*limits) + work]
+def test_what_nobody_can_interrupt_is_ended_and_is_no_fault_if_all_else_was_in_order(
+    limits: tuple[float, float], in_order: bool, work: str, code: int
+) -> None:
+    command = [sys.executable, "-c", BEGIN.format(*limits, in_order, work)]
     assert subprocess.run(command, check=False, capture_output=True, timeout=60).returncode == code
 
 

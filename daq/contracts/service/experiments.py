@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import AwareDatetime, Field, StrictBool, model_validator
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.in_unit import InUnit
 from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Moment, Wire
 from daq.contracts.trace import EventKind
@@ -26,16 +27,27 @@ Reviewer = Literal["operator", "owner"]
 
 Priority = Annotated[int, Field(ge=-100, le=100)]
 """Priority: the higher runs first; among equal ones, the one submitted first."""
-Interval = Annotated[float, Field(ge=10, le=366 * 86400)]
+Interval = Annotated[float, Field(ge=10, le=366 * 86400), InUnit("s")]
 """Time (s) between two runs of a schedule."""
+
+
+Submission = TypeVar("Submission", "ExperimentRequest", "ScheduleRequest")
+PresetName = Annotated[str, Field(min_length=1, max_length=64)]
 
 
 class ExperimentRequest(Wire):
     """An experiment to run, not before the time `at` (with its time zone); None for as soon as possible."""
 
     spec: ExperimentSpec = ExperimentSpec()
+    preset: PresetName | None = None
+    """Name of a preset, in place of `spec`."""
     at: Moment | None = None
     priority: Priority = 0
+
+    @model_validator(mode="after")
+    def _says_what_once(self) -> Self:
+        _require_once(self)
+        return self
 
 
 class ExperimentPreset(Wire):
@@ -109,16 +121,32 @@ class Experiment(Wire):
 
 
 class ScheduleRequest(Wire):
-    """An experiment to run at regular intervals, for studies of wear and drift."""
+    """An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
+    clock (`cron`)."""
 
     spec: ExperimentSpec = ExperimentSpec()
-    every: Interval
+    preset: PresetName | None = None
+    """Name of a preset, in place of `spec`."""
+    every: Interval | None = None
     """Time (s) from one run to the next."""
+    cron: Annotated[str, Field(min_length=9, max_length=100)] | None = None
+    """When to run, as minute, hour, day, month and weekday of a cron table: `0 2 * * *` is daily at 02:00."""
+    zone: Annotated[str, Field(pattern=r"^[A-Za-z0-9_+/-]{1,64}$")] | None = None
+    """Time zone of `cron`, such as Europe/London; None for that of the service's computer."""
     starts: Moment | None = None
-    """Time of the first run; None for now."""
+    """Time of the first run, with `cron` the earliest time of it; None for now."""
     count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     """Number of runs; None for no end."""
     priority: Priority = 0
+
+    @model_validator(mode="after")
+    def _says_when(self) -> Self:
+        if (self.every is None) == (self.cron is None):
+            raise ValueError("says nothing about when, or twice; give `every` or `cron`")
+        if self.zone is not None and self.cron is None:
+            raise ValueError("`zone` is for `cron`; leave it out")
+        _require_once(self)
+        return self
 
 
 class ScheduleChange(Wire):
@@ -134,7 +162,11 @@ class Schedule(Wire):
     id: str
     robot: str
     spec: ExperimentSpec
-    every: float
+    every: float | None
+    """Time (s) from one run to the next; None where `cron` says when."""
+    cron: str | None = None
+    zone: str | None = None
+    """Time zone of `cron`."""
     starts: AwareDatetime
     count: int | None
     priority: int
@@ -181,6 +213,11 @@ class MotionMark(Wire):
     time: float
     kind: EventKind
     message: str
+
+
+def _require_once(request: ExperimentRequest | ScheduleRequest) -> None:
+    if request.preset is not None and "spec" in request.model_fields_set:
+        raise ValueError("says twice what to run; give `spec` or `preset`")
 
 
 MotionPreview.model_rebuild()

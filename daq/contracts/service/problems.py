@@ -20,7 +20,7 @@ class ProblemDetails(BaseModel):
     model_config = ConfigDict(extra="allow")
 
     type: str
-    """Kind of problem: the last part of an address in docs/service.md."""
+    """Kind of problem: its place on a page of the service."""
     title: str
     status: int
     detail: str

@@ -37,7 +37,7 @@ class StandIn:
 def problem(status: int, kind: str, detail: str = "no", advice: str = "", **headers: str) -> httpx.Response:
     """As the service makes it."""
     data: dict[str, Any] = {
-        "type": f"docs/service.md#{kind}",
+        "type": f"/api/v1/problems#{kind}",
         "title": "No",
         "status": status,
         "detail": detail,

@@ -51,6 +51,12 @@ def test_a_request_is_tried_again_a_limited_number_of_times() -> None:
     assert len(network.asked) == 1 + len(PAUSES)
 
 
+def test_a_name_that_somebody_typed_is_no_syntax_of_an_address() -> None:
+    network = StandIn([httpx.Response(200, json=ME)])
+    network.connection().get(Me, "robots/ma2000/traces/why?wait=9#50%")
+    assert network.asked[0].url.raw_path == b"/api/v1/robots/ma2000/traces/why%3Fwait%3D9%2350%25"
+
+
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE"])
 def test_what_changes_something_is_sent_once(method: str) -> None:
     for answer in (BROKEN, problem(429, "too-many"), problem(503, "database")):

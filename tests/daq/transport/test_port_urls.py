@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.transport import MockPort, SerialPort, TcpPort, TransportError, parse_port_url
+from daq.transport.url import serial_url
 
 
 @pytest.mark.parametrize(
@@ -34,6 +35,11 @@ from daq.transport import MockPort, SerialPort, TcpPort, TransportError, parse_p
 )
 def test_a_url_names_a_port(url: str, port: object) -> None:
     assert parse_port_url(url) == port
+
+
+@pytest.mark.parametrize("device", ["/dev/ttyUSB0", "/tmp/why?baud=9600", "/tmp/a%41b", "/tmp/#1 arm"])
+def test_a_devices_name_is_no_syntax(device: str) -> None:
+    assert parse_port_url(serial_url(device)) == SerialPort(device, 115200)
 
 
 @pytest.mark.parametrize(

@@ -75,11 +75,23 @@ def test_a_name_that_somebody_else_lets_point_here_is_not_known(
         ({"host": "127.0.0.1:8300", "sec-fetch-site": "cross-site"}, True),
         ({"host": "127.0.0.1:8300", "sec-fetch-site": "same-site"}, True),
         ({"host": "127.0.0.1:8300", "sec-fetch-site": "none"}, False),
+        # An origin leaves out the usual port of its scheme, and a proxy may not.
+        ({"host": "arm.lab:443", "origin": "https://arm.lab"}, False),
+        ({"host": "ARM.lab", "origin": "https://arm.lab:443"}, False),
+        ({"host": "arm.lab:443", "origin": "http://arm.lab"}, True),
+        ({"host": "arm.lab:8443", "origin": "https://arm.lab"}, True),
+        # A proxy has put its own name for the service into Host.
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab"}, False),
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab:9999"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "https://attacker.example"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab", "sec-fetch-site": "cross-site"}, True),
+        ({"host": "arm.lab:8300", "origin": "https://arm.lab"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "ftp://arm.lab:21"}, True),
     ],
 )
 def test_pages_of_another_origin_change_nothing(headers: dict[str, str], elsewhere: bool) -> None:
-    assert is_from_elsewhere(headers, changes_something=True) is elsewhere
-    assert not is_from_elsewhere(headers, changes_something=False)
+    assert is_from_elsewhere(headers, ("arm.lab",), changes_something=True) is elsewhere
+    assert not is_from_elsewhere(headers, ("arm.lab",), changes_something=False)
 
 
 @pytest.mark.parametrize(
@@ -95,6 +107,9 @@ def test_pages_of_another_origin_change_nothing(headers: dict[str, str], elsewhe
         ({"host": "127.0.0.1:8300", "x-forwarded-proto": "https"}, False),
         ({"host": "localhost:8300", "forwarded": "for=10.0.0.9"}, False),
         ({"host": "localhost:8300", "via": "1.1 proxy"}, False),
+        ({"host": "127.0.0.1:8300", "origin": "http://localhost:8300"}, True),
+        ({"host": "127.0.0.1:8300", "origin": "https://arm.lab"}, False),
+        ({"host": "127.0.0.1:8300", "origin": "null"}, False),
     ],
 )
 def test_what_a_proxy_hands_on_is_no_user_of_this_computer(headers: dict[str, str], local: bool) -> None:
@@ -305,7 +320,7 @@ def test_every_answer_tells_browsers_what_they_may_not_do(service: Service) -> N
 def test_a_page_of_another_origin_cannot_stop_or_start_anything(service: Service) -> None:
     for path in ("/stop", "/experiments", "/queue/pause"):
         answer = service.robot.post(path, json={}, headers={"Origin": "http://attacker.example"})
-        assert (answer.status_code, answer.json()["type"]) == (403, "docs/service.md#other-origin")
+        assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#other-origin")
     assert service.robot.get("/queue").json()["queued"] == 0
 
 
@@ -317,12 +332,12 @@ def test_a_page_of_another_origin_cannot_watch(service: Service) -> None:
 
 def test_a_name_that_points_here_is_not_enough(service: Service) -> None:
     answer = service.client.get("/robots", headers={"Host": "attacker.example"})
-    assert (answer.status_code, answer.json()["type"]) == (403, "docs/service.md#unknown-name")
+    assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#unknown-name")
 
 
 def test_a_body_that_is_too_large_is_not_read(service: Service) -> None:
     answer = service.robot.post("/experiments", content=b"x" * (17 << 20), headers={"Content-Type": "application/json"})
-    assert (answer.status_code, answer.json()["type"]) == (413, "docs/service.md#too-large")
+    assert (answer.status_code, answer.json()["type"]) == (413, "/api/v1/problems#too-large")
 
 
 @pytest.fixture
@@ -364,7 +379,7 @@ def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path, daq: Comman
             me = nobody.get("/me", headers=anna).json()
             assert (me["name"], me["role"], me["owner_of"]) == ("anna", "viewer", [])
             refused = nobody.post("/robots/ma2000/experiments", json={}, headers=anna)
-            assert (refused.status_code, refused.json()["type"]) == (403, "docs/service.md#operator-needed")
+            assert (refused.status_code, refused.json()["type"]) == (403, "/api/v1/problems#operator-needed")
             bert = {"Authorization": f"Bearer {operator}"}
             assert nobody.post("/robots/ma2000/connect", headers=bert).status_code == 200
             assert nobody.post("/robots/ma2000/stop", headers=anna).json()["confirmed"] is True

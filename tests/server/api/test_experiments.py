@@ -62,11 +62,38 @@ def test_a_running_experiment_is_cancelled_by_a_stop_and_the_queue_waits_for_a_p
     assert service.end_of(following["id"])["state"] == "done"
 
 
+def test_a_preset_may_be_named_and_actions_need_no_body(service: Service) -> None:
+    assert service.robot.post("/queue/pause").status_code == 200
+    known = {one["name"]: one["spec"] for one in service.robot.get("/presets").json()}
+    made = service.robot.post("/experiments", json={"preset": "held-out"})
+    assert (made.status_code, made.json()["spec"]) == (201, known["held-out"])
+    assert service.robot.post("/experiments/preview", json={"preset": "ramp"}).json()["duration"] > 0
+    nightly = service.robot.post("/schedules", json={"preset": "ramp", "cron": "0 2 * * *"}).json()
+    assert (nightly["spec"], nightly["every"]) == (known["ramp"], None)
+    assert service.robot.delete(f"/schedules/{nightly['id']}").status_code == 204
+    for body in ({"preset": "rmap"}, {"preset": "ramp", "spec": SHORT}):
+        assert service.robot.post("/experiments", json=body).status_code == 422
+    assert service.robot.post(f"/experiments/{made.json()['id']}/cancel").status_code == 200
+    assert service.robot.post("/reset").status_code == 200
+    assert service.robot.post("/queue/resume").status_code == 200
+    taken = service.robot.post("/control")
+    assert taken.status_code == 201
+    assert service.robot.delete("/control", headers={"Control-Lease": taken.json()["lease"]}).status_code == 204
+
+
+def test_a_bound_is_told_with_its_unit(service: Service) -> None:
+    for motion, unit in ({"amplitude": 10}, "rad"), ({"duration": 0}, "s"), ({"duration": 1e4}, "s"):
+        refused = service.robot.post("/experiments", json={"spec": {"trajectory": {"kind": "ramp"} | motion}}).json()
+        name = next(iter(motion))
+        assert [one["field"] for one in refused["fields"]][:1] == [f"spec.trajectory.ramp.{name}"]
+        assert f" {unit} (got " in refused["fields"][0]["message"]
+
+
 def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Service) -> None:
     answer = service.robot.post("/experiments", json={"spec": {"trajectory": {"kind": "ramp", "amplitude": 3.4}}})
     assert answer.status_code == 422
     assert answer.headers["Content-Type"] == "application/problem+json"
-    assert answer.json()["type"] == "docs/service.md#beyond-limits"
+    assert answer.json()["type"] == "/api/v1/problems#beyond-limits"
     assert service.robot.get("/queue").json()["queued"] == 0
 
 

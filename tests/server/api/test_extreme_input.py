@@ -49,7 +49,7 @@ def test_a_cursor_that_no_list_gave_out_is_refused(service: Service, path: str, 
 def test_a_body_nested_beyond_measure_is_refused(service: Service, body: bytes) -> None:
     headers: dict[str, Any] = {"Content-Type": "application/json"}
     model = service.robot.post("/models", params={"name": "x"}, content=body, headers=headers)
-    assert (model.status_code, model.json()["type"]) == (422, "docs/service.md#not-a-model"), model.text
+    assert (model.status_code, model.json()["type"]) == (422, "/api/v1/problems#not-a-model"), model.text
     experiment = service.robot.post("/experiments", content=body, headers=headers)
     assert experiment.status_code in (400, 422), experiment.text
 

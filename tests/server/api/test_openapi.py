@@ -14,6 +14,7 @@ from typing import Any
 import httpx
 import pytest
 
+from server.api import description
 from server.app import bare_app
 from server.clock import SystemClock
 from tests.server.inside import service_inside
@@ -103,6 +104,21 @@ def test_no_request_waits_while_the_api_description_is_built() -> None:
 
     assert [answer.json() for answer in asyncio.run(three())] == [{"openapi": "3.1.0"}] * 3
     assert times == 1
+
+
+def test_the_description_is_made_before_anybody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(description, "AFTER", 0.0)
+    app, made = bare_app(None), threading.Event()
+    described = description.Described(app)
+
+    def slow() -> dict[str, Any]:
+        made.set()
+        return {}
+
+    app.openapi = slow  # type: ignore[method-assign]
+    described.begin_soon()
+    assert made.wait(60)
+    described.close()
 
 
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"

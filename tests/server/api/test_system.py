@@ -101,7 +101,7 @@ def test_a_folder_of_traces_that_is_away_is_told_and_takes_no_experiment(api: ht
     system = api.base_url.join("/api/v1/system")
     answer = api.post("experiments", json={"spec": {}})
     assert answer.status_code == 503, answer.text
-    assert answer.json()["type"] == "docs/service.md#traces-away"
+    assert answer.json()["type"] == "/api/v1/problems#traces-away"
     assert str(folder) in answer.json()["detail"]
     found = api.get(system).json()  # the page learns from it where it can stop
     assert found["storage"]["traces_free"] == 0
@@ -126,7 +126,7 @@ def test_a_calibration_is_checked_and_queued_as_any_experiment(
     assert (again.status_code, again.json()["id"]) == (200, first.json()["id"])
     full = shutil._ntuple_diskusage(10**9, 10**9 - 10**6, 10**6)  # type: ignore[attr-defined]
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: full)
-    assert asked().json()["type"] == "docs/service.md#no-room"
+    assert asked().json()["type"] == "/api/v1/problems#no-room"
     assert [one["id"] for one in api.get("queue/experiments").json()] == [first.json()["id"]]
 
 

@@ -111,7 +111,7 @@ def test_an_experiment_of_hours_is_refused_without_being_planned(service: Servic
 def test_what_does_not_exist_is_not_found(service: Service, method: str, path: str) -> None:
     body = {"priority": 1} if method == "PATCH" else None
     answer = service.robot.request(method, path, json=body)
-    assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found"), answer.text
+    assert (answer.status_code, answer.json()["type"]) == (404, "/api/v1/problems#not-found"), answer.text
 
 
 def test_a_robot_that_does_not_exist_is_not_found(service: Service) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
+import sqlite3
 import threading
 import zipfile
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -43,7 +46,7 @@ def quietly(_fraction: float, _text: str) -> None:
 
 def places_in(folder: Path, robot: str = "ma2000") -> Places:
     database = folder / "service" / "service.sqlite"
-    return Places(f"sqlite:///{database}", database, {robot: folder / "traces"}, folder / "service")
+    return Places(database, {robot: folder / "traces"}, folder / "service")
 
 
 def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") -> None:
@@ -314,6 +317,77 @@ def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_
     assert everything(tmp_path) == before
 
 
+def _repacked(archive: Path, *statements: str, **files: bytes) -> None:
+    """Writes a whole backup anew, with another database and other requests of jobs."""
+    with zipfile.ZipFile(archive) as pack:
+        there = {name: pack.read(name) for name in pack.namelist()}
+    database = archive.with_suffix(".sqlite")
+    database.write_bytes(there[DATABASE])
+    with closing(sqlite3.connect(database)) as connection, connection:
+        connection.executescript(";".join(statements))
+    there |= {DATABASE: database.read_bytes(), **files}
+    database.unlink()
+    manifest = json.loads(there[MANIFEST])
+    for entry in manifest["files"]:
+        data = there[entry["name"]]
+        entry |= {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    there[MANIFEST] = json.dumps(manifest).encode()
+    with zipfile.ZipFile(archive, "w") as pack:
+        for name, data in there.items():
+            pack.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    ("statements", "why"),
+    [
+        (["DROP TABLE audit"], "table audit is missing"),
+        (["ALTER TABLE audit DROP COLUMN count"], "table audit has no column count"),
+        (
+            [
+                "CREATE TABLE other AS SELECT * FROM audit",
+                "DROP TABLE audit",
+                "CREATE VIEW audit AS SELECT * FROM other",
+            ],
+            "table audit is missing",
+        ),
+        (["DROP TRIGGER audit_update"], "trigger audit_update is missing"),
+        (
+            ["DROP TRIGGER audit_update", "CREATE TRIGGER audit_update BEFORE UPDATE ON audit BEGIN SELECT 1; END"],
+            "trigger audit_update is not as this program makes it",
+        ),
+    ],
+)
+def test_a_backup_whose_tables_are_not_this_programs_is_refused_and_the_log_too(
+    archive: Path, tmp_path: Path, daq: CommandLine, statements: list[str], why: str
+) -> None:
+    _repacked(archive, *statements)
+    places = places_in(tmp_path / "there")
+    with pytest.raises(BackupError, match=why):
+        restore(archive, places, NOW, quietly)
+    assert everything(tmp_path / "there") == {}
+    with zipfile.ZipFile(archive) as pack:
+        places.database.parent.mkdir(parents=True, exist_ok=True)
+        places.database.write_bytes(pack.read(DATABASE))
+    (tmp_path / "arm.toml").write_text(f'[server]\nfolder = "{places.database.parent}"\n')
+    daq("--config", str(tmp_path / "arm.toml"), "audit", "verify").complains(2, why, "daq restore")
+
+
+def test_what_a_backups_database_has_beside_this_programs_tables_is_not_brought_back(
+    archive: Path, tmp_path: Path
+) -> None:
+    spy = "CREATE TRIGGER spy AFTER UPDATE ON queues BEGIN DELETE FROM experiments; END"
+    view, table = "CREATE VIEW seen AS SELECT * FROM tokens", 'CREATE TABLE "of ""others""" (x)'
+    _repacked(archive, spy, table, view, **{"jobs/0123456789ab/request.json": b"[]"})
+    there = places_in(tmp_path / "there")
+    done = restore(archive, there, NOW, quietly)
+    assert done.removed == ("trigger spy", "view seen", 'table of "others"')
+    store = Store(there.url)
+    store.require_sound()
+    assert ExperimentStore(store).count_waiting("ma2000") == 1, "the trigger did not act while the queue was paused"
+    store.close()
+    assert (there.service / "jobs" / "0123456789ab" / "request.json").read_text() == "[]", "no worker accepts it"
+
+
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), cut=st.booleans())
 def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
@@ -424,7 +498,7 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     def places_of_two(folder: Path) -> Places:
         database = folder / "service" / "service.sqlite"
         traces = {name: folder / "traces" / name for name in ("left", "right")}
-        return Places(f"sqlite:///{database}", database, traces, folder / "service")
+        return Places(database, traces, folder / "service")
 
     here, there = places_of_two(tmp_path / "here"), places_of_two(tmp_path / "there")
     store = Store(here.url)

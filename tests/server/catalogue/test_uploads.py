@@ -40,7 +40,7 @@ def test_a_hostile_file_is_refused_in_one_line(service: Service, content: bytes,
     answer = service.robot.post("/traces", content=content, headers=kind)
     assert answer.status_code in (413, 422), answer.text
     problem = answer.json()
-    assert problem["type"] in ("docs/service.md#not-a-trace", "docs/service.md#too-large")
+    assert problem["type"] in ("/api/v1/problems#not-a-trace", "/api/v1/problems#too-large")
     assert problem["detail"].startswith("upload: ")
     assert len(problem["detail"]) < 400
     assert "\n" not in problem["detail"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from typing import Any, get_args
+from zoneinfo import ZoneInfo
 
 import pytest
 from hypothesis import given, settings
@@ -18,9 +19,10 @@ from daq.contracts.service.robot import RobotIdentity
 from daq.trajectories import plan, start_angles
 from server.experiments.length import LONGEST, least_length, points_of
 from server.experiments.order import Waiting, next_due
-from server.experiments.schedule import Plan, following, is_due
+from server.experiments.schedule import Plan, first, following, is_due, zone_here
 from server.experiments.states import Event, IllegalEventError, advance, after_restart
 from server.owner.messages import ArmReport
+from server.problems import ProblemError
 from server.queue.readiness import Circumstances, what_is_missing
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -228,3 +230,55 @@ def test_every_kind_of_motion_is_as_long_as_it_says(trajectory: dict[str, Any], 
 def test_no_kind_of_motion_is_left_out() -> None:
     kinds = {one.model_fields["kind"].default for one in get_args(get_args(Trajectory)[0])}
     assert {trajectory["kind"] for trajectory, _, _ in OF_EVERY_KIND} == kinds
+
+
+@pytest.mark.parametrize("cron", ["0 2 * * *", "30 2 * * *"])
+@pytest.mark.parametrize(
+    ("begin", "hours"),
+    [
+        # 02:00 to 03:00 is left out on 29 March 2026 in Berlin; it comes twice on 25 October.
+        (datetime(2026, 3, 27, 12, tzinfo=UTC), [2, 3, 2]),
+        (datetime(2026, 10, 23, 12, tzinfo=UTC), [2, 2, 2]),
+    ],
+)
+def test_a_nightly_run_comes_once_a_night_also_when_the_clocks_change(
+    cron: str, begin: datetime, hours: list[int]
+) -> None:
+    berlin = ZoneInfo("Europe/Berlin")
+    plan = Plan(begin, 0.0, None, cron, "Europe/Berlin")
+    runs = [first(plan)]
+    while len(runs) < 3 and runs[-1] is not None:
+        runs.append(following(plan, len(runs), runs[-1], runs[-1] + timedelta(minutes=1)))
+    local = [run.astimezone(berlin) for run in runs if run is not None]
+    assert [run.hour for run in local] == hours
+    assert [run.date() for run in local] == [(begin + timedelta(days=day)).date() for day in (1, 2, 3)]
+
+
+def test_a_cron_run_at_the_very_start_counts_and_missed_ones_are_left_out() -> None:
+    plan = Plan(datetime(2026, 1, 1, 2, tzinfo=UTC), 0.0, 2, "0 2 * * *", "UTC")
+    begun = first(plan)
+    assert begun == plan.starts
+    assert following(plan, 1, begun, datetime(2026, 1, 5, 2, 30, tzinfo=UTC)) == datetime(2026, 1, 6, 2, tzinfo=UTC)
+    assert following(plan, 2, begun, begun) is None, "its number of runs is reached"
+    assert following(plan, 1, begun, begun - timedelta(days=9)) == begun + timedelta(days=1), "the clock is set back"
+
+
+@pytest.mark.parametrize(
+    ("cron", "zone", "field"),
+    [
+        ("0 25 * * *", "UTC", "cron"),
+        ("* * * * * *", "UTC", "cron"),
+        ("nightly at two", "UTC", "cron"),
+        ("0 2 30 2 *", "UTC", "cron"),
+        ("0 2 * * *", "Europe/Nowhere", "zone"),
+        ("0 2 * * *", "../../etc/passwd", "zone"),
+    ],
+)
+def test_a_cron_expression_that_never_comes_is_refused_in_one_line(cron: str, zone: str, field: str) -> None:
+    with pytest.raises(ProblemError, match=f"^{field}: ") as refused:
+        first(Plan(START, 0.0, None, cron, zone))
+    assert "\n" not in refused.value.detail
+
+
+def test_the_time_zone_of_this_computer_has_a_name() -> None:
+    assert ZoneInfo(zone_here()).key == zone_here()

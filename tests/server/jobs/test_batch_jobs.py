@@ -65,7 +65,7 @@ def test_a_filter_finds_the_traces_when_the_batch_is_submitted(sound_service: Se
     assert set(traces) <= set(job["request"]["traces"])
     assert len(table(sound_service, job["id"])) == len(job["request"]["traces"])
     answer = sound_service.robot.delete(f"/traces/{traces[0]}")
-    assert (answer.status_code, answer.json()["type"]) == (409, "docs/service.md#trace-in-use")
+    assert (answer.status_code, answer.json()["type"]) == (409, "/api/v1/problems#trace-in-use")
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_batch_that_is_not_possible_is_refused(
     sound_service: Service, request_: dict[str, Any], status: int, kind: str
 ) -> None:
     answer = sound_service.robot.post("/jobs", json=SIMULATE | request_)
-    assert (answer.status_code, answer.json()["type"]) == (status, f"docs/service.md#{kind}"), answer.text
+    assert (answer.status_code, answer.json()["type"]) == (status, f"/api/v1/problems#{kind}"), answer.text
 
 
 def test_what_is_no_batch_of_the_same_study_is_not_continued(sound_service: Service, traces: list[str]) -> None:

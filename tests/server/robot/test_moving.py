@@ -26,19 +26,19 @@ def test_motion_needs_the_control(service: Service) -> None:
         ("/teaching/lead", {}),
     ):
         answer = service.robot.post(path, json=body)
-        assert (answer.status_code, answer.json()["type"]) == (409, "docs/service.md#control-needed"), answer.text
+        assert (answer.status_code, answer.json()["type"]) == (409, "/api/v1/problems#control-needed"), answer.text
     assert service.robot.put("/gripper", json={"closed": True}).status_code == 409
 
 
 def test_one_client_has_the_control_at_a_time_and_gives_it_back(service: Service) -> None:
     mine = _lease(service)
     other = service.robot.post("/control", json={})
-    assert (other.status_code, other.json()["type"]) == (409, "docs/service.md#control-held")
+    assert (other.status_code, other.json()["type"]) == (409, "/api/v1/problems#control-held")
     assert service.robot.get("/control").json()["holder"] == "client"
     assert service.robot.put("/control", headers=mine).status_code == 200
     assert service.robot.delete("/control", headers=mine).status_code == 204
     assert service.robot.get("/control").json()["holder"] == "nobody"
-    assert service.robot.put("/control", headers=mine).json()["type"] == "docs/service.md#control-lost"
+    assert service.robot.put("/control", headers=mine).json()["type"] == "/api/v1/problems#control-lost"
 
 
 def test_a_step_moves_the_arm_by_what_was_asked(service: Service) -> None:

@@ -35,7 +35,7 @@ def test_a_stop_while_the_link_is_lost_is_not_said_to_be_confirmed_and_is_there_
             service.until_arm("stopped")
             assert mock.control("state")["frozen"] is True
             refused = service.robot.post("/queue/resume", json={})
-            assert refused.json()["type"] == "docs/service.md#arm-stopped"
+            assert refused.json()["type"] == "/api/v1/problems#arm-stopped"
             assert reset(service.robot).status_code == 200
             assert service.robot.post("/queue/resume", json={}).status_code == 200
             assert mock.control("state")["frozen"] is False

@@ -189,7 +189,7 @@ def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
         assert answer.status_code == status, (method, path)
         assert answer.headers["Content-Type"] == "application/problem+json"
     answer = httpx.post(f"{base.replace('ma2000', 'other')}/stop", timeout=30)
-    assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found")
+    assert (answer.status_code, answer.json()["type"]) == (404, "/api/v1/problems#not-found")
 
 
 def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: Path) -> None:
@@ -229,10 +229,10 @@ def test_the_services_own_page_may_ask_the_listener_and_no_other_page(service: S
     assert asked.headers["Access-Control-Allow-Headers"] == "authorization"
     for headers in ({"Origin": "http://attacker.example"}, {"Sec-Fetch-Site": "cross-site"}, {"Origin": "null"}):
         answer = httpx.post(f"{base}/stop", headers=headers, timeout=30)
-        assert (answer.status_code, answer.json()["type"]) == (403, "docs/service.md#other-origin")
+        assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#other-origin")
         assert "Access-Control-Allow-Origin" not in answer.headers
     named = httpx.post(f"{base}/stop", headers={"Host": "attacker.example"}, timeout=30)
-    assert (named.status_code, named.json()["type"]) == (403, "docs/service.md#unknown-name")
+    assert (named.status_code, named.json()["type"]) == (403, "/api/v1/problems#unknown-name")
 
 
 def test_the_page_is_told_that_it_may_connect_there(service: Service) -> None:
@@ -408,7 +408,7 @@ def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_w
         assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]
         os.kill(door.pid, signal.SIGKILL)
         unread = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
-        assert (unread.status_code, unread.json()["type"]) == (503, "docs/service.md#database")
+        assert (unread.status_code, unread.json()["type"]) == (503, "/api/v1/problems#database")
         door.set_tokens({digest_of("daq_x"): Caller("anna", "viewer", digest_of("daq_x"))})
         os.kill(door.pid, signal.SIGKILL)
         known = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)

@@ -121,7 +121,7 @@ def test_a_table_that_breaks_while_it_runs_is_named_and_everything_else_goes_on(
         for table, (damage, address) in WHILE_IT_RUNS.items():
             damage(tmp_path / "service" / FILE)
             answer = api.get(address, params={"limit": 7})  # a part that nobody remembers
-            assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#database"), answer.text
+            assert (answer.status_code, answer.json()["type"]) == (503, "/api/v1/problems#database"), answer.text
             assert f"table {table}" in answer.json()["detail"]
             assert "daq restore" in answer.json()["advice"]
             assert "\n" not in answer.json()["detail"]

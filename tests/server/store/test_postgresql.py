@@ -126,7 +126,7 @@ def test_the_service_keeps_everything_in_it_and_refuses_what_it_cannot_hold(
         assert api.post("/queue/pause", json={}).status_code == 200
         made = api.post("/experiments", json={}).json()
         refused = api.patch(f"/traces/{1:012x}", json={"notes": "nul \0 here"})
-        assert (refused.status_code, refused.json()["type"]) == (422, "docs/service.md#not-valid"), refused.text
+        assert (refused.status_code, refused.json()["type"]) == (422, "/api/v1/problems#not-valid"), refused.text
         assert api.get(f"/experiments/{made['id']}").json()["state"] == "queued"
         assert [one["id"] for one in api.get("/queue/experiments").json()] == [made["id"]]
     assert not list(tmp_path.rglob("*.sqlite"))

@@ -12,19 +12,25 @@ import pytest
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import event, inspect, select, text, update
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
+from daq.config.service import ServiceSettings
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentRequest
 from daq.contracts.service.traces import CatalogueEntry, TraceChange
+from server.backup.database import head_of_audit, revision_of
 from server.experiments.states import Event
 from server.problems import ProblemError
+from server.stopping.tokens import reader_of
+from server.store.address import address_of
 from server.store.engine import Store, StoreError, migrations
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
+from server.store.lock import sqlite_file
 from server.store.pages import Cursor
 from server.store.remembered import Remembered
 from server.store.tables import TABLES_OF_THE_SEARCH, ArchivedRow, Table, TraceTagRow
@@ -40,6 +46,20 @@ def test_nobody_else_may_read_the_database(sqlite_store: Store, tmp_path: Path) 
         files = [path for path in tmp_path.iterdir() if path.name.startswith("service.sqlite")]
         assert files
         assert not [path.name for path in files if path.stat().st_mode & 0o077]
+
+
+@pytest.mark.parametrize("name", ["why?", "a%41b", "50%", "a#b", "x?mode=memory&y", "ü :@"])
+def test_a_folders_name_is_no_syntax_of_an_address(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / name / "service"
+    address = address_of(ServiceSettings(folder=folder))
+    assert sqlite_file(address) == sqlite_file(address.render_as_string()) == folder / "service.sqlite"
+    store = Store(address)
+    store.migrate()
+    store.close()
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert revision_of(folder / "service.sqlite") == ScriptDirectory.from_config(migrations()).get_current_head()
+    assert reader_of(str(address), folder / "service.sqlite")() == {}
+    assert head_of_audit(folder / "service.sqlite") == "nothing"
 
 
 def test_tables_are_those_of_the_migrations(store: Store) -> None:

@@ -11,7 +11,7 @@ import { METHODS_TO_TRY, withToken } from './settings';
 theme.start((shown) => document.documentElement.classList.toggle('dark-mode', shown === 'dark'));
 SwaggerUI({
   dom_id: '#reference',
-  url: '/api/v1/openapi.json',
+  url: 'api/v1/openapi.json',
   // Closed tags: a hundred operations drawn at once hold a slow computer up for seconds.
   docExpansion: 'none',
   defaultModelsExpandDepth: 0,

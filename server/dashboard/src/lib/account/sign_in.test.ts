@@ -1,8 +1,9 @@
 import { describe, expect, it, vi } from 'vitest';
 
 vi.stubGlobal('sessionStorage', { getItem: () => null });
-vi.stubGlobal('location', { origin: 'http://127.0.0.1:8300' });
+vi.stubGlobal('location', { origin: 'https://lab', pathname: '/arm/' });
 const { problemOfSignIn, roleText, signInAddress } = await import('./sign_in');
+const { root } = await import('../api');
 
 describe('signing in', () => {
   it('says why it has failed, also for a kind that it does not know', () => {
@@ -16,7 +17,7 @@ describe('signing in', () => {
 
   it('comes back to the robot that was shown', () => {
     expect(signInAddress('/api/v1/login/start', '')).toBe('/api/v1/login/start');
-    expect(signInAddress('/api/v1/login/start', 'left')).toBe('/api/v1/login/start?robot=left');
+    expect(signInAddress('/api/v1/login/start', 'left')).toBe(`${root}/api/v1/login/start?robot=left`);
   });
 
   it('says what somebody may do at this arm', () => {

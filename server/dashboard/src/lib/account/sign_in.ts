@@ -1,6 +1,6 @@
 /** Signing in and out: which ways there are, what a refused sign-in means, and what a role may do. */
 
-import { api, ask, asProblem } from '../api';
+import { api, ask, asProblem, root } from '../api';
 import { currentToken, keepToken } from '../api/token';
 import type { LoginWays, Me } from '../api/types';
 
@@ -26,7 +26,7 @@ export function problemOfSignIn(query: string): string {
 
 /** The address at which signing in begins; afterwards the page shows this robot. */
 export function signInAddress(start: string, robot: string): string {
-  return robot === '' ? start : `${start}?robot=${encodeURIComponent(robot)}`;
+  return robot === '' ? root + start : `${root}${start}?robot=${encodeURIComponent(robot)}`;
 }
 
 /** What a role may do, in a few words. */
@@ -51,6 +51,6 @@ export async function leave(): Promise<string> {
     }
   }
   keepToken(null);
-  location.replace(provider ?? '/');
+  location.replace(provider ?? `${root}/`);
   return '';
 }

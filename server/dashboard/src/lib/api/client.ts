@@ -12,7 +12,9 @@ import type { paths } from './schema';
 import { currentToken } from './token';
 import type { Health, Told } from './types';
 
-export const api = createClient<paths>({ baseUrl: location.origin });
+/** The address of the service, at whose root this page is: a proxy may serve both below a path of its own. */
+export const root = location.origin + location.pathname.replace(/\/[^/]*$/, '');
+export const api = createClient<paths>({ baseUrl: root });
 
 api.use({
   onRequest({ request }) {
@@ -48,7 +50,7 @@ export function showRobot(name: string, all: readonly string[] = [name]): void {
 
 /** The address of this page for another robot: the page is loaded anew, so that nothing of this one is left in it. */
 export function pageOf(name: string, page: string): string {
-  return `/?robot=${encodeURIComponent(name)}#/${page}`;
+  return `?robot=${encodeURIComponent(name)}#/${page}`;
 }
 
 /** A key under which a request is carried out once. Not `randomUUID`: that one exists only on pages that came over TLS or
@@ -81,7 +83,7 @@ export async function ask<T>(request: Promise<Answer<T>>): Promise<Told<T>> {
 
 /** How the service is. One that is not ready says so with a 503, whose body is what is wanted. Throws a Problem. */
 export async function readiness(): Promise<Health> {
-  const answer = await fetch('/readyz', { headers: authorization() }).catch(() => {
+  const answer = await fetch(`${root}/readyz`, { headers: authorization() }).catch(() => {
     throw notAnswered();
   });
   const body: unknown = await answer.json().catch(() => null);
@@ -96,7 +98,7 @@ function authorization(): HeadersInit {
 
 /** The address of a file to download: a picture, a trace. With a token the file is fetched first: see `download`. */
 export function addressOf(path: string): string {
-  return `/api/v1/robots/${encodeURIComponent(robot)}${path}`;
+  return `${root}/api/v1/robots/${encodeURIComponent(robot)}${path}`;
 }
 
 /** Saves a file of the service under a name of its own. Throws a Problem. */

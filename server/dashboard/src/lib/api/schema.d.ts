@@ -845,7 +845,8 @@ export interface paths {
         put?: never;
         /**
          * Create Schedule
-         * @description Creates a schedule that submits an experiment periodically. It is checked now and before every run.
+         * @description Creates a schedule that submits an experiment at even intervals or by the wall clock. It is checked now and
+         *     before every run.
          */
         post: operations["create_schedule"];
         delete?: never;
@@ -2779,6 +2780,8 @@ export interface components {
              *     }
              */
             spec?: components["schemas"]["ExperimentSpec"];
+            /** Preset */
+            preset?: string | null;
             /** At */
             at?: string | null;
             /**
@@ -5704,7 +5707,11 @@ export interface components {
             robot: string;
             spec: components["schemas"]["ExperimentSpec"];
             /** Every */
-            every: number;
+            every: number | null;
+            /** Cron */
+            cron?: string | null;
+            /** Zone */
+            zone?: string | null;
             /**
              * Starts
              * Format: date-time
@@ -5746,7 +5753,8 @@ export interface components {
         };
         /**
          * ScheduleRequest
-         * @description An experiment to run at regular intervals, for studies of wear and drift.
+         * @description An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
+         *     clock (`cron`).
          */
         ScheduleRequest: {
             /**
@@ -5770,8 +5778,14 @@ export interface components {
              *     }
              */
             spec?: components["schemas"]["ExperimentSpec"];
+            /** Preset */
+            preset?: string | null;
             /** Every */
-            every: number;
+            every?: number | null;
+            /** Cron */
+            cron?: string | null;
+            /** Zone */
+            zone?: string | null;
             /** Starts */
             starts?: string | null;
             /** Count */
@@ -6961,7 +6975,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["ResetRequest"];
             };
@@ -7956,7 +7970,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["QueueResume"];
             };
@@ -8236,7 +8250,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["ControlRequest"];
             };
@@ -8552,7 +8566,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
                 "application/json": components["schemas"]["ArchiveOrder"];
             };

@@ -5,7 +5,7 @@
  * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
  */
 
-import { here, isFleet } from '../api/client';
+import { here, isFleet, root } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
 import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
 import type {
@@ -210,7 +210,7 @@ class Live {
           (error: unknown) => this.notAdmitted(error),
         );
       },
-      open: (ticket) => new WebSocket(`${location.origin.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
+      open: (ticket) => new WebSocket(`${root.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
       wanted: () => ({
         subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'],
         history: this.missing(),

@@ -24,6 +24,24 @@ export function interval(seconds: number): string {
   return `${Number((seconds / size).toFixed(1))} ${unit}`;
 }
 
+/** The cron expression of a time of day: `02:00`. */
+export function cronOf(time: string): string {
+  const [hour, minute] = time.split(':').map(Number);
+  return `${minute} ${hour} * * *`;
+}
+
+/** When a schedule runs: `every 30 min`, `daily 02:00 (Europe/London)`, or its cron expression. */
+export function ruleOf(schedule: {
+  every: number | null;
+  cron?: string | null;
+  zone?: string | null;
+}): string {
+  if (schedule.every !== null) return `every ${interval(schedule.every)}`;
+  const [, minute = '', hour = ''] = /^(\d+) (\d+) \* \* \*$/.exec(schedule.cron ?? '') ?? [];
+  const rule = hour === '' ? schedule.cron : `daily ${hour.padStart(2, '0')}:${minute.padStart(2, '0')}`;
+  return `${rule} (${schedule.zone})`;
+}
+
 /** How long until a moment, or since: `in 5 min`, `2 h ago`, `now`. */
 export function fromNow(moment: string, now: number): string {
   const seconds = (Date.parse(moment) - now) / 1000;

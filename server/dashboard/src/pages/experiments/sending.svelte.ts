@@ -12,9 +12,9 @@ import {
 } from '../../lib/api';
 import { dayAndTime } from '../../lib/format';
 import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
-import { interval, localMoment, momentOf, UNITS, type Unit } from '../../lib/trajectory/when';
+import { cronOf, localMoment, momentOf, ruleOf, UNITS, type Unit } from '../../lib/trajectory/when';
 
-export type When = 'now' | 'at' | 'every';
+export type When = 'now' | 'at' | 'daily' | 'every';
 
 const whole = (low: number, high: number): NumberRule => ({
   bounds: { low, high, above: false },
@@ -33,6 +33,8 @@ export class Sending {
   at = $state(localMoment(new Date(Date.now() + 10 * 60_000)));
   /** The same for the first run of a schedule; empty for at once. */
   starts = $state('');
+  /** Time of day, at the arm's computer. */
+  daily = $state('02:00');
   every = $state('30');
   unit = $state<Unit>('min');
   count = $state('10');
@@ -46,6 +48,11 @@ export class Sending {
   problems: Readonly<Record<string, string>> = $derived.by(() => this.wrong());
   private key = newKey();
 
+  /** Whether it is to be run again and again. */
+  get isSchedule(): boolean {
+    return this.when === 'daily' || this.when === 'every';
+  }
+
   /** Sends it. Whether it was taken; `problem` says why not. */
   async send(spec: ExperimentSpec): Promise<boolean> {
     if (this.busy) return false;
@@ -54,7 +61,7 @@ export class Sending {
     this.done = '';
     this.made = null;
     try {
-      this.done = this.when === 'every' ? await this.schedule(spec) : await this.submit(spec);
+      this.done = this.isSchedule ? await this.schedule(spec) : await this.submit(spec);
       this.key = newKey();
       return true;
     } catch (error) {
@@ -77,13 +84,15 @@ export class Sending {
   }
 
   private async schedule(spec: ExperimentSpec): Promise<string> {
-    const every = this.seconds();
     const count = this.count.trim() === '' ? null : Number(this.count);
-    const starts = momentOf(this.starts);
-    const body = { spec, every, count, starts, priority: Number(this.priority) };
-    await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
-    const first = starts === null ? '' : `, first ${dayAndTime(starts)}`;
-    return `scheduled every ${interval(every)}${first}`;
+    const when =
+      this.when === 'daily'
+        ? { cron: cronOf(this.daily) }
+        : { every: this.seconds(), starts: momentOf(this.starts) };
+    const body = { spec, ...when, count, priority: Number(this.priority) };
+    const made = await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
+    const first = made.next ? `, first ${dayAndTime(made.next)}` : '';
+    return `scheduled: ${ruleOf(made)}${first}`;
   }
 
   private seconds(): number {
@@ -95,9 +104,11 @@ export class Sending {
     const { problem } = typedNumber(this.priority, PRIORITY);
     if (problem) problems.priority = problem;
     if (this.when === 'at' && momentOf(this.at) === null) problems.at = 'a day and a time are needed';
-    if (this.when === 'every') {
+    if (this.when === 'daily' && this.daily === '') problems.daily = 'a time is needed';
+    if (this.isSchedule) {
       const every = this.seconds();
-      if (!(every >= SHORTEST && every <= LONGEST)) problems.every = 'allowed: 10 s to 366 d';
+      if (this.when === 'every' && !(every >= SHORTEST && every <= LONGEST))
+        problems.every = 'allowed: 10 s to 366 d';
       const count = this.count.trim() === '' ? '' : typedNumber(this.count, COUNT).problem;
       if (count) problems.count = count;
     }
