@@ -67,7 +67,8 @@ def _within_file(standing: Standing, later: Sequence[Step]) -> BalanceFit:
         joints = tuple(j for j in step.joints if not any(j in stated[name].joints for name in back))
         if step.effect is not None and (joints or not step.joints):
             model = model.without_effect(step.effect, joints or None)
-    unknowns = [u.within_stated for u in standing.now.unknowns if u.name not in out]
+    known = model.by_name.keys() - out  # a disturbance is named by size and phase, and fitted by sine and cosine
+    unknowns = [u.within_stated for u in standing.now.unknowns if u.nuisance or u.name in known]
     balance = TorqueBalance(model, standing.case.records)
     return fit(balance, unknowns, standing.now.values, standing.case.data, standing.now.noise.memory)
 
