@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import io
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from matplotlib.backend_bases import RendererBase
 
-AS_WRITTEN = {"text.parse_math": False}
+AS_WRITTEN: dict[Any, Any] = {"text.parse_math": False}
 """Settings of matplotlib in which a text is never a formula: `$` in a robot's name is a dollar. They hold for texts
 that are made while they are set."""
 

@@ -26,7 +26,7 @@ def print_fitting(table: Table, console: Console) -> None:
     """Prints a table without a box as wide as the console. A name goes on in a second line after a dot or an underline,
     prose after a word; a table that is wider still is printed row by row."""
     for column in table.columns:
-        column._cells = [printable(cell) if isinstance(cell, str) else cell for cell in column.cells]
+        column._cells = [printable(cell) if isinstance(cell, str) else cell for cell in column._cells]
     columns = [[str(column.header), *map(_text, column.cells)] for column in table.columns]
     natural = [max(map(cell_len, column)) for column in columns]
     texts = [column.justify == "left" for column in table.columns]

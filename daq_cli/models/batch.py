@@ -183,8 +183,8 @@ def shown(what: str) -> Iterator[Told]:
 def _bar(what: str) -> Iterator[Callable[[Standing], None]]:
     from rich.progress import BarColumn, Progress, TextColumn
 
-    what, text = (TextColumn(field, markup=False) for field in ("{task.description}", "{task.fields[text]}"))
-    columns = (what, BarColumn(), text)
+    description, text = (TextColumn(field, markup=False) for field in ("{task.description}", "{task.fields[text]}"))
+    columns = (description, BarColumn(), text)
     with Progress(*columns, console=console(), transient=True) as bar:
         task = bar.add_task(what, text="")
 

@@ -36,7 +36,9 @@ function taken(fileName: string): Plugin {
     name: 'taken-files',
     generateBundle(_, bundle) {
       const styles = [...this.getModuleIds()].filter((id) => /\.css(\?|$)/.test(id));
-      const parts = Object.values(bundle).flatMap((one) => (one.type === 'chunk' ? one.moduleIds : one.originalFileNames));
+      const parts = Object.values(bundle).flatMap((one) =>
+        one.type === 'chunk' ? one.moduleIds : one.originalFileNames,
+      );
       const files = [...parts, ...styles].flatMap((id) => /node_modules\/([^?]+)/.exec(id)?.[1] ?? []);
       this.emitFile({ type: 'asset', fileName, source: JSON.stringify([...new Set(files)].sort()) });
     },
