@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
 from rich.text import Text
@@ -63,7 +63,7 @@ def _pieces(word: str) -> list[str]:
     return [first, *(INDENT + piece for piece in others)]
 
 
-def _broken(cell: object, width: int) -> object:
+def _broken(cell: object, width: int) -> Any:
     """The cell with line breaks after joints of its names, where a word is longer than the width."""
     text = _text(cell)
     if all(cell_len(word) <= width for word in text.split()):
