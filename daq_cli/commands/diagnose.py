@@ -99,6 +99,9 @@ def diagnose(
         bool,
         typer.Option("--design", help="Search for a motion of its own to ask for; it takes some 10 s more."),
     ] = False,
+    despite_doubts: Annotated[
+        bool, typer.Option("--despite-doubts", help="Compute although the check of the records raises doubts.")
+    ] = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -111,7 +114,7 @@ def diagnose(
 
     robot = robot_of(context)
     load_effects(effect_file, robot)
-    options = _options(effects, joints, most, method)
+    options = _options(effects, joints, most, method).model_copy(update={"despite_doubts": despite_doubts})
     fitted_to = read_traces(robot, folder, traces)
     held = read_traces(robot, folder, holdout) if holdout else []
     begin = _beginning(robot, fitted_to, traces, model, load)

@@ -17,6 +17,7 @@ from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
 from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
+from model.record_check.finding import RecordFinding, doubts_headline
 
 RESULT_FORMAT = 1
 """Version of the file; a reader refuses newer ones."""
@@ -78,6 +79,8 @@ class FitResult(FrozenRecord):
     message: str
     on_the_edge: tuple[str, ...] = ()
     """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
+    record: tuple[RecordFinding, ...] = ()
+    """What the check of the traces found, before anything was fitted."""
 
     def __repr__(self) -> str:
         """One line; `print` shows the parameters, too."""
@@ -98,8 +101,9 @@ class FitResult(FrozenRecord):
 
     @property
     def doubt(self) -> str:
-        """One line where the model ends much farther from the records than it began; empty where it does not."""
-        return doubt_of(self.errors)
+        """One line where the traces are to be checked first, or the model ends much farther from them than it began;
+        empty where neither is so."""
+        return doubts_headline(self.record) or doubt_of(self.errors)
 
     def parameter(self, name: str) -> FittedParameter:
         """The parameter of that name. Raises SpecError when it was not fitted."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
+from model.record_check.finding import RecordFinding
 from model.validation.expected_deviation import Basis, Convention
 
 DAMPING_RATIO = 0.5
@@ -65,6 +66,8 @@ class Fidelity(FrozenRecord):
     sum_of_contributions: float
     curves: tuple[Curve, ...] = ()
     notes: tuple[str, ...] = ()
+    record: tuple[RecordFinding, ...] = ()
+    """What the check of the traces found, before anything was computed."""
 
     @property
     def explains(self) -> bool:

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.record_check.check import check_records, repaired, require_computable
 from model.simulation.prepared import Options
 from model.validation.criterion import (
     DAMPING_RATIO,
@@ -73,6 +75,10 @@ def validate_by_distortion(
     if not names:
         raise SpecError("no parameters: name at least one that was fitted")
     required_deviation(1.0, damping_ratio)
+    record = check_records(model, traces)
+    require_computable(record)
+    if isinstance(model.machine.controller, NoController):
+        traces = [repaired(trace, model.machine) for trace in traces]
     error = squared_error(model, traces, names, outputs, options)
     varied = _varied(tuple(model.parameter(name) for name in names))
     share = 0.8 if curve_points else 1.0
@@ -98,6 +104,7 @@ def validate_by_distortion(
         sum_of_contributions=math.fsum(d.contribution for d in distortions),
         curves=_curves(error, varied, distortions, curve_points, progress, cancel) if curve_points else (),
         notes=tuple(_notes(varied.parameters, doublings)),
+        record=record,
     )
 
 
