@@ -37,6 +37,8 @@ UNLIKE = 0.5
 records of sound rigs and of rigs with hidden effects none left as much."""
 EXPLAINS = 0.25
 """Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
+CLEAR = 5.0
+"""Deviations of an estimate from which it is clear, however its noise goes on from sample to sample."""
 OUT_OF_SCALE = 100.0
 """Ratio of the torque that a drive gives to that which its motion needs, or its inverse, from which it is of another
 unit: mA for A make it a thousand, and sound rigs 0.6 to 4.6 times what is needed."""
@@ -66,6 +68,9 @@ class Balance:
     given: Floats
     needed: Floats
     parts: Floats
+    behind: Floats
+    """(n,) samples that the drive comes behind the motion that it makes; 0 where that is not clear. A drive that is
+    held until the next sample comes half of one before."""
 
     @property
     def shares(self) -> Floats:
@@ -115,10 +120,12 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     chain = chain_of(model, vector)
     needed = inverse_dynamics_along(chain, position, speed, acceleration)
     braked = needed + gain * joints[:, at.GEAR] * joints[:, at.BACK_EMF] * speed
-    left = np.array([_left(given[:, j] - braked[:, j], speed[:, j]) for j in range(given.shape[1])])
+    rate = smooth(motion.drive, 1) * gain * motion.period
+    found = [_left(given[:, j] - braked[:, j], speed[:, j], rate[:, j], width) for j in range(given.shape[1])]
+    left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
     weight = gravity_along(chain, position)
     parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
-    return Balance(left, np.mean(given**2, axis=0), np.mean(braked**2, axis=0), parts)
+    return Balance(left, np.mean(given**2, axis=0), np.mean(braked**2, axis=0), parts, behind)
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:
@@ -190,15 +197,28 @@ OF_ALL = frozenset(["milliseconds", "half-times", "double-times", "gravity"])
 """Ways that are of the whole record."""
 
 
-def _left(torque: Floats, speed: Floats) -> float:
-    """Mean square of a torque (k,) that a constant, and friction of any size against the motion, leave."""
+def _left(torque: Floats, speed: Floats, rate: Floats, width: int) -> tuple[float, float]:
+    """Mean square of a torque (k,) that a constant, and friction of any size against the motion, leave; and the samples
+    that the drive comes behind.
+
+    Args:
+        rate: (k,) of the drive's torque, a sample. width: samples over which they are smoothed, of which one counts.
+    """
     size = float(np.sqrt(np.mean(speed**2)))
     if size == 0.0:
-        return float(np.var(torque))
+        return float(np.var(torque)), 0.0
     along = speed / size
     columns = np.column_stack([np.tanh(along / 0.05), along])
     columns -= columns.mean(axis=0)
-    return float(nnls(columns, torque - torque.mean())[1] ** 2 / len(torque))
+    level = torque - torque.mean()
+    left = float(nnls(columns, level)[1] ** 2 / len(torque))
+    columns = np.column_stack([columns, rate - rate.mean()])
+    line, _, rank, _ = np.linalg.lstsq(columns, level, rcond=None)
+    if rank < columns.shape[1]:
+        return left, 0.0
+    spread = float(np.mean((level - columns @ line) ** 2)) * width
+    deviation = float(np.sqrt(spread * np.linalg.inv(columns.T @ columns)[2, 2]))
+    return left, float(-line[2]) if abs(line[2]) > CLEAR * deviation else 0.0
 
 
 def _width(motion: Motion) -> int | None:

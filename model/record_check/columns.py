@@ -23,6 +23,8 @@ FACTOR_OF_GAIN = 3.0
 """Most by which gains are off; a drive further from what they make is in another unit, or they are."""
 OTHER_PERIOD = 0.05
 """Relative distance between the interval of samples and the controller's period, from which they differ."""
+BEHIND = 0.25
+"""Samples by which a drive comes behind its motion, from which it is said: half of one is how it is formed."""
 LEADS = 1.5
 """Samples by which a position leads its set point, from which one stands for the other: none moves before it is
 asked."""
@@ -184,6 +186,7 @@ class _Witnesses:
                 return
         if not holds:
             yield from self._out_of_scale(motion)
+            yield from self._behind(motion)
         if not isinstance(self.model.machine.controller, NoController) and not holds:
             for joint in joints:
                 if self._leads(joint):
@@ -191,6 +194,16 @@ class _Witnesses:
                         "columns-swapped", joint, "its position moves before its set point: are they exchanged?",
                         CHECK_COLUMNS,
                     )  # fmt: skip
+
+    def _behind(self, motion: Motion) -> Iterator[RecordFinding]:
+        """Drives that come after the motion that they make, which no delay of an arm does."""
+        found = balance(self.model, motion)
+        for place, joint in enumerate(self.model.machine.modelled_joints):
+            late = 0.0 if found is None else float(found.behind[place])
+            if late > BEHIND:
+                says = f"its drive comes {number(late)} samples after the motion that it makes: it stands too low."
+                advice = "Move the drive up by one row, if each row is read at one moment."
+                yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
 
     def _out_of_scale(self, motion: Motion) -> Iterator[RecordFinding]:
         found = balance(self.model, motion)

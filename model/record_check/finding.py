@@ -21,7 +21,6 @@ FindingKind = Literal[
     "jump",
     "no-sensor",
     "position-unit",
-    "saturated",
     "spikes",
     "stuck",
     "time-scale",

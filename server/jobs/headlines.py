@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from model.record_check.finding import doubts_headline
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -21,12 +23,16 @@ def of_fit(found: FitResult, comparison: Comparison) -> str:
     held = before.held_out is not None and after.held_out is not None
     errors = (before.held_out, after.held_out) if held else (before.in_sample, after.in_sample)
     change = " → ".join("?" if joints is None else _error(joints) for joints in errors)
-    return f"{known} of {len(found.parameters)} parameters known; error {change}{', held out' if held else ''}"
+    doubts = doubts_headline(found.record)
+    begin = f"{doubts}; " if doubts else ""
+    return f"{begin}{known} of {len(found.parameters)} parameters known; error {change}{', held out' if held else ''}"
 
 
 def of_validation(found: Fidelity) -> str:
     """Says whether expected deviations explain the residual."""
     said = "expected deviations explain the residual" if found.explains else "the model lacks something"
+    if doubts := doubts_headline(found.record):
+        return f"{doubts}; Σλ² = {found.sum_of_contributions:.3g}"
     return f"Σλ² = {found.sum_of_contributions:.3g}: {said}"
 
 

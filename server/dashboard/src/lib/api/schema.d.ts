@@ -2387,7 +2387,7 @@ export interface components {
              * Verdict
              * @enum {string}
              */
-            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect";
+            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect" | "check-the-record";
             /** Summary */
             summary: string;
             /** Significant */
@@ -2467,6 +2467,11 @@ export interface components {
              * @default []
              */
             worse_held_out?: number[];
+            /**
+             * Record
+             * @default []
+             */
+            record?: components["schemas"]["RecordFinding"][];
             /**
              * Not Examined
              * @default []
@@ -2918,6 +2923,11 @@ export interface components {
              * @default []
              */
             notes?: string[];
+            /**
+             * Record
+             * @default []
+             */
+            record?: components["schemas"]["RecordFinding"][];
         };
         /**
          * FieldProblem
@@ -2972,6 +2982,11 @@ export interface components {
              * @default []
              */
             on_the_edge?: string[];
+            /**
+             * Record
+             * @default []
+             */
+            record?: components["schemas"]["RecordFinding"][];
             /** Models */
             models: components["schemas"]["ModelAgreement"][];
             /** Signals */
@@ -4445,7 +4460,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "drive-out-of-scale" | "drive-timing" | "errors-follow-record" | "gravity-magnitude" | "gravity-reversed" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
             /**
              * Values
              * @default {}
@@ -5206,6 +5221,61 @@ export interface components {
             time: number;
             /** Experiment */
             experiment: string | null;
+        };
+        /**
+         * RecordFinding
+         * @description One thing that a record, or the machine file beside it, says and that cannot be, or should be known.
+         *
+         *     Args:
+         *         record: what the record is called; empty where the finding is of the machine file. joint: from 1; None: of all.
+         *         times: s of the record's own clock, the first of `count`. value, allowed: as measured, and the most (or the
+         *             value) that was expected, in `unit`.
+         *         says, advice: a sentence each.
+         */
+        RecordFinding: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            /**
+             * Consequence
+             * @enum {string}
+             */
+            consequence: "fatal" | "doubt" | "note";
+            /**
+             * Record
+             * @default
+             */
+            record?: string;
+            /** Joint */
+            joint?: number | null;
+            /**
+             * Times
+             * @default []
+             */
+            times?: number[];
+            /**
+             * Count
+             * @default 0
+             */
+            count?: number;
+            /** Value */
+            value?: number | null;
+            /** Allowed */
+            allowed?: number | null;
+            /**
+             * Unit
+             * @default
+             */
+            unit?: string;
+            /** Says */
+            says: string;
+            /**
+             * Advice
+             * @default
+             */
+            advice?: string;
         };
         /**
          * RecordedPath
