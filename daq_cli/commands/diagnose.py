@@ -216,10 +216,10 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     from model.reports.diagnosis_report import LABELS, diagnosis_report
     from model.reports.page import write_report
 
-    simulated = not isinstance(found.model_before.machine.controller, NoController)
+    simulated = found.computed and not isinstance(found.model_before.machine.controller, NoController)
     comparison = None
     if simulated and all(t.set_point is not None for t in (*traces, *held)):
         models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
         comparison = compare(models, [*traces, *held], found.holdout)
-    efforts = recorded_and_predicted(found, [*traces, *held], found.holdout)
+    efforts = recorded_and_predicted(found, [*traces, *held], found.holdout) if found.computed else ()
     return write_report(diagnosis_report(found, comparison, files_of([*traces, *held]), efforts), path)

@@ -42,7 +42,7 @@ def answer_text(found: Diagnosis) -> str:
     lines = _filled(verdict, headline(found), len(verdict) + 2)
     for line in lines_of(doubts_in(found.record)):
         lines += ["", *_filled("CHECK", line)]
-    if found.verdict == "check-the-record" and not found.steps:
+    if not found.computed:
         return "\n".join([*lines, *_record_notes(found)])
     warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
     for number in sorted(warnings):

@@ -382,6 +382,11 @@ class Diagnosis(FrozenRecord):
     """Joints of which no fitted trace tells anything, since their drives stand at limits: the answer is not of them."""
 
     @property
+    def computed(self) -> bool:
+        """Whether anything was computed: not of records that are to be checked first."""
+        return self.verdict != "check-the-record" or self.gap is not None
+
+    @property
     def examined_nothing(self) -> bool:
         """Whether no joint could be examined, so that nothing follows from nothing having been found."""
         return set(self.not_examined) >= set(self.model_before.machine.modelled_joints)

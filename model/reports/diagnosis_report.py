@@ -59,6 +59,8 @@ def diagnosis_report(
     doubts = [words for words, note in zip(found.notes, found.notes_data, strict=False) if note.warning]
     sections = [Section("Warnings", tuple(Text(words, "warning") for words in doubts))] if doubts else []
     sections += record_sections(found.record)
+    if not found.computed:
+        return Report(capitalised(headline(found)), found.summary, _facts(found, files), tuple(sections))
     sections += [] if found.gap is None else [gap_section(found.gap)]
     stated = stated_numbers(found)
     for number in range(1, len(found.steps) + 1):
