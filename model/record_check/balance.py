@@ -39,6 +39,13 @@ EXPLAINS = 0.25
 """Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
 CLEAR = 5.0
 """Deviations of an estimate from which it is clear, however its noise goes on from sample to sample."""
+TURNED = 0.75
+"""Least share of twice the torque of gravity in what is left, from which gravity counts as turned round. A balance
+spring that carries the whole arm comes to 0.5."""
+LEAST_REMOVED = 0.5
+"""Least share of the mean square that turning gravity round takes off."""
+LEAST_TORQUE = 0.1
+"""Least torque of gravity on any joint, as a share of the drive's, from which records tell its direction."""
 OUT_OF_SCALE = 100.0
 """Ratio of the torque that a drive gives to that which its motion needs, or its inverse, from which it is of another
 unit: mA for A make it a thousand, and sound rigs 0.6 to 4.6 times what is needed."""
@@ -46,7 +53,7 @@ unit: mA for A make it a thousand, and sound rigs 0.6 to 4.6 times what is neede
 
 @dataclass(frozen=True)
 class Motion:
-    """What is balanced: position and drive (k, n) of the modelled joints, s between samples, and the sign of gravity.
+    """What is balanced: position and drive (k, n) of the modelled joints, and s between samples.
 
     speed: (k, n) where sensors measure it, and position is its integral.
     """
@@ -56,7 +63,6 @@ class Motion:
     period: float
     step: Floats
     speed: Floats | None = None
-    gravity: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,8 @@ class Balance:
     given: Floats
     needed: Floats
     parts: Floats
+    turned: float
+    """Share of what is left that gravity takes off where it is turned round, if it is that which is left; else 0."""
     behind: Floats
     """(n,) samples that the drive comes behind the motion that it makes; 0 where that is not clear. A drive that is
     held until the next sample comes half of one before."""
@@ -103,9 +111,7 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     width = _width(motion)
     if width is None:
         return None
-    vector = model.vector.copy()
-    vector[at.GRAVITY_X : at.GRAVITY_Z + 1] *= motion.gravity
-    joints = vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
+    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     rows = slice(width // 2, len(motion.position) - width // 2, max(1, len(motion.position) // MOST_ROWS))
 
     def smooth(signal: Floats, order: int) -> Floats:
@@ -117,7 +123,7 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     acceleration, drive = smooth(source, 2 - shift), smooth(motion.drive, 0)
     gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
     given = gain * drive
-    chain = chain_of(model, vector)
+    chain = chain_of(model)
     needed = inverse_dynamics_along(chain, position, speed, acceleration)
     braked = needed + gain * joints[:, at.GEAR] * joints[:, at.BACK_EMF] * speed
     rate = smooth(motion.drive, 1) * gain * motion.period
@@ -125,7 +131,14 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
     weight = gravity_along(chain, position)
     parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
-    return Balance(left, np.mean(given**2, axis=0), np.mean(braked**2, axis=0), parts, behind)
+    return Balance(
+        left,
+        np.mean(given**2, axis=0),
+        np.mean(braked**2, axis=0),
+        parts,
+        _gravity_turned(given, braked, weight),
+        behind,
+    )
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:
@@ -190,11 +203,23 @@ WAYS: dict[str, Callable[[Motion, list[int]], Motion]] = {
     "half-times": _slower(0.5),
     "double-times": _slower(2.0),
     "position-drive": _exchanged,
-    "gravity": lambda motion, _columns: replace(motion, gravity=-1.0),
 }
 """Ways to read a record, or its machine file, otherwise than it stands."""
-OF_ALL = frozenset(["milliseconds", "half-times", "double-times", "gravity"])
+OF_ALL = frozenset(["milliseconds", "half-times", "double-times"])
 """Ways that are of the whole record."""
+
+
+def _gravity_turned(given: Floats, needed: Floats, weight: Floats) -> float:
+    """Share of the mean square that turning gravity round takes off; 0 where it is not that which is left."""
+    sizes = np.sqrt(np.mean(given**2, axis=0))
+    if not (sizes > 0.0).all():
+        return 0.0
+    left, change = (needed - given) / sizes, -2.0 * weight / sizes
+    if not np.mean(change**2, axis=0).max() > (2 * LEAST_TORQUE) ** 2:
+        return 0.0
+    share = -float(np.sum(left * change) / np.sum(change**2))
+    removed = 1.0 - float(np.sum((left + change) ** 2) / np.sum(left**2))
+    return removed if share > TURNED and removed > LEAST_REMOVED else 0.0
 
 
 def _left(torque: Floats, speed: Floats, rate: Floats, width: int) -> tuple[float, float]:

@@ -11,7 +11,17 @@ import numpy as np
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
-from model.record_check.balance import OF_ALL, OUT_OF_SCALE, UNLIKE, WAYS, Motion, balance, likelier, motion_of
+from model.record_check.balance import (
+    LEAST_REMOVED,
+    OF_ALL,
+    OUT_OF_SCALE,
+    UNLIKE,
+    WAYS,
+    Motion,
+    balance,
+    likelier,
+    motion_of,
+)
 from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
 from model.record_check.law import Reading as ColumnReading
@@ -169,14 +179,16 @@ class _Witnesses:
         joints = self.model.machine.modelled_joints
         if motion is None or told:
             return
-        ways = ["gravity"] if holds else list(WAYS)
-        if self.model.machine.gravity == (0.0, 0.0, 0.0):
-            ways.remove("gravity")
+        found = balance(self.model, motion)
+        if found is not None and found.turned > 0.0:
+            yield self._gravity(found.turned)
+            return
+        ways = [] if holds else list(WAYS)
         if not any(self.model.machine.joint(j).kind == "revolute" for j in joints) and "degrees" in ways:
             ways.remove("degrees")
-        found = likelier(self.model, motion, None, ways)
-        if found is not None:
-            yield self._of_way(found, None if len(joints) > 1 else joints[0])
+        whole = likelier(self.model, motion, None, ways)
+        if whole is not None:
+            yield self._of_way(whole, None if len(joints) > 1 else joints[0])
             return
         alone = [way for way in ways if way not in OF_ALL]
         for place, joint in enumerate(joints):
@@ -216,8 +228,16 @@ class _Witnesses:
 
     def _of_way(self, way: str, joint: int | None) -> RecordFinding:
         kind, says, advice = _WAY_WORDS[way]
+        return self._doubt(kind, joint, says, advice)
+
+    def _gravity(self, removed: float) -> RecordFinding:
         gravity = ", ".join(f"{g:.4g}" for g in self.model.machine.gravity)
-        return self._doubt(kind, joint, says.format(gravity=gravity), advice)
+        says = (
+            f"drive and motion say that gravity, stated as [{gravity}] m/s², points the other way: turned round, it "
+            f"takes {removed:.0%} off what is left."
+        )
+        advice = "Check `gravity`, the posture in which positions are 0, their direction, and the sign of the drive."
+        return self._doubt("gravity-reversed", None, says, advice, value=removed, allowed=LEAST_REMOVED)
 
     def _scale(self, joint: int, ratio: float, of: str) -> RecordFinding:
         units = self.model.machine.joint(joint).drive_units
@@ -282,11 +302,6 @@ _WAY_WORDS: dict[str, tuple[FindingKind, str, str]] = {
         "columns-swapped",
         "drive and motion belong together if position and drive are exchanged.",
         CHECK_COLUMNS,
-    ),
-    "gravity": (
-        "gravity-reversed",
-        "drive and motion belong together if gravity, stated as [{gravity}] m/s², points the other way.",
-        "Check `gravity`, the posture in which positions are 0, their direction, and the sign of the drive.",
     ),
 }
 
