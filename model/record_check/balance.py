@@ -39,6 +39,8 @@ EXPLAINS = 0.25
 """Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
 CLEAR = 5.0
 """Deviations of an estimate from which it is clear, however its noise goes on from sample to sample."""
+MOST_FRICTION = 5.0
+"""Most torque that a drive gives, in torques that weight and inertia need: sound rigs have up to 4.6."""
 TURNED = 0.75
 """Least share of twice the torque of gravity in what is left, from which gravity counts as turned round. A balance
 spring that carries the whole arm comes to 0.5."""
@@ -131,14 +133,8 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
     weight = gravity_along(chain, position)
     parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
-    return Balance(
-        left,
-        np.mean(given**2, axis=0),
-        np.mean(braked**2, axis=0),
-        parts,
-        _gravity_turned(given, braked, weight),
-        behind,
-    )
+    sizes = (np.mean(torque**2, axis=0) for torque in (given, braked))
+    return Balance(left, *sizes, parts, _gravity_turned(given, braked, weight), behind)
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:
@@ -150,7 +146,7 @@ def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str
     whole = _total(found, joint)
     if not whole > UNLIKE**2:
         return None
-    left = {way: _total(balance(model, changed), joint) for way, changed in _changed(motion, joint, ways)}
+    left = {way: _believable(balance(model, changed), joint) for way, changed in _changed(motion, joint, ways)}
     best = min(left, key=lambda way: left[way], default=None)
     return best if best is not None and left[best] < EXPLAINS * whole else None
 
@@ -160,6 +156,15 @@ def _total(found: Balance | None, joint: int | None) -> float:
         return np.inf
     shares = found.shares
     return float(shares.mean() if joint is None else shares[joint])
+
+
+def _believable(found: Balance | None, joint: int | None) -> float:
+    """The same of another way to read a record; infinite where nearly all of the drive would go into friction, which
+    any drive along the motion may."""
+    if found is None:
+        return np.inf
+    given, needed = (float(np.sum(one if joint is None else one[joint])) for one in (found.given, found.needed))
+    return np.inf if given > MOST_FRICTION**2 * needed else _total(found, joint)
 
 
 def _changed(motion: Motion, joint: int | None, ways: Sequence[str]) -> Iterator[tuple[str, Motion]]:
