@@ -243,7 +243,8 @@ class _Witnesses:
         units = self.model.machine.joint(joint).drive_units
         stated = f" Its drive is stated in {units[0]}." if len(units) == 1 else ""
         says = f"its drive is {number(ratio)} times {of}.{stated}"
-        return self._doubt("drive-scale", joint, says, "Check the unit of the drive.", value=ratio, allowed=1.0)
+        advice = "Check the unit of the drive, that positions are in rad or m and times in s, and the columns."
+        return self._doubt("drive-scale", joint, says, advice, value=ratio, allowed=1.0)
 
     def _doubt(
         self,

@@ -14,7 +14,7 @@ from scipy.ndimage import median_filter
 
 from model.arrays import Floats
 
-TAIL = 0.05
+TAIL = 0.2
 """Share of a record's intervals from which the tail of its noise is told: half of them may be false."""
 FALSE_DOUBTS = 1e-6
 """Records in which noise alone may raise a doubt: its tail is taken for an exponential one."""
@@ -79,11 +79,13 @@ def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
     apart = intervals > MISSING * usual
     outside[apart[:-2] | apart[1:-1] | apart[2:]] = 0.0
     line = float(np.quantile(outside, 1 - TAIL))
-    tail = outside[outside > line]
-    spread = float(np.median(tail - line)) / np.log(2.0) if len(tail) else 0.0
+    tail = np.sort(outside)[-max(1, round(TAIL * len(outside))) :]
+    spread = float(np.median(tail - line)) / np.log(2.0)
     noise = line + spread * float(np.log(TAIL * len(outside) / FALSE_DOUBTS))
     kink = KINK * float(np.abs(np.diff(median_filter(rate, ISOLATED, mode="nearest"))).max())
-    allowed = max(noise + kink, LEAST_COUNTS * step)
+    moved = np.abs(np.diff(reading))
+    rounding = max(step, float(moved[moved > 0.0].min(initial=np.inf)) if moved.any() else 0.0)
+    allowed = max(noise + kink, LEAST_COUNTS * rounding)
     found = []
     for k in np.flatnonzero(outside > allowed):
         around = rate[max(0, k - 2) : k + 5]

@@ -103,7 +103,7 @@ def cut_out(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
 
 def milliseconds(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     """Times in ms."""
-    return Faulty(replace(trace, time=1e3 * trace.time), ("time-scale",))
+    return Faulty(replace(trace, time=1e3 * trace.time), ("time-scale", "drive-scale"))
 
 
 def slow_times(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
@@ -130,7 +130,7 @@ def swapped_drive(trace: Trace, machine: Machine, draw: Generator) -> Faulty | N
     if trace.drive is None:
         return None
     swapped = replace(trace, position=trace.drive, drive=trace.position)
-    return Faulty(swapped, ("columns-swapped", "units-differ", "drive-scale", "position-unit"))
+    return Faulty(swapped, ("columns-swapped", "units-differ", "drive-scale", "drive-zero"))
 
 
 def degrees(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:

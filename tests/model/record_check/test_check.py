@@ -137,7 +137,10 @@ def test_a_trace_of_more_joints_than_the_machine_has_is_refused() -> None:
         diagnose_torques(base_model(rigs.slide_machine()), [SLIDE], [replace(SLIDE, joints=(2,))])
 
 
+@pytest.mark.lab_data
 def test_public_records_of_a_real_arm_raise_no_doubt(lab_data: Path) -> None:
+    if not (lab_data / "double_pendulum").is_dir():
+        pytest.skip(f"needs {lab_data / 'double_pendulum'}")
     model = base_model(load_machine(str(ROOT / "examples" / "double_pendulum.toml")))
     traces = [import_csv(path) for path in sorted((lab_data / "double_pendulum").glob("run_*.csv"))]
     assert doubts_in(check_records(model, traces)) == ()
