@@ -66,8 +66,8 @@ def _computed(
     if choose_method(model, (*traces, *holdout), options, designs=designs) == "inverse-dynamics":
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
-        whole = [[repaired(trace, model.machine) for trace in some] for some in (traces, holdout)]
-        return diagnose_torques(model, *whole, options, progress, cancel)
+        whole, held = ([repaired(trace, model.machine) for trace in some] for some in (traces, holdout))
+        return diagnose_torques(model, whole, held, options, progress, cancel)
     return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser)
 
 

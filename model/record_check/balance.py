@@ -133,8 +133,8 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
     weight = gravity_along(chain, position)
     parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
-    sizes = (np.mean(torque**2, axis=0) for torque in (given, braked))
-    return Balance(left, *sizes, parts, _gravity_turned(given, braked, weight), behind)
+    size, needs = (np.mean(torque**2, axis=0) for torque in (given, braked))
+    return Balance(left, size, needs, parts, _gravity_turned(given, braked, weight), behind)
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:

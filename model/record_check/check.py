@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,9 +18,10 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.record_check.columns import column_findings
-from model.record_check.finding import RecordFinding
+from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.readings import (
     FalseReadings,
+    Jump,
     find_gaps,
     find_jumps,
     is_bridged,
@@ -34,6 +35,8 @@ ON_EARTH = (9.76, 9.84)
 """Least and largest gravity on the ground, m/s²: on a mountain at the equator, and at a pole, rounded outwards."""
 WITHIN_NOISE = 3.0
 """Times its noise that a model may leave of a record and still explain it: spikes that alone leave more are no note."""
+MOST_KEPT = 100
+"""Times that a finding holds: a page need not have more."""
 WILD_SHARE = 0.5
 """Distance between set point and position, as a share of the largest travel of any joint, that no controller leaves for
 half of a record. A joint that is held may sag by more than its own travel."""
@@ -162,7 +165,7 @@ def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:
         kind="gap",
         consequence="doubt" if long else "note",
         record=trace.called,
-        times=tuple(starts[:100]),
+        times=tuple(starts[:MOST_KEPT]),
         count=len(shown),
         value=longest,
         allowed=usual,
@@ -174,56 +177,71 @@ def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:
 
 
 def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
-    found, time = false_readings(trace, machine, joint), trace.time
-    unit = machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else "")
-    column = trace.column(joint)
+    found = false_readings(trace, machine, joint)
+    told = _Jumps(trace, joint, machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else ""))
     driven = not isinstance(machine.controller, NoController)
+    if found.wraps:
+        advice = "Unwrap the encoder before the controller, or in the file." if driven else "It is unwrapped."
+        says = f"its reading jumps by a whole turn {told.place(found.wraps)}."
+        yield told.finding("wraps", found.wraps, says, advice, doubt=driven)
+    if found.spikes:
+        noise = noise_of(trace.position[:, trace.column(joint)], _step(machine, joint))
+        alone = math.sqrt(sum(jump.size**2 for jump in found.spikes) / len(trace))
+        doubt = measures_speed(machine, joint) or alone > WITHIN_NOISE * noise
+        says = f"{times_of(len(found.spikes), 'spike')} {told.place(found.spikes)}, of {told.size(found.spikes)}."
+        yield told.finding("spikes", found.spikes, says, "Look for lost bytes or a loose connector.", doubt=doubt)
+    if found.others:
+        says = f"its reading jumps {told.place(found.others)}, by {told.size(found.others)}."
+        advice = "Were samples cut out, did the encoder slip, or was it set to zero? Use a piece without."
+        yield told.finding("jump", found.others, says, advice)
+    for since, jump in found.stuck:
+        begin, end = float(trace.time[since]), float(trace.time[jump.row])
+        says = (
+            f"its reading stands still from {begin:.2f} to {end:.2f} s ({number(end - begin)} s), then jumps by "
+            f"{number(abs(jump.size))} {told.unit}."
+        )
+        advice = "The sensor or its line was stuck: use a piece without."
+        yield told.finding("stuck", [replace(jump, row=since - 1)], says, advice)
 
-    def finding(kind: str, doubt: bool, rows: list[int], size: float, allowed: float, says: str, advice: str):  # type: ignore[no-untyped-def]
+
+@dataclass(frozen=True)
+class _Jumps:
+    """Findings of jumps in the readings of one joint, in `unit`."""
+
+    trace: Trace
+    joint: int
+    unit: str
+
+    def times(self, jumps: Sequence[Jump]) -> list[float]:
+        """s, of the first false sample of each."""
+        return [float(self.trace.time[jump.row + 1]) for jump in jumps]
+
+    def place(self, jumps: Sequence[Jump]) -> str:
+        """When they are, in words."""
+        return at_times(self.times(jumps))
+
+    def size(self, jumps: Sequence[Jump]) -> str:
+        """How large they are, in words."""
+        largest, usual = max(abs(jump.size) for jump in jumps), jumps[0].usual
+        return f"{number(largest)} {self.unit} at most, where {number(usual)} {self.unit} can be noise or motion"
+
+    def finding(
+        self, kind: FindingKind, jumps: Sequence[Jump], says: str, advice: str, *, doubt: bool = True
+    ) -> RecordFinding:
+        """The finding of jumps of one kind."""
         return RecordFinding(
-            kind=kind,  # type: ignore[arg-type]
+            kind=kind,
             consequence="doubt" if doubt else "note",
-            record=trace.called,
-            joint=joint,
-            times=tuple(float(time[row]) for row in rows[:100]),
-            count=len(rows),
-            value=size,
-            allowed=allowed,
-            unit=unit,
+            record=self.trace.called,
+            joint=self.joint,
+            times=tuple(self.times(jumps)[:MOST_KEPT]),
+            count=len(jumps),
+            value=max(abs(jump.size) for jump in jumps),
+            allowed=jumps[0].usual,
+            unit=self.unit,
             says=says,
             advice=advice,
         )
-
-    for kind, jumps in (("wraps", found.wraps), ("spikes", found.spikes), ("jump", found.others)):
-        if not jumps:
-            continue
-        rows = [jump.row + 1 for jump in jumps]
-        size = max(abs(jump.size) for jump in jumps)
-        usual = jumps[0].usual
-        place = at_times([float(time[row]) for row in rows])
-        most = f"{number(size)} {unit} at most, where {number(usual)} {unit} can be noise or motion"
-        if kind == "wraps":
-            says = f"its reading jumps by a whole turn {place}."
-            advice = "Unwrap the encoder before the controller, or in the file." if driven else "It is unwrapped."
-            yield finding(kind, driven, rows, size, usual, says, advice)
-        elif kind == "spikes":
-            noise = noise_of(trace.position[:, column], _step(machine, joint))
-            alone = math.sqrt(sum(jump.size**2 for jump in jumps) / len(trace))
-            doubt = measures_speed(machine, joint) or alone > WITHIN_NOISE * noise
-            says = f"{times_of(len(jumps), 'spike')} {place}, of {most}."
-            yield finding(kind, doubt, rows, size, usual, says, "Look for lost bytes or a loose connector.")
-        else:
-            says = f"its reading jumps {place}, by {most}."
-            advice = "Were samples cut out, did the encoder slip, or was it set to zero? Use a piece without."
-            yield finding(kind, True, rows, size, usual, says, advice)
-    for since, jump in found.stuck:
-        seconds = float(time[jump.row] - time[since])
-        says = (
-            f"its reading stands still from {time[since]:.2f} to {time[jump.row]:.2f} s ({number(seconds)} s), then "
-            f"jumps by {number(abs(jump.size))} {unit}."
-        )
-        advice = "The sensor or its line was stuck: use a piece without."
-        yield finding("stuck", True, [since], abs(jump.size), jump.usual, says, advice)
 
 
 def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:

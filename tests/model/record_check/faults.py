@@ -130,7 +130,7 @@ def swapped_drive(trace: Trace, machine: Machine, draw: Generator) -> Faulty | N
     if trace.drive is None:
         return None
     swapped = replace(trace, position=trace.drive, drive=trace.position)
-    return Faulty(swapped, ("columns-swapped", "units-differ", "drive-scale", "drive-zero"))
+    return Faulty(swapped, ("columns-swapped", "units-differ", "drive-scale", "drive-zero", "position-unit"))
 
 
 def degrees(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
