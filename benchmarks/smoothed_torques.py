@@ -11,7 +11,8 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
-from model.inverse_dynamics.supplied_torque import friction_levels, needed_torque
+from model.dynamics.recursive import inverse_dynamics_along
+from model.inverse_dynamics.supplied_torque import friction_levels
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
@@ -60,8 +61,7 @@ def torques_along(model: Model, trace: Trace, window: float) -> TorquesAlongTrac
     chain = chain_body(shared, joints, np.zeros_like(model.flags))
     settings = np.zeros(at.SETTINGS, dtype=np.int64)
     settings[at.PUBLISHED_LOADS] = int(is_rod_arm(model.machine))
-    required, levels = np.empty_like(position), np.empty_like(position)
-    needed_torque(chain, position, velocity, acceleration, required)
+    required, levels = inverse_dynamics_along(chain, position, velocity, acceleration), np.empty_like(position)
     friction_levels(chain, position, joints, settings, levels)
     gear = joints[:, at.GEAR]
     slow = 0.5 * np.abs(velocity).max(axis=0).clip(1e-9) * 1e-2

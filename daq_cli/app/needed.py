@@ -10,6 +10,7 @@ MODEL = frozenset(
     [
         "batch",
         "blind",
+        "check",
         "compare",
         "design",
         "diagnose",

@@ -99,6 +99,9 @@ def diagnose(
         bool,
         typer.Option("--design", help="Search for a motion of its own to ask for; it takes some 10 s more."),
     ] = False,
+    despite_doubts: Annotated[
+        bool, typer.Option("--despite-doubts", help="Compute although the check of the records raises doubts.")
+    ] = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -111,7 +114,7 @@ def diagnose(
 
     robot = robot_of(context)
     load_effects(effect_file, robot)
-    options = _options(effects, joints, most, method)
+    options = _options(effects, joints, most, method).model_copy(update={"despite_doubts": despite_doubts})
     fitted_to = read_traces(robot, folder, traces)
     held = read_traces(robot, folder, holdout) if holdout else []
     begin = _beginning(robot, fitted_to, traces, model, load)
@@ -213,10 +216,10 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     from model.reports.diagnosis_report import LABELS, diagnosis_report
     from model.reports.page import write_report
 
-    simulated = not isinstance(found.model_before.machine.controller, NoController)
+    simulated = found.computed and not isinstance(found.model_before.machine.controller, NoController)
     comparison = None
     if simulated and all(t.set_point is not None for t in (*traces, *held)):
         models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
         comparison = compare(models, [*traces, *held], found.holdout)
-    efforts = recorded_and_predicted(found, [*traces, *held], found.holdout)
+    efforts = recorded_and_predicted(found, [*traces, *held], found.holdout) if found.computed else ()
     return write_report(diagnosis_report(found, comparison, files_of([*traces, *held]), efforts), path)

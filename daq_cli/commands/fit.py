@@ -27,7 +27,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_record
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -241,6 +241,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "whitened_mean_square": found.whitened_mean_square,
             "converged": found.converged,
             "on_the_edge": list(found.on_the_edge),
+            "record": [finding.model_dump(mode="json") for finding in found.record],
             "evaluations": found.evaluations,
             "seconds": found.seconds,
         }
@@ -250,6 +251,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
 def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BaseParameters | None) -> None:
     from daq_cli.models.agreement_table import print_agreement
 
+    print_record(found.record)
     print_parameters(found.parameters)
     known = sum(p.verdict == "known" for p in found.parameters)
     print(f"\nknown: {known} of {len(found.parameters)}", end="")

@@ -113,6 +113,10 @@ def _print_result(
 def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
     from rich.table import Table
 
+    from daq_cli.models.parameter_table import print_record
+
+    print_record(fidelity.record)
+
     table = Table(box=None, header_style="bold")
     for name in ("parameter", "value", "doubles the error at", "σ needed", "τ′ expected", "λ²", "unit"):
         table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")

@@ -19,6 +19,7 @@ from model.discrepancy.explanation.headline import headline
 from model.discrepancy.explanation.method_words import method_words
 from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
 from model.effects.names import capitalised, effect_on
+from model.record_check.finding import doubts_in, lines_of
 from model.units import shown_unit
 
 if TYPE_CHECKING:
@@ -39,6 +40,10 @@ def answer_text(found: Diagnosis) -> str:
     """The whole answer."""
     verdict = found.verdict.replace("-", " ").upper()
     lines = _filled(verdict, headline(found), len(verdict) + 2)
+    for line in lines_of(doubts_in(found.record)):
+        lines += ["", *_filled("CHECK", line)]
+    if not found.computed:
+        return "\n".join([*lines, *_record_notes(found)])
     warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
     for number in sorted(warnings):
         lines += ["", *_filled("WARNING", found.notes[number])]
@@ -58,8 +63,15 @@ def answer_text(found: Diagnosis) -> str:
         lines += ["", *_filled("ask", _asked(found.next_experiment))]
     for number, note in enumerate(found.notes):
         lines += [] if number in warnings else ["", *_filled("note", note)]
+    lines += _record_notes(found)
     lines += ["", f"Took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"]
     return "\n".join(lines)
+
+
+def _record_notes(found: Diagnosis) -> list[str]:
+    """What the check of the records notes, a paragraph each."""
+    notes = [finding for finding in found.record if finding.consequence == "note"]
+    return [line for note in lines_of(notes) for line in ("", *_filled("record", note))]
 
 
 def _step(step: Step, earlier: Sequence[Step], stated: Mapping[str, Parameter]) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from daq_cli.app.context import console, print_json, print_prose, print_table
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import files_of
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -71,6 +71,7 @@ def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
     from model.discrepancy.explanation.renderer import sentence
     from model.reports.page import trace_names
 
+    print_record(found.record)
     print_parameters(found.parameters)
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")

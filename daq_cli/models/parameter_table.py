@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from daq_cli.app.context import print_table
+from model.record_check.finding import doubts_in, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from model.fitting.result import FittedParameter
+    from model.record_check.finding import RecordFinding
 
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
@@ -24,6 +26,14 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     for p in parameters:
         table.add_row(*row_of(p))
     print_table(table)
+
+
+def print_record(findings: Sequence[RecordFinding]) -> None:
+    """What the check of the records found, a line each: doubts as CHECK, others as record."""
+    for line in lines_of(doubts_in(findings)):
+        print(f"CHECK {line}")
+    for line in lines_of([finding for finding in findings if finding.consequence == "note"]):
+        print(f"record {line}")
 
 
 def print_on_the_edge(links: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from daq.contracts.machine import DcMotor
 from model import layout as at
 from model.arrays import Floats
-from model.inverse_dynamics.supplied_torque import needed_torque
+from model.dynamics.recursive import inverse_dynamics_along
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
@@ -104,13 +104,12 @@ def inertial_regressor(chain: ChainArrays, motion: Motion) -> Floats:
     )
     for link in range(joints):
         moved = to_link_frame(chain, link)
-        distal, torque = np.empty((*position.shape, 10)), np.empty_like(position)
+        distal = np.empty((*position.shape, 10))
         for entry in range(10):
             inertial = np.zeros((joints, 10))
             inertial[link, entry] = 1.0
             part = chain._replace(inertial=inertial, rotor_inertia=rest)
-            needed_torque(part, position, speed, acceleration, torque)
-            distal[:, :, entry] = torque
+            distal[:, :, entry] = inverse_dynamics_along(part, position, speed, acceleration)
         columns[:, :, 10 * link : 10 * (link + 1)] = distal @ moved
     return columns
 

@@ -10,12 +10,14 @@ from typing import Literal
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
 from model.machine_model.model import Model
+from model.record_check.check import check_records, repaired, require_computable
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 
@@ -88,6 +90,9 @@ def compare(
                 f"{label} moves joints {list(model.machine.modelled_joints)}, {models[0][0]} moves "
                 f"{list(machine.modelled_joints)}: they cannot be compared"
             )
+    require_computable(check_records(models[0][1], traces))
+    if isinstance(machine.controller, NoController):
+        traces = [repaired(trace, machine) for trace in traces]
     records = records_of(traces, machine, signal)
     floor = noise_floor(records, machine, signal)
     simulated: list[list[Floats]] = []

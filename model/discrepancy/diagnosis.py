@@ -12,11 +12,12 @@ from daq.contracts.frozen import FrozenRecord
 from model.discrepancy.grounds import ControllerProof, Measurement, Method, Note, Reason, Refusal, SharedLaw
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.record_check.finding import RecordFinding
 
 ANSWER_FORMAT = 1
 """Version of the answer; a reader refuses newer ones."""
 
-Verdict = Literal["nothing-significant", "named", "ambiguous", "suspected", "unknown-effect"]
+Verdict = Literal["nothing-significant", "named", "ambiguous", "suspected", "unknown-effect", "check-the-record"]
 Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
 AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
 UNWRITTEN = ""
@@ -400,8 +401,16 @@ class Diagnosis(FrozenRecord):
     """Joints on which more is left than noise, where the verdict is `unknown-effect`."""
     worse_held_out: tuple[int, ...] = ()
     """Joints whose held-out error grew although no effect was added: the tolerance parameters were fitted wrongly."""
+    record: tuple[RecordFinding, ...] = ()
+    """What the records, or the machine file beside them, say that cannot be, or should be known. Where there are
+    doubts, the verdict is `check-the-record`."""
     not_examined: tuple[int, ...] = ()
     """Joints of which no fitted trace tells anything, since their drives stand at limits: the answer is not of them."""
+
+    @property
+    def computed(self) -> bool:
+        """Whether anything was computed: not of records that are to be checked first."""
+        return self.verdict != "check-the-record" or self.gap is not None
 
     @property
     def examined_nothing(self) -> bool:

@@ -38,11 +38,8 @@ PatternKind = Literal[
 NoteKind = Literal[
     "cutoff",
     "drive-at-limit",
-    "drive-out-of-scale",
     "drive-timing",
     "errors-follow-record",
-    "gravity-magnitude",
-    "gravity-reversed",
     "larger-noise",
     "names-excluded",
     "no-experiment-left",

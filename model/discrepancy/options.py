@@ -24,6 +24,7 @@ class DiagnosisOptions(SpokenRecord):
     method: how model and records are compared; None: as machine and traces allow (`method_choice`).
     fitted: candidates per step that are fitted after the probes.
     polished: how many of the best fits are taken to their ends.
+    despite_doubts: compute although a record is doubted; the verdict stays `check-the-record`.
     """
 
     effects: tuple[str, ...] | None = None
@@ -32,6 +33,7 @@ class DiagnosisOptions(SpokenRecord):
     method: Method | None = None
     fitted: Annotated[int, Field(ge=1, le=100)] = 8
     polished: Annotated[int, Field(ge=1, le=100)] = 3
+    despite_doubts: bool = False
 
 
 class SearchOptions(Protocol):

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from daq.contracts.errors import TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis
 from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
+from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
+from model.record_check.check import check_records, repaired
+from model.record_check.finding import RecordFinding, doubts_in
 
 
 def diagnose(
@@ -30,6 +33,9 @@ def diagnose(
     motion in torques: `method_choice` says when. `chooser` knows the experiments that may be run next on a machine with
     a controller; without it, or in torques, nothing is proposed.
 
+    The records are checked first. Where units, signs, columns, times or readings are doubted, the verdict is
+    `check-the-record`, and nothing is computed unless the options say so.
+
     Raises:
         TraceError, SpecError: for traces or options that cannot give an answer; one line says why.
         CancelledError: when asked to end.
@@ -37,12 +43,51 @@ def diagnose(
     options, cancel = options or DiagnosisOptions(), cancel or Never()
     check_options(options, model)
     _refuse_shared(traces, holdout)
+    progress(0.0, "checking the records")
+    found = check_records(model, (*traces, *holdout))
+    if doubts_in(found) and not options.despite_doubts:
+        return _doubted(model, traces, holdout, found)
+    answer = _computed(model, traces, holdout, options, progress, cancel, chooser)
+    doubted = {"verdict": "check-the-record"} if doubts_in(found) else {}
+    return with_sentences(answer.model_copy(update={"record": found, **doubted})) if found else answer
+
+
+def _computed(
+    model: Model,
+    traces: Sequence[Trace],
+    holdout: Sequence[Trace],
+    options: DiagnosisOptions,
+    progress: Progress,
+    cancel: Cancel,
+    chooser: ExperimentChooser | None,
+) -> Diagnosis:
+    """The answer of the method that suits, whatever is doubted."""
     designs = chooser is not None and chooser.search is not None
     if choose_method(model, (*traces, *holdout), options, designs=designs) == "inverse-dynamics":
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
-        return diagnose_torques(model, traces, holdout, options, progress, cancel)
+        whole, held = ([repaired(trace, model.machine) for trace in some] for some in (traces, holdout))
+        return diagnose_torques(model, whole, held, options, progress, cancel)
     return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser)
+
+
+def _doubted(
+    model: Model, traces: Sequence[Trace], holdout: Sequence[Trace], found: tuple[RecordFinding, ...]
+) -> Diagnosis:
+    """The answer to records that are to be checked first."""
+    answer = Diagnosis(
+        verdict="check-the-record",
+        summary=UNWRITTEN,
+        steps=(),
+        record=found,
+        model_before=model,
+        model_after=model,
+        traces=tuple(t.record.trace_id for t in traces),
+        holdout=tuple(t.record.trace_id for t in holdout),
+        seconds=0.0,
+        robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces if len(t))),
+    )
+    return with_sentences(answer)
 
 
 def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:

@@ -300,6 +300,15 @@ def inverse_dynamics(chain: ChainArrays, q: Array, velocity: Array, acceleration
 
 
 @compiled
+def inverse_dynamics_along(chain: ChainArrays, positions: Array, velocities: Array, accelerations: Array) -> Array:
+    """τ at every row of a motion, (k, n) each."""
+    found = np.empty_like(positions)
+    for k in range(positions.shape[0]):
+        found[k] = inverse_dynamics(chain, positions[k], velocities[k], accelerations[k])
+    return found
+
+
+@compiled
 def forward_dynamics(chain: ChainArrays, q: Array, velocity: Array, torque: Array) -> Array:
     """q̈ for given joint torques or forces, (n,); inf or nan where D(q) is singular."""
     table = _link_table(chain, q)

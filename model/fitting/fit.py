@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
+from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.finding import doubts_headline
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
@@ -57,13 +60,18 @@ def fit(
 
     This is an output-error fit: the model's own loop follows the recorded set points, and its readings are compared
     with the recorded ones. A first search weighs every sample by the sensor's noise. Then, in rounds, the mean effect
-    of the noise is subtracted, residual and Jacobian are whitened, and the search goes on from where it was.
+    of the noise is subtracted, residual and Jacobian are whitened, and the search goes on from where it was. The traces
+    are checked first: `record` of the result has what was found.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give a result; one line says why.
         CancelledError: when asked to end.
     """
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
+    record = check_records(model, traces)
+    require_computable(record)
+    if _loop(model, options) == "open":  # no controller has used the readings as they are
+        traces = [repaired(trace, model.machine) for trace in traces]
     problem = fit_problem(model, traces, options)
     coordinates = coordinates_of(problem.model, problem.unknowns, options)
     before = problem.evaluate(_starts(problem), derivatives=False)
@@ -90,7 +98,9 @@ def fit(
     progress(1.0, "done")
     solution = replace(solution, evaluations=evaluations)
     size = problem.floor if noise is None else np.maximum(noise.size, problem.floor)
-    return _result(model, problem, solution, estimate, before, size, options, time.perf_counter() - begun)
+    result = _result(model, problem, solution, estimate, before, size, options, time.perf_counter() - begun)
+    assert result.verdict is not None
+    return result.model_copy(update={"record": record, "verdict": result.verdict.doubted(doubts_headline(record))})
 
 
 def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> SimulatedProblem:
@@ -109,10 +119,14 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     if options.start_posture and signal == "position" and not simple:
         postures = start_postures(model.machine, records, any(use.name == BEND for use in wider.effects))
     forms = friction_forms(wider) if options.friction_form and not simple else ()
-    loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
+    loop = _loop(model, options)
     every = (*unknowns, *bends, *forms, *postures)
     floor = noise_floor(records, model.machine, signal)
     return SimulatedProblem(wider, records, every, floor, signal, loop, options.step)
+
+
+def _loop(model: Model, options: FitOptions) -> Literal["closed", "open"]:
+    return options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
 
 
 def _signal(model: Model, options: FitOptions) -> Signal:

@@ -18,6 +18,7 @@ from model.fitting.options import FitOptions
 from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
 from model.machine_model.record_verdict import RecordVerdict
+from model.record_check.finding import RecordFinding, doubts_headline
 
 RESULT_FORMAT = 1
 """Version of the file; a reader refuses newer ones."""
@@ -82,6 +83,8 @@ class FitResult(FrozenRecord):
     message: str
     on_the_edge: tuple[str, ...] = ()
     """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
+    record: tuple[RecordFinding, ...] = ()
+    """What the check of the traces found, before anything was fitted."""
 
     def __repr__(self) -> str:
         """One line; `print` shows the parameters, too."""
@@ -101,14 +104,17 @@ class FitResult(FrozenRecord):
 
     @property
     def said(self) -> list[str]:
-        """The verdict in words, and a doubt where there is one."""
+        """The verdict in words, and a doubt that is not in it."""
+        if self.verdict is not None and self.verdict.doubt:
+            return [self.verdict.text]
         verdict = [] if self.verdict is None else [self.verdict.text]
         return [*verdict, *([f"WARNING {self.doubt}"] if self.doubt else [])]
 
     @property
     def doubt(self) -> str:
-        """One line where the model ends much farther from the records than it began; empty where it does not."""
-        return doubt_of(self.errors)
+        """One line where the traces are to be checked first, or the model ends much farther from them than it began;
+        empty where neither is so."""
+        return doubts_headline(self.record) or doubt_of(self.errors)
 
     def parameter(self, name: str) -> FittedParameter:
         """The parameter of that name. Raises SpecError when it was not fitted."""

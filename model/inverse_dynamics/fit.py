@@ -35,6 +35,8 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
+from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.finding import RecordFinding, doubts_headline
 from model.units import joint_unit
 
 CUTOFF = 12.0
@@ -79,6 +81,8 @@ class TorqueFit(FrozenRecord):
     """Of these, joints of which a trace tells nothing for that reason."""
     on_the_edge: tuple[str, ...] = ()
     """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
+    record: tuple[RecordFinding, ...] = ()
+    """What the check of the traces found, before anything was fitted."""
 
     def __repr__(self) -> str:
         """One line; `print` shows the parameters, too."""
@@ -130,6 +134,9 @@ def fit_torques(
     """
     options, cancel = options or FitOptions(), cancel or Never()
     _check_effects(model)
+    record = check_records(model, (*traces, *held_out))
+    require_computable(record)
+    traces, held_out = ([repaired(trace, model.machine) for trace in some] for some in (traces, held_out))
     records_of([*traces, *held_out], model.machine, "position")
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
@@ -176,7 +183,7 @@ def fit_torques(
         parameters=parameters,
         identifiability=report,
         errors=tuple(error for error, _, _ in errors),
-        verdict=_verdict(fitted, traces, motions[: len(traces)], cutoff),
+        verdict=_verdict(fitted, traces, motions[: len(traces)], cutoff).doubted(doubts_headline(record)),
         in_sample=_share(errors[: len(traces)]),
         held_out=_share(errors[len(traces) :]) if held_out else None,
         cutoff=cutoff,
@@ -185,12 +192,13 @@ def fit_torques(
         at_limit=limits.shares,
         unknown_joints=limits.unknown,
         on_the_edge=on_the_edge(model, fitted, options),
+        record=record,
     )
 
 
 def torque_curves(model: Model, trace: Trace, cutoff: float = CUTOFF) -> TorqueCurves:
     """Recorded and residual torque along a trace, by a model. Raises TraceError and SpecError as `fit_torques` does."""
-    motion = recorded_motion(trace, model.machine, cutoff)
+    motion = recorded_motion(repaired(trace, model.machine), model.machine, cutoff)
     balance = TorqueBalance(model, (motion,))
     return TorqueCurves(
         trace.record.trace_id,

@@ -52,17 +52,6 @@ class JointNumbers(NamedTuple):
 
 
 @compiled
-def needed_torque(
-    chain: ChainArrays, position: NDArray[Any], speed: NDArray[Any], acceleration: NDArray[Any], out: NDArray[Any]
-) -> None:
-    """Torques (k, n) that a motion needs of motors and friction: D q̈ + H + G (3.40)."""
-    for k in range(position.shape[0]):
-        found = recursive.inverse_dynamics(chain, position[k], speed[k], acceleration[k])
-        for j in range(position.shape[1]):
-            out[k, j] = found[j]
-
-
-@compiled
 def friction_levels(
     chain: ChainArrays, position: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], out: NDArray[Any]
 ) -> None:

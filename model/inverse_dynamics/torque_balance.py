@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 from model import layout as at
 from model.arrays import Floats
 from model.drives.piecewise import EDGE
+from model.dynamics.recursive import inverse_dynamics_along
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
@@ -221,9 +222,7 @@ def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) 
 
 
 def _needed(chain: ChainArrays, motion: LinkMotion) -> Floats:
-    out = np.empty_like(motion.position)
-    kernel.needed_torque(chain, motion.position, motion.speed, motion.acceleration, out)
-    return out
+    return np.asarray(inverse_dynamics_along(chain, motion.position, motion.speed, motion.acceleration))
 
 
 def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:

@@ -26,6 +26,7 @@ from model.reports.diagnosis_words import Compared, compared
 from model.reports.gap import gap_section
 from model.reports.motion import motion_section
 from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed, trace_names
+from model.reports.record_section import record_sections
 
 VERDICTS = {
     "nothing-significant": "nothing significant",
@@ -33,6 +34,7 @@ VERDICTS = {
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
     "suspected": "suspected: more of this motion would settle it",
     "unknown-effect": "an effect that is not among the known ones",
+    "check-the-record": "the record is to be checked first",
 }
 LABELS = ("before", "after")
 """Labels of the models in the comparison that this report shows."""
@@ -56,6 +58,9 @@ def diagnosis_report(
     of = compared(found)
     doubts = [words for words, note in zip(found.notes, found.notes_data, strict=False) if note.warning]
     sections = [Section("Warnings", tuple(Text(words, "warning") for words in doubts))] if doubts else []
+    sections += record_sections(found.record)
+    if not found.computed:
+        return Report(capitalised(headline(found)), found.summary, _facts(found, files), tuple(sections))
     sections += [] if found.gap is None else [gap_section(found.gap)]
     stated = stated_numbers(found)
     for number in range(1, len(found.steps) + 1):

@@ -11,6 +11,7 @@ from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
 from model.reports.page import Cell, Report, Section, Table, effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
+from model.reports.record_section import record_sections
 
 
 def fit_report(
@@ -42,7 +43,12 @@ def fit_report(
         ("held out", listed(trace_names(held, files)) if held else "none"),
         ("search", f"{found.evaluations} evaluations in {found.seconds:.1f} s; {_ended(found)}"),
     )
-    return Report(f"Fit of {found.model.machine.title}", _answer(found, comparison), facts, tuple(sections))
+    return Report(
+        f"Fit of {found.model.machine.title}",
+        _answer(found, comparison),
+        facts,
+        (*record_sections(found.record), *sections),
+    )
 
 
 def _ended(found: FitResult) -> str:

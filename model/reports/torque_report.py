@@ -14,6 +14,7 @@ from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Report, Section, Table, Text, cells, effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
+from model.reports.record_section import record_sections
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +53,13 @@ def torque_report(
         ("held out", listed(trace_names(held, files)) if held else "none"),
         ("search", f"{found.evaluations} evaluations; {'converged' if found.converged else 'did not converge'}"),
     )
-    return Report(f"Fit of torques of {machine.title}", _answer(found), facts, sections, RESIDUAL)
+    return Report(
+        f"Fit of torques of {machine.title}",
+        _answer(found),
+        facts,
+        (*record_sections(found.record), *sections),
+        RESIDUAL,
+    )
 
 
 def _answer(found: TorqueFit) -> str:

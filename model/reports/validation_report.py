@@ -9,6 +9,7 @@ import numpy as np
 
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed, numbers
+from model.reports.record_section import record_sections
 from model.units import joint_unit, squared
 from model.validation.criterion import Curve, Fidelity
 from model.validation.variation import TimeDomain, Variation
@@ -51,7 +52,12 @@ def validation_report(
         ("Σλ²", f"{source.sum_of_contributions:.4f} with τ′ = â/(3√2), {three.sum_of_contributions:.4f} with τ′ = â/3"),
         ("damping ratio", f"{source.damping_ratio:g}, of the associate system"),
     )
-    return Report(f"Validation of {label} by distortion", _answer(source), facts, tuple(sections))
+    return Report(
+        f"Validation of {label} by distortion",
+        _answer(source),
+        facts,
+        (*record_sections(source.record), *sections),
+    )
 
 
 def _answer(source: Fidelity) -> str:

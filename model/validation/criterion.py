@@ -8,6 +8,7 @@ from typing import ClassVar
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from model.machine_model.record_verdict import RecordVerdict
+from model.record_check.finding import RecordFinding
 from model.validation.expected_deviation import Basis, Convention
 
 DAMPING_RATIO = 0.5
@@ -68,6 +69,8 @@ class Fidelity(FrozenRecord):
     curves: tuple[Curve, ...] = ()
     notes: tuple[str, ...] = ()
     verdict: RecordVerdict | None = None
+    record: tuple[RecordFinding, ...] = ()
+    """What the check of the traces found, before anything was computed."""
 
     @property
     def said(self) -> str:

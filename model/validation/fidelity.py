@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
+from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.finding import doubts_headline
 from model.simulation.prepared import Options
 from model.units import joint_unit
 from model.validation.criterion import (
@@ -76,6 +79,10 @@ def validate_by_distortion(
     if not names:
         raise SpecError("no parameters: name at least one that was fitted")
     required_deviation(1.0, damping_ratio)
+    record = check_records(model, traces)
+    require_computable(record)
+    if isinstance(model.machine.controller, NoController):
+        traces = [repaired(trace, model.machine) for trace in traces]
     error = squared_error(model, traces, names, outputs, options)
     varied = _varied(tuple(model.parameter(name) for name in names))
     share = 0.8 if curve_points else 1.0
@@ -98,11 +105,12 @@ def validate_by_distortion(
         damping_ratio=damping_ratio,
         error=least,
         error_by_joint=tuple(map(float, errors)),
-        verdict=_verdict(error, varied.best, errors),
+        verdict=_verdict(error, varied.best, errors).doubted(doubts_headline(record)),
         parameters=tuple(distortions),
         sum_of_contributions=math.fsum(d.contribution for d in distortions),
         curves=_curves(error, varied, distortions, curve_points, progress, cancel) if curve_points else (),
         notes=tuple(_notes(varied.parameters, doublings)),
+        record=record,
     )
 
 

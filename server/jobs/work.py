@@ -221,7 +221,7 @@ class _Worker:
             chooser=experiment_chooser(begin.machine, design=request.design),
         )
         comparison, given = None, None
-        controlled = not isinstance(begin.machine.controller, NoController)
+        controlled = found.computed and not isinstance(begin.machine.controller, NoController)
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
             comparison = self._compared(models, [*traces, *held], found.holdout, DIAGNOSIS_SHARE, MAP_SHARE)
@@ -231,7 +231,7 @@ class _Worker:
         changed = found.model_after.with_lineage(before.lineage).identity != before.identity
         if changed:
             self._keep_model(found.model_after)
-        efforts = recorded_and_predicted(found, [*traces, *held], found.holdout)
+        efforts = recorded_and_predicted(found, [*traces, *held], found.holdout) if found.computed else ()
         result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given, efforts))
         report = diagnosis_report(found, comparison, efforts=efforts)
         return self._done(result, report, headline(found), found.model_after if changed else None)

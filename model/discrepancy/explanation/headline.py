@@ -17,6 +17,7 @@ from model.discrepancy.explanation.renderer import (
 )
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
+from model.record_check.finding import doubts_headline
 
 SHOWN = 3
 """Members of a group that a headline names."""
@@ -25,6 +26,8 @@ SHOWN = 3
 def headline(found: Diagnosis) -> str:
     """The effects that were found, with joints and sizes; or that none was found, or none that is known; and joints
     that were not examined. A clause."""
+    if found.verdict == "check-the-record":
+        return doubts_headline(found.record)
     return "; ".join([_finding_of(found), *not_examined_words(found.not_examined)])
 
 

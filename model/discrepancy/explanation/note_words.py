@@ -32,18 +32,6 @@ def _drive_at_limit(v: Values) -> str:
     ) + (f"; a record tells nothing of joint {unknown}, which is not examined there" if unknown else "")
 
 
-def _drive_out_of_scale(v: Values) -> str:
-    def of(joint: Values) -> str:
-        stated = f" (its drive is stated in {joint['unit']})" if joint["unit"] else ""
-        return f"joint {joint['joint']} {plain(joint['ratio'])} times{stated}"
-
-    return (
-        f"recorded drives do not suit the motion: by the machine file they give {', '.join(map(of, v['joints']))} the "
-        "torque that the recorded motion needs. Check the unit of the drive, that positions are in rad or m and times "
-        "in s, and which column is which; or nearly all of it goes into friction that the file does not state"
-    )
-
-
 def _drive_timing(v: Values) -> str:
     late = ", ".join(f"{samples:.2g}" for samples in v["late"])
     return (
@@ -57,22 +45,6 @@ def _errors_follow_record(v: Values) -> str:
         "the gap and the sizes in reasons are of the closed loop; the map, and the errors by which held-out traces "
         "decide, are of a simulation whose controller is given the simulated reading moved "
         f"{v['share']:g} of the way to the recorded one"
-    )
-
-
-def _gravity_magnitude(v: Values) -> str:
-    return (
-        f"the machine file's gravity is {v['magnitude']:.4g} m/s² and not 9.81 m/s², as on the ground: it is stated in "
-        "m/s², along the axes of the base"
-    )
-
-
-def _gravity_reversed(v: Values) -> str:
-    stated = ", ".join(f"{g:.4g}" for g in v["gravity"])
-    return (
-        f"the machine file's gravity, [{stated}] m/s², points the other way than these records say: turned round, it "
-        f"takes {v['removed']:.0%} off the mean square of what the model as given leaves. Check `gravity`, the posture "
-        "in which positions are 0, their direction, and the sign of the drive"
     )
 
 
@@ -249,11 +221,8 @@ def _rounded(value: float, unit: str) -> str:
 WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
     "drive-at-limit": _drive_at_limit,
-    "drive-out-of-scale": _drive_out_of_scale,
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
-    "gravity-magnitude": _gravity_magnitude,
-    "gravity-reversed": _gravity_reversed,
     "larger-noise": _larger_noise,
     "names-excluded": _names_excluded,
     "no-experiment-left": _no_experiment_left,

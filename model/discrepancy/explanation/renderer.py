@@ -37,6 +37,7 @@ from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
 from model.discrepancy.numbers import from_to, plain
 from model.effects.names import capitalised, effect_on, joints_in_words, placed
+from model.record_check.finding import doubts_in, lines_of
 from model.units import shown_unit, with_unit
 
 NOTICEABLE = 0.98
@@ -211,6 +212,8 @@ def not_examined_words(joints: Sequence[int]) -> list[str]:
 def _summary_of(answer: Diagnosis) -> str:
     adopted = [s for s in answer.steps if s.adopted]
     match answer.verdict:
+        case "check-the-record":
+            return " ".join(lines_of(doubts_in(answer.record)))
         case "nothing-significant" if answer.examined_nothing:
             return "The traces say nothing of the model."
         case "nothing-significant":

@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.likelihood import stretches_of
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.record_check.check import repaired
 
 
 def recorded_and_predicted(
@@ -34,7 +35,8 @@ def recorded_and_predicted(
     cutoffs = [float(note.values["cutoff"]) for note in found.notes_data if note.kind == "cutoff"]
     if found.method != "inverse-dynamics" or not cutoffs:
         return ()
-    return tuple(_efforts(found, trace, cutoffs[0], trace.record.trace_id in held_out) for trace in traces)
+    whole = [repaired(trace, found.model_before.machine) for trace in traces]
+    return tuple(_efforts(found, trace, cutoffs[0], trace.record.trace_id in held_out) for trace in whole)
 
 
 def _efforts(found: Diagnosis, trace: Trace, cutoff: float, is_held_out: bool) -> TraceSignals:

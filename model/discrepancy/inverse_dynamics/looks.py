@@ -14,7 +14,6 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis, Step
 from model.discrepancy.explanation.notes import on_unfinished
-from model.discrepancy.gravity_doubts import on_gravity_along
 from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
@@ -23,7 +22,6 @@ from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import REPEATING
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
-from model.discrepancy.scale_doubts import on_scale
 from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
@@ -218,10 +216,8 @@ class Records:
         )
         steps = TorqueWorkflow(model, case, self.controller, progress, self.cancel)
         steps.run()
-        steps.notes += on_gravity_along(model, records)
         steps.notes += on_unfinished((*self.traces, *self.held_out))
         steps.notes += self._on_shaking()
-        steps.notes += on_scale(model, records) or on_scale(model, case.held_out)
         return Look(steps, self, cutoff)
 
     def _on_shaking(self) -> tuple[Note, ...]:

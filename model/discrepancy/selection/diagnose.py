@@ -21,7 +21,6 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalE
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
-from model.discrepancy.gravity_doubts import on_gravity
 from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.localisation.structure import joints_with_structure
@@ -281,7 +280,6 @@ def _answer(
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
         *note_on_noise(end.observation, case.scoring.rms(case.scoring.residuals(end)), noisy),
-        *on_gravity(case.model, case.traces),
         *on_unfinished((*case.traces, *case.held_traces)),
         *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *asked.notes,

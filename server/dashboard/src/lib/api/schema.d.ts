@@ -2393,7 +2393,7 @@ export interface components {
              * Verdict
              * @enum {string}
              */
-            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect";
+            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect" | "check-the-record";
             /** Summary */
             summary: string;
             /** Significant */
@@ -2473,6 +2473,11 @@ export interface components {
              * @default []
              */
             worse_held_out?: number[];
+            /**
+             * Record
+             * @default []
+             */
+            record?: components["schemas"]["RecordFinding"][];
             /**
              * Not Examined
              * @default []
@@ -2945,6 +2950,11 @@ export interface components {
              */
             notes?: string[];
             verdict?: components["schemas"]["RecordVerdict"] | null;
+            /**
+             * Record
+             * @default []
+             */
+            record?: components["schemas"]["RecordFinding"][];
         };
         /**
          * FieldProblem
@@ -3000,6 +3010,11 @@ export interface components {
              * @default []
              */
             on_the_edge?: string[];
+            /**
+             * Record
+             * @default []
+             */
+            record?: components["schemas"]["RecordFinding"][];
             /** Models */
             models: components["schemas"]["ModelAgreement"][];
             /** Signals */
@@ -4536,7 +4551,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "drive-out-of-scale" | "drive-timing" | "errors-follow-record" | "gravity-magnitude" | "gravity-reversed" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
             /**
              * Values
              * @default {}
@@ -5314,6 +5329,59 @@ export interface components {
             far: components["schemas"]["FarNumber"][];
             /** Text */
             text: string;
+         * RecordFinding
+         * @description One thing that a record, or the machine file beside it, says and that cannot be, or should be known.
+         *
+         *     Args:
+         *         record: what the record is called; empty where the finding is of the machine file. joint: from 1; None: of all.
+         *         times: s of the record's own clock, the first of `count`. value, allowed: as measured, and the most (or the
+         *             value) that was expected, in `unit`.
+         *         says, advice: a sentence each.
+         */
+        RecordFinding: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            /**
+             * Consequence
+             * @enum {string}
+             */
+            consequence: "fatal" | "doubt" | "note";
+            /**
+             * Record
+             * @default
+             */
+            record?: string;
+            /** Joint */
+            joint?: number | null;
+            /**
+             * Times
+             * @default []
+             */
+            times?: number[];
+            /**
+             * Count
+             * @default 0
+             */
+            count?: number;
+            /** Value */
+            value?: number | null;
+            /** Allowed */
+            allowed?: number | null;
+            /**
+             * Unit
+             * @default
+             */
+            unit?: string;
+            /** Says */
+            says: string;
+            /**
+             * Advice
+             * @default
+             */
+            advice?: string;
         };
         /**
          * RecordedPath

@@ -31,6 +31,7 @@ const TONES: Record<Verdict, Tone> = {
   ambiguous: 'warn',
   suspected: 'warn',
   'unknown-effect': 'bad',
+  'check-the-record': 'bad',
 };
 
 /** The tone of a verdict; nothing found is no good news of joints that could not be examined. */

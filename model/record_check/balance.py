@@ -1,0 +1,267 @@
+"""Torques as a witness: do drive and motion belong together as they stand, or as they would in other units?
+
+Whatever rubs against the motion is left free, since few files state it; what an effect of the arm adds beside that is
+small beside a wrong unit, a wrong sign, or a wrong column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from daq.contracts.trace import Trace
+from model import layout as at
+from model.arrays import Floats
+from model.dynamics.recursive import gravity_along, inverse_dynamics_along
+from model.machine_model.model import Model
+from model.record_check.law import DEGREE
+from model.record_check.readings import noise_of
+from model.simulation.chain_of_model import chain_of
+
+ORDER = 3
+"""Degree of the polynomials that smooth a motion."""
+NARROWEST, WIDEST = 5, 401
+"""Samples of the smoothing."""
+NOISE_SHARE = 0.1
+"""Most noise of an acceleration, as a share of its root mean square."""
+SLOWER = 3
+"""Smoothing beside the narrowest that noise allows: gears that give, and play, shake faster than a rigid arm moves."""
+MOST_ROWS = 4000
+"""Samples of a record that are balanced: enough to tell halves from wholes."""
+UNLIKE = 0.5
+"""Share of the torque (root mean squares) that is left, from which drive and motion do not belong together. Of 800
+records of sound rigs and of rigs with hidden effects none left as much."""
+EXPLAINS = 0.25
+"""Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
+CLEAR = 5.0
+"""Deviations of an estimate from which it is clear, however its noise goes on from sample to sample."""
+MOST_FRICTION = 5.0
+"""Most torque that a drive gives, in torques that weight and inertia need: sound rigs have up to 4.6."""
+TURNED = 0.75
+"""Least share of twice the torque of gravity in what is left, from which gravity counts as turned round. A balance
+spring that carries the whole arm comes to 0.5."""
+LEAST_REMOVED = 0.5
+"""Least share of the mean square that turning gravity round takes off."""
+LEAST_TORQUE = 0.1
+"""Least torque of gravity on any joint, as a share of the drive's, from which records tell its direction."""
+OUT_OF_SCALE = 100.0
+"""Ratio of the torque that a drive gives to that which its motion needs, or its inverse, from which it is of another
+unit: mA for A make it a thousand, and sound rigs 0.6 to 4.6 times what is needed."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is balanced: position and drive (k, n) of the modelled joints, and s between samples.
+
+    speed: (k, n) where sensors measure it, and position is its integral.
+    """
+
+    position: Floats
+    drive: Floats
+    period: float
+    step: Floats
+    speed: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Mean squares by joint (n,): torque that is left, of the drive, that the motion needs, and the sum of those of
+    its parts, weight and inertia, which may cancel."""
+
+    left: Floats
+    given: Floats
+    needed: Floats
+    parts: Floats
+    turned: float
+    """Share of what is left that gravity takes off where it is turned round, if it is that which is left; else 0."""
+    behind: Floats
+    """(n,) samples that the drive comes behind the motion that it makes; 0 where that is not clear. A drive that is
+    held until the next sample comes half of one before."""
+
+    @property
+    def shares(self) -> Floats:
+        """(n,) of the larger of both torques, the mean square that is left; 0 where there is neither."""
+        whole = np.maximum(self.given, self.needed)
+        return np.asarray(np.where(whole > 0.0, self.left / np.where(whole > 0.0, whole, 1.0), 0.0))
+
+
+def motion_of(trace: Trace, model: Model) -> Motion | None:
+    """The motion of a trace; None without drives, or where it has gaps too long to be bridged."""
+    machine = model.machine
+    if trace.drive is None or len(trace) < 2 * NARROWEST:
+        return None
+    columns = [trace.column(j) for j in machine.modelled_joints]
+    period = float(np.median(np.diff(trace.time)))
+    time = np.arange(trace.time[0], trace.time[-1] + 0.5 * period, period)[: 20 * MOST_ROWS]
+    sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
+    step = np.array([0.0 if s is None else s.range.value / 2**s.bits for s in sensors])
+
+    def even(signal: Floats) -> Floats:
+        return np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)
+
+    by_speed = trace.velocity is not None and any(s is not None and s.measures == "velocity" for s in sensors)
+    speed = even(trace.velocity) if by_speed and trace.velocity is not None else None
+    return Motion(even(trace.position), even(trace.drive), period, step, speed)
+
+
+def balance(model: Model, motion: Motion) -> Balance | None:
+    """The balance of a motion; None where nothing of it moves beyond the noise of its readings."""
+    width = _width(motion)
+    if width is None:
+        return None
+    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
+    rows = slice(width // 2, len(motion.position) - width // 2, max(1, len(motion.position) // MOST_ROWS))
+
+    def smooth(signal: Floats, order: int) -> Floats:
+        whole = savgol_filter(signal, width, ORDER, deriv=order, delta=motion.period, axis=0)
+        return np.ascontiguousarray(whole[rows])
+
+    source, shift = (motion.position, 0) if motion.speed is None else (motion.speed, 1)
+    position, speed = smooth(motion.position, 0), smooth(source, 1 - shift)
+    acceleration, drive = smooth(source, 2 - shift), smooth(motion.drive, 0)
+    gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
+    given = gain * drive
+    chain = chain_of(model)
+    needed = inverse_dynamics_along(chain, position, speed, acceleration)
+    braked = needed + gain * joints[:, at.GEAR] * joints[:, at.BACK_EMF] * speed
+    rate = smooth(motion.drive, 1) * gain * motion.period
+    found = [_left(given[:, j] - braked[:, j], speed[:, j], rate[:, j], width) for j in range(given.shape[1])]
+    left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
+    weight = gravity_along(chain, position)
+    parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
+    size, needs = (np.mean(torque**2, axis=0) for torque in (given, braked))
+    return Balance(left, size, needs, parts, _gravity_turned(given, braked, weight), behind)
+
+
+def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:
+    """The one of `ways` (keys of WAYS) to read the columns of a joint (its place; None: of all) that explains most of a
+    balance which does not hold as recorded; None where it holds, or none explains it."""
+    found = balance(model, motion)
+    if found is None:
+        return None
+    whole = _total(found, joint)
+    if not whole > UNLIKE**2:
+        return None
+    left = {way: _believable(balance(model, changed), joint) for way, changed in _changed(motion, joint, ways)}
+    best = min(left, key=lambda way: left[way], default=None)
+    return best if best is not None and left[best] < EXPLAINS * whole else None
+
+
+def _total(found: Balance | None, joint: int | None) -> float:
+    if found is None:
+        return np.inf
+    shares = found.shares
+    return float(shares.mean() if joint is None else shares[joint])
+
+
+def _believable(found: Balance | None, joint: int | None) -> float:
+    """The same of another way to read a record; infinite where nearly all of the drive would go into friction, which
+    any drive along the motion may."""
+    if found is None:
+        return np.inf
+    given, needed = (float(np.sum(one if joint is None else one[joint])) for one in (found.given, found.needed))
+    return np.inf if given > MOST_FRICTION**2 * needed else _total(found, joint)
+
+
+def _changed(motion: Motion, joint: int | None, ways: Sequence[str]) -> Iterator[tuple[str, Motion]]:
+    columns = list(range(motion.position.shape[1])) if joint is None else [joint]
+    for way in ways:
+        yield way, WAYS[way](motion, columns)
+
+
+def _scaled(signal: str, factor: float) -> Callable[[Motion, list[int]], Motion]:
+    def changed(motion: Motion, columns: list[int]) -> Motion:
+        whole = getattr(motion, signal)
+        if whole is None:
+            return motion
+        whole = whole.copy()
+        whole[:, columns] *= factor
+        return replace(motion, **{signal: whole})
+
+    return changed
+
+
+def _degrees(motion: Motion, columns: list[int]) -> Motion:
+    return _scaled("position", DEGREE)(_scaled("speed", DEGREE)(motion, columns), columns)
+
+
+def _slower(factor: float) -> Callable[[Motion, list[int]], Motion]:
+    return lambda motion, _columns: replace(motion, period=factor * motion.period)
+
+
+def _exchanged(motion: Motion, columns: list[int]) -> Motion:
+    position, drive = motion.position.copy(), motion.drive.copy()
+    position[:, columns], drive[:, columns] = motion.drive[:, columns], motion.position[:, columns]
+    return replace(motion, position=position, drive=drive, speed=None)
+
+
+WAYS: dict[str, Callable[[Motion, list[int]], Motion]] = {
+    "degrees": _degrees,
+    "thousandths": _scaled("drive", 1e-3),
+    "thousands": _scaled("drive", 1e3),
+    "drive-sign": _scaled("drive", -1.0),
+    "milliseconds": _slower(1e-3),
+    "half-times": _slower(0.5),
+    "double-times": _slower(2.0),
+    "position-drive": _exchanged,
+}
+"""Ways to read a record, or its machine file, otherwise than it stands."""
+OF_ALL = frozenset(["milliseconds", "half-times", "double-times"])
+"""Ways that are of the whole record."""
+
+
+def _gravity_turned(given: Floats, needed: Floats, weight: Floats) -> float:
+    """Share of the mean square that turning gravity round takes off; 0 where it is not that which is left."""
+    sizes = np.sqrt(np.mean(given**2, axis=0))
+    if not (sizes > 0.0).all():
+        return 0.0
+    left, change = (needed - given) / sizes, -2.0 * weight / sizes
+    if not np.mean(change**2, axis=0).max() > (2 * LEAST_TORQUE) ** 2:
+        return 0.0
+    share = -float(np.sum(left * change) / np.sum(change**2))
+    removed = 1.0 - float(np.sum((left + change) ** 2) / np.sum(left**2))
+    return removed if share > TURNED and removed > LEAST_REMOVED else 0.0
+
+
+def _left(torque: Floats, speed: Floats, rate: Floats, width: int) -> tuple[float, float]:
+    """Mean square of a torque (k,) that a constant, and friction of any size against the motion, leave; and the samples
+    that the drive comes behind.
+
+    Args:
+        rate: (k,) of the drive's torque, a sample. width: samples over which they are smoothed, of which one counts.
+    """
+    size = float(np.sqrt(np.mean(speed**2)))
+    if size == 0.0:
+        return float(np.var(torque)), 0.0
+    along = speed / size
+    columns = np.column_stack([np.tanh(along / 0.05), along])
+    columns -= columns.mean(axis=0)
+    level = torque - torque.mean()
+    left = float(nnls(columns, level)[1] ** 2 / len(torque))
+    columns = np.column_stack([columns, rate - rate.mean()])
+    line, _, rank, _ = np.linalg.lstsq(columns, level, rcond=None)
+    if rank < columns.shape[1]:
+        return left, 0.0
+    spread = float(np.mean((level - columns @ line) ** 2)) * width
+    deviation = float(np.sqrt(spread * np.linalg.inv(columns.T @ columns)[2, 2]))
+    return left, float(-line[2]) if abs(line[2]) > CLEAR * deviation else 0.0
+
+
+def _width(motion: Motion) -> int | None:
+    """The narrowest smoothing, in samples, that leaves accelerations little noise on every joint that moves."""
+    order = 2 if motion.speed is None else 1
+    source = motion.position if motion.speed is None else motion.speed
+    noise = np.array([noise_of(source[:, j], motion.step[j] if order == 2 else 0.0) for j in range(source.shape[1])])
+    width = NARROWEST
+    while width <= min(WIDEST, len(source) // 4):
+        weight = float(np.linalg.norm(savgol_coeffs(width, ORDER, deriv=order)))
+        size = np.sqrt(np.mean(savgol_filter(source, width, ORDER, deriv=order, axis=0) ** 2, axis=0))
+        moving = size > 3 * weight * noise
+        if moving.any() and (weight * noise[moving] < NOISE_SHARE * size[moving]).all():
+            return min(SLOWER * width, (len(source) // 4) | 1)
+        width = 2 * (width * 5 // 8) + 1 if width > NARROWEST else 7
+    return None

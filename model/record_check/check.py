@@ -1,0 +1,276 @@
+"""The check of a record before anything is computed from it: what it says that cannot be, and where.
+
+Physical and statistical statements alone: a finite torque makes no jump, a controller's drive follows from its set
+point and position, drive and motion balance in the units that are stated. None knows an effect of an arm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import Machine, NoController
+from daq.contracts.trace import Trace
+from model.arrays import Floats
+from model.machine_model.model import Model
+from model.record_check.columns import column_findings
+from model.record_check.finding import FindingKind, RecordFinding
+from model.record_check.readings import (
+    FalseReadings,
+    Jump,
+    find_gaps,
+    find_jumps,
+    is_bridged,
+    noise_of,
+    sort_jumps,
+    unwrapped,
+)
+from model.record_check.words import at_times, number, times_of
+
+ON_EARTH = (9.76, 9.84)
+"""Least and largest gravity on the ground, m/s²: on a mountain at the equator, and at a pole, rounded outwards."""
+WITHIN_NOISE = 3.0
+"""Times its noise that a model may leave of a record and still explain it: spikes that alone leave more are no note."""
+MOST_KEPT = 100
+"""Times that a finding holds: a page need not have more."""
+WILD_SHARE = 0.5
+"""Distance between set point and position, as a share of the largest travel of any joint, that no controller leaves for
+half of a record. A joint that is held may sag by more than its own travel."""
+
+
+def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding, ...]:
+    """What is wrong with records, or with the machine file beside them, or should be known; empty where all is well.
+
+    Args:
+        model: of the machine that made them. traces: as they were read.
+    """
+    found = list(_on_machine(model.machine, traces))
+    for trace in traces:
+        if len(trace) >= 3 and all(j in trace.joints for j in model.machine.modelled_joints):
+            readings = list(_on_readings(trace, model.machine))
+            found += readings
+            found += column_findings(repaired(trace, model.machine), model)
+    return tuple(found)
+
+
+def repaired(trace: Trace, machine: Machine) -> Trace:
+    """The trace with whole turns added behind each wrap of its encoders, and spikes replaced by what lies beside them;
+    the same trace where there are none.
+
+    It is for torques along the motion alone: a controller in a simulated loop has used the readings as they were.
+    """
+    position = trace.position
+    for joint in machine.modelled_joints:
+        column, found = trace.column(joint), false_readings(trace, machine, joint)
+        if measures_speed(machine, joint) or not (found.wraps or found.spikes):
+            continue
+        if position is trace.position:
+            position = position.copy()
+        whole = unwrapped(position[:, column], found.wraps, turns_of(machine, joint))
+        position[:, column] = _without_spikes(whole, found)
+    return trace if position is trace.position else replace(trace, position=position)
+
+
+def require_computable(findings: Sequence[RecordFinding]) -> None:
+    """Raises TraceError with one line for the first finding from which nothing can be computed."""
+    for finding in findings:
+        if finding.consequence == "fatal":
+            raise TraceError(finding.line)
+
+
+def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
+    """The jumps in what a joint's sensor measures."""
+    by_speed = measures_speed(machine, joint)
+    source = trace.velocity if by_speed and trace.velocity is not None else trace.position
+    reading = source[:, trace.column(joint)]
+    jumps = find_jumps(trace.time, reading, 0.0 if by_speed else _step(machine, joint))
+    return sort_jumps(reading, jumps, () if by_speed else turns_of(machine, joint))
+
+
+def measures_speed(machine: Machine, joint: int) -> bool:
+    """Whether a joint's sensor is a tachometer."""
+    sensor = machine.joint(joint).sensor
+    return sensor is not None and sensor.measures == "velocity"
+
+
+def turns_of(machine: Machine, joint: int) -> tuple[float, ...]:
+    """Whole turns of a joint and of its sensor, rad (m), by which a reading may wrap."""
+    own = machine.joint(joint)
+    sensor = () if own.sensor is None or own.sensor.measures != "position" else (own.sensor.range.value,)
+    return (*((2 * math.pi,) if own.kind == "revolute" else ()), *sensor)
+
+
+def _step(machine: Machine, joint: int) -> float:
+    sensor = machine.joint(joint).sensor
+    return 0.0 if sensor is None else sensor.range.value / 2**sensor.bits
+
+
+def _without_spikes(reading: Floats, found: FalseReadings) -> Floats:
+    rows = np.arange(len(reading))
+    false = np.zeros(len(reading), dtype=bool)
+    for spike in found.spikes:
+        false[spike.row + 1 : spike.back + 1] = True
+    return np.interp(rows, rows[~false], reading[~false])
+
+
+def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFinding]:
+    magnitude = math.hypot(*machine.gravity)
+    if magnitude != 0.0 and not ON_EARTH[0] <= magnitude <= ON_EARTH[1]:
+        yield RecordFinding(
+            kind="gravity-magnitude",
+            consequence="note",
+            value=magnitude,
+            allowed=9.81,
+            unit="m/s²",
+            says=f"the machine file's gravity is {magnitude:.4g} m/s² and not 9.81 m/s², as on the ground.",
+            advice="State it in m/s², along the axes of the base.",
+        )
+    for joint in machine.modelled_joints:
+        if machine.joint(joint).sensor is None and all(joint in trace.joints for trace in traces):
+            sizes = [noise_of(trace.position[:, trace.column(joint)], 0.0) for trace in traces if len(trace) > 2]
+            unit = machine.joint(joint).units.position
+            size = float(np.median(sizes)) if sizes else 0.0
+            yield RecordFinding(
+                kind="no-sensor",
+                consequence="note",
+                joint=joint,
+                value=size,
+                unit=unit,
+                says=f"the machine file states no `sensor`: its noise is taken from the record, {number(size)} {unit}.",
+                advice=f"State `sensor` under joint {joint} to have it known.",
+            )
+
+
+def _on_readings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
+    yield from _on_gaps(trace)
+    for joint in machine.modelled_joints:
+        yield from _on_jumps(trace, machine, joint)
+    yield from _on_units(trace, machine)
+
+
+def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:
+    gaps = find_gaps(trace.time)
+    if not gaps:
+        return
+    usual = float(np.median(np.diff(trace.time)))
+    long = [gap for gap in gaps if not is_bridged(gap[1], usual)]
+    shown = long or gaps
+    longest = max(length for _, length in shown)
+    starts = [float(trace.time[row]) for row, _ in shown]
+    yield RecordFinding(
+        kind="gap",
+        consequence="doubt" if long else "note",
+        record=trace.called,
+        times=tuple(starts[:MOST_KEPT]),
+        count=len(shown),
+        value=longest,
+        allowed=usual,
+        unit="s",
+        says=f"{times_of(len(shown), 'gap')} {at_times(starts)}, the longest of {number(longest)} s, where samples are "
+        f"{number(usual)} s apart.",
+        advice="Use a piece without any: what moved the joints meanwhile is not known." if long else "",
+    )
+
+
+def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
+    found = false_readings(trace, machine, joint)
+    told = _Jumps(trace, joint, machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else ""))
+    driven = not isinstance(machine.controller, NoController)
+    if found.wraps:
+        advice = "Unwrap the encoder before the controller, or in the file." if driven else "It is unwrapped."
+        says = f"its reading jumps by a whole turn {told.place(found.wraps)}."
+        yield told.finding("wraps", found.wraps, says, advice, doubt=driven)
+    if found.spikes:
+        noise = noise_of(trace.position[:, trace.column(joint)], _step(machine, joint))
+        alone = math.sqrt(sum(jump.size**2 for jump in found.spikes) / len(trace))
+        doubt = measures_speed(machine, joint) or alone > WITHIN_NOISE * noise
+        says = f"{times_of(len(found.spikes), 'spike')} {told.place(found.spikes)}, of {told.size(found.spikes)}."
+        yield told.finding("spikes", found.spikes, says, "Look for lost bytes or a loose connector.", doubt=doubt)
+    if found.others:
+        says = f"its reading jumps {told.place(found.others)}, by {told.size(found.others)}."
+        advice = "Were samples cut out, did the encoder slip, or was it set to zero? Use a piece without."
+        yield told.finding("jump", found.others, says, advice)
+    for since, jump in found.stuck:
+        begin, end = float(trace.time[since]), float(trace.time[jump.row])
+        says = (
+            f"its reading stands still from {begin:.2f} to {end:.2f} s ({number(end - begin)} s), then jumps by "
+            f"{number(abs(jump.size))} {told.unit}."
+        )
+        advice = "The sensor or its line was stuck: use a piece without."
+        yield told.finding("stuck", [replace(jump, row=since - 1)], says, advice)
+
+
+@dataclass(frozen=True)
+class _Jumps:
+    """Findings of jumps in the readings of one joint, in `unit`."""
+
+    trace: Trace
+    joint: int
+    unit: str
+
+    def times(self, jumps: Sequence[Jump]) -> list[float]:
+        """s, of the first false sample of each."""
+        return [float(self.trace.time[jump.row + 1]) for jump in jumps]
+
+    def place(self, jumps: Sequence[Jump]) -> str:
+        """When they are, in words."""
+        return at_times(self.times(jumps))
+
+    def size(self, jumps: Sequence[Jump]) -> str:
+        """How large they are, in words."""
+        largest, usual = max(abs(jump.size) for jump in jumps), jumps[0].usual
+        return f"{number(largest)} {self.unit} at most, where {number(usual)} {self.unit} can be noise or motion"
+
+    def finding(
+        self, kind: FindingKind, jumps: Sequence[Jump], says: str, advice: str, *, doubt: bool = True
+    ) -> RecordFinding:
+        """The finding of jumps of one kind."""
+        return RecordFinding(
+            kind=kind,
+            consequence="doubt" if doubt else "note",
+            record=self.trace.called,
+            joint=self.joint,
+            times=tuple(self.times(jumps)[:MOST_KEPT]),
+            count=len(jumps),
+            value=max(abs(jump.size) for jump in jumps),
+            allowed=jumps[0].usual,
+            unit=self.unit,
+            says=says,
+            advice=advice,
+        )
+
+
+def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
+    """Set points and positions in different units: they differ by a factor or an offset throughout.
+
+    What counts is the travel of the record's motion, whatever an encoder's count is.
+    """
+    if trace.set_point is None or not np.ptp(trace.set_point, axis=0).any():
+        return  # nothing is asked for, so nothing says how far it should have gone
+    kinds = {j: machine.joint(j).kind for j in machine.modelled_joints}
+    signals = (trace.set_point, trace.position)
+    travels = {j: max(float(np.ptp(s[:, trace.column(j)])) for s in signals) for j in kinds}
+    for joint, kind in kinds.items():
+        if measures_speed(machine, joint):
+            continue
+        column = trace.column(joint)
+        apart = float(np.median(np.abs(trace.set_point[:, column] - trace.position[:, column])))
+        most = WILD_SHARE * max(travels[j] for j in kinds if kinds[j] == kind)
+        if apart > most:
+            larger = float(np.abs(trace.set_point[:, column]).max()), float(np.abs(trace.position[:, column]).max())
+            unit = machine.joint(joint).units.position
+            yield RecordFinding(
+                kind="units-differ",
+                consequence="fatal",
+                record=trace.called,
+                joint=joint,
+                value=apart,
+                allowed=most,
+                unit=unit,
+                says=f"set points (to {larger[0]:.4g}) and positions (to {larger[1]:.4g}) are {apart:.3g} {unit} apart "
+                f"throughout; both must be in {unit} from the same zero.",
+            )

@@ -1,0 +1,311 @@
+"""Units, signs, columns and times of a record, by two witnesses: the controller's law, and the balance of torques."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.contracts.machine import NoController
+from daq.contracts.trace import Trace
+from model.machine_model.model import Model
+from model.record_check.balance import (
+    LEAST_REMOVED,
+    OF_ALL,
+    OUT_OF_SCALE,
+    UNLIKE,
+    WAYS,
+    Motion,
+    balance,
+    likelier,
+    motion_of,
+)
+from model.record_check.finding import FindingKind, RecordFinding
+from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
+from model.record_check.law import Reading as ColumnReading
+from model.record_check.words import CHECK_COLUMNS, number
+
+FACTOR_OF_UNIT = 1.2
+"""Ratio within which a factor is that of another unit: gains and motors are hardly off by more."""
+FACTOR_OF_GAIN = 3.0
+"""Most by which gains are off; a drive further from what they make is in another unit, or they are."""
+OTHER_PERIOD = 0.05
+"""Relative distance between the interval of samples and the controller's period, from which they differ."""
+BEHIND = 0.25
+"""Samples by which a drive comes behind its motion, from which it is said: half of one is how it is formed."""
+LEADS = 1.5
+"""Samples by which a position leads its set point, from which one stands for the other: none moves before it is
+asked."""
+FOLLOWS = 0.3
+"""Least correlation of set point less position with the speed, for a lead to be told."""
+
+
+def column_findings(trace: Trace, model: Model) -> tuple[RecordFinding, ...]:
+    """What is said of a record's columns and times; empty where they are as the machine file has them."""
+    return tuple(_Witnesses(trace, model).findings())
+
+
+@dataclass(frozen=True)
+class _Witnesses:
+    trace: Trace
+    model: Model
+
+    def findings(self) -> Iterator[RecordFinding]:
+        machine = self.model.machine
+        joints = machine.modelled_joints
+        motion = motion_of(self.trace, self.model)
+        laws = {joint: fits_of(self.trace, machine, joint) for joint in joints}
+        known = {joint: best_fit(fits) for joint, fits in laws.items()}
+        told: set[int] = set()
+        for joint, fit in known.items():
+            found = self._without_drive(joint, motion) or (None if fit is None else self._by_law(joint, fit, motion))
+            if found is not None:
+                told.add(joint)
+                yield found
+        holds = all(fit is not None for fit in known.values()) and not told
+        time = self._on_times(holds=holds)
+        if time is not None:
+            yield time
+        if time is None or time.consequence == "note":
+            yield from self._by_balance(motion, told, holds=holds)
+
+    # ---- the drive that is not there
+
+    def _without_drive(self, joint: int, motion: Motion | None) -> RecordFinding | None:
+        """A drive that is 0 throughout, although the controller or the motion needs one."""
+        if self.trace.drive is None or self.trace.drive[:, self.trace.column(joint)].any():
+            return None
+        if self._asked_of_controller(joint) or self._needs_drive(joint, motion):
+            return self._doubt("drive-zero", joint, "its drive is 0 throughout, although it is driven.", CHECK_COLUMNS)
+        says = "its drive is 0 throughout: it is taken to swing by itself."
+        return self._doubt("drive-zero", joint, says, CHECK_COLUMNS, sure=False)
+
+    def _asked_of_controller(self, joint: int) -> bool:
+        trace, column = self.trace, self.trace.column(joint)
+        if isinstance(self.model.machine.controller, NoController) or trace.set_point is None:
+            return False
+        reading = ColumnReading(trace.position[:, column], trace.set_point[:, column])
+        formed = formed_drive(trace, self.model.machine, joint, reading)
+        return formed is not None and bool(np.ptp(trace.set_point[:, column])) and bool(formed.any())
+
+    def _needs_drive(self, joint: int, motion: Motion | None) -> bool:
+        """Whether the motion needs a torque that is not a small part of what carries and accelerates it: a joint that
+        only swings needs none."""
+        found = None if motion is None else balance(self.model, motion)
+        if found is None:
+            return False
+        place = self.model.machine.modelled_joints.index(joint)
+        return bool(found.left[place] > UNLIKE**2 * found.parts[place])
+
+    # ---- the controller's law
+
+    def _by_law(self, joint: int, fit: LawFit, motion: Motion | None) -> RecordFinding | None:
+        reading, factor = fit.reading, fit.factor
+        in_degrees = reading.turned or ("positions and set points" if _near(factor, DEGREE) else "")
+        if in_degrees:
+            says = f"its {in_degrees} are in degrees: the controller's drive then follows from them."
+            return self._doubt("position-unit", joint, says, "Convert them to rad.", value=1 / DEGREE, allowed=1.0)
+        if reading.swapped or (factor < 0.0 and self._drives_motion(joint, motion)):
+            says = "position and set point are exchanged: the controller drives the other way round."
+            return self._doubt("columns-swapped", joint, says, CHECK_COLUMNS)
+        if factor < 0.0:
+            says = "its drive has the other sign: it goes against what the controller's gains make."
+            advice = "Check the sign of the drive, and of the gains."
+            return self._doubt("drive-sign", joint, says, advice, value=factor, allowed=1.0)
+        return self._by_size(joint, fit)
+
+    def _by_size(self, joint: int, fit: LawFit) -> RecordFinding | None:
+        """A drive of the right sign that is not what the gains make, or not at once."""
+        if not 1 / FACTOR_OF_GAIN < fit.factor < FACTOR_OF_GAIN:
+            return self._scale(joint, fit.factor, "what the controller's gains make of set point and position")
+        if fit.reading.late:
+            says = "its drive stands one sample too low: it follows from set point and position of the row before."
+            return self._doubt("drive-late", joint, says, "Move the drive up by one row.", value=1.0, allowed=0.0)
+        return None
+
+    def _drives_motion(self, joint: int, motion: Motion | None) -> bool:
+        """Whether the drive makes the motion as it stands: then its sign is right, and the set point, which moves as
+        the position does, stands for it."""
+        found = None if motion is None else balance(self.model, motion)
+        if found is None:
+            return self._leads(joint)
+        place = self.model.machine.modelled_joints.index(joint)
+        assert motion is not None
+        turned = balance(self.model, WAYS["drive-sign"](motion, [place]))
+        return turned is None or found.left[place] < turned.left[place]
+
+    def _leads(self, joint: int) -> bool:
+        """Whether the position moves before its set point."""
+        trace, column = self.trace, self.trace.column(joint)
+        if trace.set_point is None:
+            return False
+        apart = trace.set_point[:, column] - trace.position[:, column]
+        speed = np.gradient(trace.position[:, column], trace.time)
+        apart, speed = apart - apart.mean(), speed - speed.mean()
+        size = float(np.sqrt((apart @ apart) * (speed @ speed)))
+        usual = float(np.median(np.diff(trace.time)))
+        lag = float(apart @ speed) / max(float(speed @ speed), 1e-300)
+        return size > 0.0 and float(apart @ speed) < -FOLLOWS * size and lag < -LEADS * usual
+
+    # ---- times
+
+    def _on_times(self, *, holds: bool) -> RecordFinding | None:
+        trace, controller = self.trace, self.model.machine.controller
+        stated = None if isinstance(controller, NoController) else controller.period.value
+        period = trace.record.period or stated
+        if period is None:
+            return None
+        usual = float(np.median(np.diff(trace.time)))
+        ticks = 1.0 if trace.tick is None else float(np.median(np.diff(trace.tick)))
+        expected = period * (ticks if trace.tick is not None else trace.record.every)
+        ratio = usual / expected if expected > 0.0 else 1.0
+        if abs(ratio - 1.0) < OTHER_PERIOD:
+            return None
+        says = f"samples are {number(usual)} s apart, where {number(expected)} s are stated: {number(ratio)} times."
+        joints = self.model.machine.modelled_joints
+        whole = trace.tick is not None or _near(ratio, 1e3) or _near(ratio, 1e-3)
+        sure = whole or (holds and any(time_matters(trace, self.model.machine, j, ratio) for j in joints))
+        if sure:
+            advice = "Are they in ms? Times are in s." if _near(ratio, 1e3) else "Check the times: they are in s."
+            return self._doubt("time-scale", None, says, advice, value=usual, allowed=expected, unit="s")
+        advice = "If each sample is one control period, the times are wrong."
+        return self._doubt("time-scale", None, says, advice, value=usual, allowed=expected, unit="s", sure=False)
+
+    # ---- torques
+
+    def _by_balance(self, motion: Motion | None, told: set[int], *, holds: bool) -> Iterator[RecordFinding]:
+        joints = self.model.machine.modelled_joints
+        if motion is None or told:
+            return
+        found = balance(self.model, motion)
+        if found is not None and found.turned > 0.0:
+            yield self._gravity(found.turned)
+            return
+        ways = [] if holds else list(WAYS)
+        if not any(self.model.machine.joint(j).kind == "revolute" for j in joints) and "degrees" in ways:
+            ways.remove("degrees")
+        whole = likelier(self.model, motion, None, ways)
+        if whole is not None:
+            yield self._of_way(whole, None if len(joints) > 1 else joints[0])
+            return
+        alone = [way for way in ways if way not in OF_ALL]
+        for place, joint in enumerate(joints):
+            way = likelier(self.model, motion, place, alone) if len(joints) > 1 and alone else None
+            if way is not None:
+                yield self._of_way(way, joint)
+                return
+        if not holds:
+            yield from self._out_of_scale(motion)
+            yield from self._behind(motion)
+        if not isinstance(self.model.machine.controller, NoController) and not holds:
+            for joint in joints:
+                if self._leads(joint):
+                    yield self._doubt(
+                        "columns-swapped", joint, "its position moves before its set point: are they exchanged?",
+                        CHECK_COLUMNS,
+                    )  # fmt: skip
+
+    def _behind(self, motion: Motion) -> Iterator[RecordFinding]:
+        """Drives that come after the motion that they make, which no delay of an arm does."""
+        found = balance(self.model, motion)
+        for place, joint in enumerate(self.model.machine.modelled_joints):
+            late = 0.0 if found is None else float(found.behind[place])
+            if late > BEHIND:
+                says = f"its drive comes {number(late)} samples after the motion that it makes: it stands too low."
+                advice = "Move the drive up by one row, if each row is read at one moment."
+                yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
+
+    def _out_of_scale(self, motion: Motion) -> Iterator[RecordFinding]:
+        found = balance(self.model, motion)
+        if found is None:
+            return
+        for place, joint in enumerate(self.model.machine.modelled_joints):
+            given, needed = math.sqrt(found.given[place]), math.sqrt(found.needed[place])
+            if given > 0.0 and needed > 0.0 and not 1 / OUT_OF_SCALE < given / needed < OUT_OF_SCALE:
+                yield self._scale(joint, given / needed, "the torque that the recorded motion needs")
+
+    def _of_way(self, way: str, joint: int | None) -> RecordFinding:
+        kind, says, advice = _WAY_WORDS[way]
+        return self._doubt(kind, joint, says, advice)
+
+    def _gravity(self, removed: float) -> RecordFinding:
+        gravity = ", ".join(f"{g:.4g}" for g in self.model.machine.gravity)
+        says = (
+            f"drive and motion say that gravity, stated as [{gravity}] m/s², points the other way: turned round, it "
+            f"takes {removed:.0%} off what is left."
+        )
+        advice = "Check `gravity`, the posture in which positions are 0, their direction, and the sign of the drive."
+        return self._doubt("gravity-reversed", None, says, advice, value=removed, allowed=LEAST_REMOVED)
+
+    def _scale(self, joint: int, ratio: float, of: str) -> RecordFinding:
+        units = self.model.machine.joint(joint).drive_units
+        stated = f" Its drive is stated in {units[0]}." if len(units) == 1 else ""
+        says = f"its drive is {number(ratio)} times {of}.{stated}"
+        advice = "Check the unit of the drive, that positions are in rad or m and times in s, and the columns."
+        return self._doubt("drive-scale", joint, says, advice, value=ratio, allowed=1.0)
+
+    def _doubt(
+        self,
+        kind: FindingKind,
+        joint: int | None,
+        says: str,
+        advice: str,
+        *,
+        value: float | None = None,
+        allowed: float | None = None,
+        unit: str = "1",
+        sure: bool = True,
+    ) -> RecordFinding:
+        return RecordFinding(
+            kind=kind,
+            consequence="doubt" if sure else "note",
+            record=self.trace.called,
+            joint=joint,
+            value=value,
+            allowed=allowed,
+            unit="" if value is None else unit,
+            says=says,
+            advice=advice,
+        )
+
+
+_WAY_WORDS: dict[str, tuple[FindingKind, str, str]] = {
+    "degrees": ("position-unit", "drive and motion belong together if positions are in degrees.", "Convert to rad."),
+    "thousandths": (
+        "drive-scale",
+        "drive and motion belong together if the drive is in thousandths of its unit (mA for A).",
+        "Check the unit of the drive.",
+    ),
+    "thousands": (
+        "drive-scale",
+        "drive and motion belong together if the drive is in thousands of its unit.",
+        "Check the unit of the drive.",
+    ),
+    "drive-sign": (
+        "drive-sign",
+        "drive and motion belong together if the drive has the other sign.",
+        "Check the sign of the drive, the direction of positions, and `gear_ratio`.",
+    ),
+    "milliseconds": ("time-scale", "drive and motion belong together if times are in ms.", "Convert times to s."),
+    "half-times": (
+        "time-scale",
+        "drive and motion belong together if times are half as long.",
+        "Check the times: they are in s.",
+    ),
+    "double-times": (
+        "time-scale",
+        "drive and motion belong together if times are twice as long.",
+        "Check the times: they are in s.",
+    ),
+    "position-drive": (
+        "columns-swapped",
+        "drive and motion belong together if position and drive are exchanged.",
+        CHECK_COLUMNS,
+    ),
+}
+
+
+def _near(factor: float, unit: float) -> bool:
+    return factor > 0.0 and 1 / FACTOR_OF_UNIT < factor / unit < FACTOR_OF_UNIT

@@ -1,0 +1,148 @@
+"""The controller's own law as a witness: which columns, units and times make the recorded drive what it must be.
+
+The drive follows from set point and position alone, whatever the arm does. So no hidden effect of the arm is told here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.contracts.machine import BoardPid, DcMotor, Machine, NoController, SampledPid
+from daq.contracts.trace import Trace
+from model.arrays import Floats
+from model.drives.controller import INTEGRAL_SHARE
+
+HOLDS = 0.1
+"""Most that a law may leave of the drive's variation (root mean squares) to hold: rounding and lost samples leave less,
+and no other law comes so near."""
+BETTER = 0.2
+"""Most that another reading of the columns may leave, as a share of what they leave as recorded, to be believed."""
+AT_LIMIT = 0.98
+"""Share of the largest drive from which it may be cut off."""
+SEVERAL = 3
+"""Samples at the largest drive that show a limit."""
+DEGREE = math.pi / 180.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read the columns of one joint.
+
+    Args:
+        position, set_point: what stands in these columns. late: samples that the drive stands too low in the file.
+        swapped: whether position and set point are exchanged. turned: those of both that are in degrees.
+    """
+
+    position: Floats
+    set_point: Floats
+    late: int = 0
+    swapped: bool = False
+    turned: str = ""
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """How the drive follows from columns: `left` of its variation, and `factor` times what the gains say."""
+
+    reading: Reading
+    factor: float
+    left: float
+
+
+def fits_of(trace: Trace, machine: Machine, joint: int) -> list[LawFit]:
+    """How a joint's drive follows from each way to read its columns, as recorded first; empty where the machine file
+    describes no controller, or the record lacks what it needs."""
+    if isinstance(machine.controller, NoController) or trace.set_point is None or trace.drive is None:
+        return []
+    column = trace.column(joint)
+    position, asked, drive = (s[:, column] for s in (trace.position, trace.set_point, trace.drive))
+    if not np.ptp(asked) or not np.ptp(drive) or len(drive) < 4 * SEVERAL:
+        return []
+    found = []
+    for reading in _ways(position, asked, slides=machine.joint(joint).kind == "prismatic"):
+        formed = formed_drive(trace, machine, joint, reading)
+        if formed is None:
+            return []
+        late = reading.late
+        found.append(_fit(reading, formed[: len(formed) - late], drive[late:]))
+    return found
+
+
+def best_fit(fits: list[LawFit]) -> LawFit | None:
+    """The fit of columns as recorded where it holds well enough; one that is far better; None where none holds."""
+    if not fits:
+        return None
+    recorded = fits[0]
+    best = min((fit for fit in fits if fit is recorded or fit.factor > 0.0), key=lambda fit: fit.left)
+    if best.left < HOLDS and best.left < BETTER * recorded.left:
+        return best
+    return recorded if recorded.left < HOLDS else None
+
+
+def time_matters(trace: Trace, machine: Machine, joint: int, ratio: float) -> bool:
+    """Whether the law, which holds with the file's period a sample, does not hold with that period `ratio` times as
+    long: then the samples are one period apart, whatever the times say."""
+    column = trace.column(joint)
+    assert trace.set_point is not None
+    assert trace.drive is not None
+    reading = Reading(trace.position[:, column], trace.set_point[:, column])
+    formed = [formed_drive(trace, machine, joint, reading, stretched) for stretched in (1.0, ratio)]
+    if any(one is None for one in formed):
+        return False
+    left = [_fit(reading, one, trace.drive[:, column]).left for one in formed if one is not None]
+    return left[0] < HOLDS and left[0] < BETTER * left[1]
+
+
+def formed_drive(trace: Trace, machine: Machine, joint: int, reading: Reading, stretched: float = 1.0) -> Floats | None:
+    """The drive (k,) that the machine file's gains make of columns, without limits and rounding, but for a constant;
+    None where the file lacks the sensor that its law counts by. stretched: factor of the control period."""
+    controller = machine.controller
+    error = reading.set_point - reading.position
+    if isinstance(controller, SampledPid):
+        period = stretched * controller.period.value
+        output = _pid(error, controller.gains[joint - 1], period)
+        if controller.velocity_gains is not None:
+            speed = np.diff(reading.position, prepend=reading.position[0]) / period
+            output = _pid(output - speed, controller.velocity_gains[joint - 1], period)
+        return output
+    own = machine.joint(joint)
+    if not isinstance(controller, BoardPid) or own.sensor is None or not isinstance(own.drive, DcMotor):
+        return None
+    p, i, d = (trace.record.gains or {}).get(joint, controller.gains[joint - 1])
+    counts = error / (own.sensor.direction * own.sensor.range.value / 2**own.sensor.bits)
+    power = p * counts + i * np.cumsum(counts) / INTEGRAL_SHARE + d * np.diff(counts, prepend=counts[0])
+    volts = machine.drive_sign(joint) * own.drive.scale.counts_to_volts(1.0)
+    return np.asarray(controller.dac_counts_per_adc_count.value * volts * power)
+
+
+def _ways(position: Floats, asked: Floats, *, slides: bool) -> Iterator[Reading]:
+    yield Reading(position, asked)
+    yield Reading(position, asked, late=1)
+    yield Reading(asked, position, swapped=True)  # of a cascade; a PID's drive has the other sign, as in the first
+    if not slides:
+        yield Reading(position * DEGREE, asked, turned="positions")
+        yield Reading(position, asked * DEGREE, turned="set points")
+
+
+def _pid(error: Floats, gains: tuple[float, float, float], period: float) -> Floats:
+    p, i, d = gains
+    return np.asarray(p * error + i * period * np.cumsum(error) + d * np.diff(error, prepend=error[0]) / period)
+
+
+def _fit(reading: Reading, formed: Floats, drive: Floats) -> LawFit:
+    """The drive as a factor times what is formed, beside what integrators held in the beginning."""
+    size = np.abs(drive)
+    limited = size >= AT_LIMIT * size.max()
+    free = ~limited if int(limited.sum()) >= SEVERAL else np.ones(len(drive), dtype=bool)
+    free[0] = False  # what the controller differentiated there is not in the record
+    if int(free.sum()) < 4 * SEVERAL or not np.ptp(formed[free]):
+        return LawFit(reading, 0.0, 1.0)
+    columns = np.column_stack([formed[free], np.ones(int(free.sum()))])
+    line = np.linalg.lstsq(columns, drive[free], rcond=None)[0]
+    left = drive[free] - columns @ line
+    whole = float(np.sqrt(np.mean((drive[free] - drive[free].mean()) ** 2)))
+    return LawFit(reading, float(line[0]), float(np.sqrt(np.mean(left**2))) / whole if whole > 0.0 else 1.0)

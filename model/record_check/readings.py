@@ -1,0 +1,168 @@
+"""Jumps, spikes, stuck readings and gaps: what the readings of one joint do that no joint can.
+
+A torque is finite, so a speed changes little from one sample to the next. A reading is false where the speed of one
+interval lies outside the speeds of both its neighbours by more than the record's own noise and accelerations make.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from model.arrays import Floats
+
+TAIL = 0.2
+"""Share of a record's intervals from which the tail of its noise is told: half of them may be false."""
+FALSE_DOUBTS = 1e-6
+"""Records in which noise alone may raise a doubt: its tail is taken for an exponential one."""
+ISOLATED = 7
+"""Intervals of a running median, which a spike of up to three samples does not move."""
+KINK = 2.0
+"""Most that a speed may peak in one interval, in the largest change from one interval to the next: a torque that
+turns round in the middle of it gives half of that."""
+LEAST_COUNTS = 4.0
+"""Least false step, in steps of the sensor: rounding alone makes two."""
+RETURNS = 3
+"""Samples within which a spike returns."""
+STUCK = 5
+"""Least samples with the same reading before a jump, for a reading that was stuck."""
+MISSING = 2.5
+"""Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
+BRIDGED = (10.0, 0.05)
+"""Longest gap that is bridged: so many intervals, and so many seconds more; a joint goes on as it did."""
+WHOLE = 0.1
+"""Distance from a whole turn, as a share of it, at which a jump is that of a wrapped encoder: it moves meanwhile."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A false step of a reading.
+
+    Args:
+        row: the sample before it. size: of the step, less what the joint moved meanwhile. usual: the most that the
+            record's own noise and accelerations explain. back: of a spike, its last sample.
+    """
+
+    row: int
+    size: float
+    usual: float
+    back: int = 0
+
+
+@dataclass(frozen=True)
+class FalseReadings:
+    """The jumps of a reading, sorted: wraps by whole turns; spikes, pairs of jumps there and back; stuck, jumps after
+    readings that did not change, with the row since which; others."""
+
+    wraps: tuple[Jump, ...]
+    spikes: tuple[Jump, ...]
+    stuck: tuple[tuple[int, Jump], ...]
+    others: tuple[Jump, ...]
+
+
+def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
+    """False steps of a reading (k,).
+
+    Args:
+        time: (k,) s. step: of the sensor, in the reading's unit; 0 where it is not known.
+    """
+    if len(reading) < 4 * ISOLATED:
+        return []
+    intervals = np.diff(time)
+    usual = float(np.median(intervals))
+    rate = np.diff(reading) / intervals * usual
+    below, above = np.minimum(rate[:-2], rate[2:]), np.maximum(rate[:-2], rate[2:])
+    outside = np.maximum(0.0, np.maximum(rate[1:-1] - above, below - rate[1:-1]))
+    apart = intervals > MISSING * usual
+    outside[apart[:-2] | apart[1:-1] | apart[2:]] = 0.0
+    line = float(np.quantile(outside, 1 - TAIL))
+    tail = np.sort(outside)[-max(1, round(TAIL * len(outside))) :]
+    spread = float(np.median(tail - line)) / np.log(2.0)
+    noise = line + spread * float(np.log(TAIL * len(outside) / FALSE_DOUBTS))
+    kink = KINK * float(np.abs(np.diff(median_filter(rate, ISOLATED, mode="nearest"))).max())
+    moved = np.abs(np.diff(reading))
+    rounding = max(step, float(moved[moved > 0.0].min(initial=np.inf)) if moved.any() else 0.0)
+    allowed = max(noise + kink, LEAST_COUNTS * rounding)
+    found = []
+    for k in np.flatnonzero(outside > allowed):
+        around = rate[max(0, k - 2) : k + 5]
+        found.append(Jump(int(k) + 1, float(rate[k + 1] - np.median(around)), allowed))
+    return found
+
+
+def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -> FalseReadings:
+    """Jumps by what makes them. turns: whole turns of the joint, or of its sensor, in the reading's unit."""
+    wraps = [j for j in jumps if any(_whole(j.size, turn) for turn in turns)]
+    left = [j for j in jumps if j not in wraps]
+    spikes: list[Jump] = []
+    stuck: list[tuple[int, Jump]] = []
+    others: list[Jump] = []
+    k = 0
+    while k < len(left):
+        last = _returns(left, k)
+        if last is not None:
+            spikes.append(replace(left[k], back=left[last].row))
+            k = last + 1
+            continue
+        since = _unchanged_since(reading, left[k].row)
+        if left[k].row - since >= STUCK:
+            stuck.append((since, left[k]))
+        else:
+            others.append(left[k])
+        k += 1
+    return FalseReadings(tuple(wraps), tuple(spikes), tuple(stuck), tuple(others))
+
+
+def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) -> Floats:
+    """The reading (k,) with whole turns added behind each wrap."""
+    whole = reading.copy()
+    for jump in wraps:
+        turn = next(turn for turn in turns if _whole(jump.size, turn))
+        whole[jump.row + 1 :] -= turn * round(jump.size / turn)
+    return whole
+
+
+def find_gaps(time: Floats) -> list[tuple[int, float]]:
+    """Row before each gap, and its length in s: at least one sample is missing there."""
+    intervals = np.diff(time)
+    usual = float(np.median(intervals))
+    return [(int(row), float(intervals[row])) for row in np.flatnonzero(intervals > MISSING * usual)]
+
+
+def is_bridged(gap: float, usual: float) -> bool:
+    """Whether a gap (s) is short beside motion; usual: interval between samples, s."""
+    return gap <= BRIDGED[0] * usual + BRIDGED[1]
+
+
+def noise_of(reading: Floats, step: float) -> float:
+    """Standard deviation of a reading's noise and rounding, from its second differences, which false readings hardly
+    move. step: of the sensor."""
+    second = np.diff(reading, 2)
+    spread = 1.4826 * float(np.median(np.abs(second - np.median(second)))) / np.sqrt(6.0)
+    return max(spread, step / np.sqrt(12.0))
+
+
+def _whole(size: float, turn: float) -> bool:
+    turns = round(size / turn)
+    return turns != 0 and abs(size - turns * turn) < WHOLE * turn
+
+
+def _returns(jumps: Sequence[Jump], first: int) -> int | None:
+    """The jump that brings the reading back, where there is one soon."""
+    total = 0.0
+    for k in range(first, len(jumps)):
+        if jumps[k].row > jumps[first].row + RETURNS:
+            return None
+        total += jumps[k].size
+        if k > first and abs(total) < 0.5 * abs(jumps[first].size):
+            return k
+    return None
+
+
+def _unchanged_since(reading: Floats, row: int) -> int:
+    """The first of the samples with the reading of `row` that come right before it."""
+    changed = np.flatnonzero(reading[: row + 1] != reading[row])
+    return int(changed[-1]) + 1 if len(changed) else 0

@@ -1,0 +1,146 @@
+"""What is said of records: units, gravity, sensors that are not stated, and answers that stop there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import Machine, load_machine
+from daq.contracts.trace import Trace
+from daq.traces.csv_table import import_csv
+from daq_cli.models.diagnosis_text import answer_text
+from model.discrepancy.explanation.headline import headline
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.workflow import diagnose
+from model.fitting.fit import fit
+from model.fitting.options import FitOptions
+from model.fitting.records import noise_floor, records_of
+from model.inverse_dynamics.fit import fit_torques
+from model.machine_model.model import base_model
+from model.record_check.check import check_records, repaired
+from model.record_check.finding import doubts_in
+from model.reports.diagnosis_report import diagnosis_report
+from model.reports.page import html
+from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.model.record_check.rigs import ROOT, example
+
+SLIDE = rigs.slide_trace(1, {}, 8.0)
+GEARED = rigs.geared_trace(3, {}, 8.0)
+
+
+def geared(factor: float) -> Machine:
+    arm = rigs.geared_machine()
+    return arm.model_copy(update={"gravity": tuple(factor * g for g in arm.gravity)})
+
+
+def kinds(machine: Machine, trace: Trace) -> list[str]:
+    return [one.kind for one in check_records(base_model(machine), [trace]) if one.kind != "no-sensor"]
+
+
+@pytest.mark.parametrize("scale", [1000.0, 0.001])
+def test_a_drive_of_another_unit_is_doubted(scale: float) -> None:
+    assert SLIDE.drive is not None
+    assert kinds(rigs.slide_machine(), replace(SLIDE, drive=scale * SLIDE.drive)) == ["drive-scale"]
+
+
+@pytest.mark.parametrize("hidden", [{}, {"coulomb": 30.0}, {"viscous": 120.0}])
+def test_friction_that_no_file_states_is_no_other_unit(hidden: dict[str, float]) -> None:
+    assert kinds(rigs.slide_machine(), rigs.slide_trace(1, hidden, 8.0)) == []
+
+
+@pytest.mark.parametrize("hidden", [{}, {"coulomb": 0.3}, {"weight": 2.4}])
+def test_gravity_that_points_the_other_way_is_doubted(hidden: dict[str, float]) -> None:
+    assert kinds(geared(-1.0), rigs.geared_trace(3, hidden, 8.0)) == ["gravity-reversed"]
+    assert kinds(geared(1.0), rigs.geared_trace(3, hidden, 8.0)) == []
+
+
+@pytest.mark.parametrize("factor", [1 / 9.81, 1.62 / 9.81, 1000 / 9.81])
+def test_an_implausible_gravity_is_noted(factor: float) -> None:
+    found = check_records(base_model(geared(factor)), [replace(GEARED, drive=None)])
+    (note,) = [one for one in found if one.kind == "gravity-magnitude"]
+    assert note.consequence == "note"
+    assert note.says.startswith(f"the machine file's gravity is {9.81 * factor:.4g} m/s² and not 9.81 m/s²")
+
+
+def test_a_doubted_record_is_the_verdict_on_terminal_report_and_in_json(tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    swapped = replace(trace, position=trace.set_point, set_point=trace.position, file="swapped.csv")
+    found = diagnose(base_model(machine), [swapped])
+    assert found.verdict == "check-the-record"
+    assert not found.steps
+    says = "swapped.csv: joint 1: position and set point are exchanged"
+    assert says in headline(found)
+    assert says in " ".join(answer_text(found).split())
+    assert answer_text(found).startswith("CHECK THE RECORD")
+    assert says in html(diagnosis_report(found))
+    assert found.model_dump(mode="json")["record"][0]["kind"] == "columns-swapped"
+
+
+def test_wraps_are_said_and_taken_out_where_no_controller_has_used_them() -> None:
+    turned = rigs.geared_trace(3, {"coulomb": 0.3}, 8.0)
+    wrapped = replace(turned, position=0.1 + (turned.position - 0.1) % (2 * np.pi))
+    model = base_model(rigs.geared_machine())
+    (said,) = [one for one in check_records(model, [wrapped]) if one.kind == "wraps"]
+    assert (said.consequence, said.joint) == ("note", 1)
+    assert np.ptp(repaired(wrapped, model.machine).position - turned.position) < 1e-9
+    options = FitOptions(parameters=("*coulomb*",), use_priors=False)
+    with_friction = model.with_effect("coulomb_friction", (1,))
+    left = [fit_torques(with_friction, [one], options=options).in_sample for one in (turned, wrapped)]
+    assert left[1] == pytest.approx(left[0], rel=1e-6)
+
+
+def test_spikes_are_a_doubt_beside_a_fit() -> None:
+    position = SLIDE.position.copy()
+    position[[300, 700, 1100]] += 0.05
+    spiked = replace(SLIDE, position=position)
+    found = fit_torques(base_model(rigs.slide_machine()), [spiked])
+    assert [one.kind for one in doubts_in(found.record)] == ["spikes"]
+
+
+def test_a_record_of_every_second_period_without_a_sensor_has_a_noise(tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    joint = machine.joints[0].model_copy(update={"sensor": None})
+    unstated = machine.model_copy(update={"joints": (joint,)})
+    rows = slice(None, None, 2)
+    slow = replace(
+        trace,
+        time=trace.time[rows],
+        position=trace.position[rows],
+        set_point=None if trace.set_point is None else trace.set_point[rows],
+        drive=None if trace.drive is None else trace.drive[rows],
+    )
+    records = records_of([slow], unstated, "position")
+    assert records[0].runs[0].stop - records[0].runs[0].start > 100
+    floor = noise_floor(records, unstated, "position")
+    assert 0 < floor[0] < 1e-3
+    (note,) = [one for one in check_records(base_model(unstated), [slow]) if one.kind == "no-sensor"]
+    assert "states no `sensor`" in note.line
+    assert note.joint == 1
+    torn = [replace(record, runs=(slice(0, 2),)) for record in records]
+    with pytest.raises(TraceError, match="noise of joint 1 is not known; state its `sensor`"):
+        noise_floor(torn, unstated, "position")
+
+
+def test_set_points_in_another_unit_end_a_fit(tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    assert trace.set_point is not None
+    with pytest.raises(TraceError, match="apart throughout"):
+        fit(base_model(machine), [replace(trace, set_point=5.0 + trace.set_point)])
+
+
+def test_a_trace_of_more_joints_than_the_machine_has_is_refused() -> None:
+    with pytest.raises(TraceError, match="has a joint 2"):
+        diagnose_torques(base_model(rigs.slide_machine()), [SLIDE], [replace(SLIDE, joints=(2,))])
+
+
+@pytest.mark.lab_data
+def test_public_records_of_a_real_arm_raise_no_doubt(lab_data: Path) -> None:
+    if not (lab_data / "double_pendulum").is_dir():
+        pytest.skip(f"needs {lab_data / 'double_pendulum'}")
+    model = base_model(load_machine(str(ROOT / "examples" / "double_pendulum.toml")))
+    traces = [import_csv(path) for path in sorted((lab_data / "double_pendulum").glob("run_*.csv"))]
+    assert doubts_in(check_records(model, traces)) == ()
