@@ -59,26 +59,29 @@ def judge(question: Question, answer: Answer, right: Iterable[str]) -> tuple[str
 
 
 def _within(number: Number, joints: set[int], answer: Answer) -> bool:
-    found = _found(number, joints, answer)
-    return bool(found) and all(number.low <= value <= number.high for value in found)
+    """Whether every joint has a number in the interval; it may have others, as a second ripple is."""
+    found = _found(number, answer)
+    return all(
+        any(number.low <= value <= number.high and (joint in of or not joints) for of, value in found)
+        for joint in joints or {0}
+    )
 
 
-def _found(number: Number, joints: set[int], answer: Answer) -> list[float]:
-    steps = [step["parameters"] for step in adopted(answer)]
-    last = {name: parameter for parameters in steps for name, parameter in parameters.items()}
+def _found(number: Number, answer: Answer) -> list[tuple[tuple[int, ...], float]]:
+    """Joints and value of every such number of the answer."""
     return [
-        float(parameter["value"])
-        for name, parameter in last.items()
+        (tuple(parameter["joints"]), float(parameter["value"]))
+        for step in adopted(answer)
+        for name, parameter in step["parameters"].items()
         if any(name.endswith(of) for of in number.of)
-        and (not joints or not parameter["joints"] or joints & set(parameter["joints"]))
     ]
 
 
 def _sizes(question: Question, joints: set[int], answer: Answer) -> str:
     if question.number is None:
         return ""
-    found = _found(question.number, joints, answer)
-    return f", {', '.join(f'{value:.3g}' for value in found)} {question.number.unit}" if found else ""
+    found = [f"{value:.3g}" for of, value in _found(question.number, answer) if not joints or joints & set(of)]
+    return f", {', '.join(found)} {question.number.unit}" if found else ""
 
 
 def _text(step: Mapping[str, Any]) -> str:
