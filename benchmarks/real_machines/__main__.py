@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import tomllib
@@ -27,7 +28,7 @@ from benchmarks.figures import machine
 from benchmarks.real_machines.judge import judge, wrong_names
 from benchmarks.real_machines.records import MissingDataError, add_torque, read_columns, write_machine, write_record
 from benchmarks.real_machines.reference import gain_of, reference
-from benchmarks.real_machines.rigs import Alteration, Question, Rig, load_rigs
+from benchmarks.real_machines.rigs import HERE, Alteration, Question, Rig, load_rigs
 
 LONGEST = 400.0
 """CPU seconds that a diagnosis may take; after them it has no answer."""
@@ -72,7 +73,7 @@ def diagnose(fitted: Sequence[Path], held_out: Sequence[Path], model: Path, plac
     if process.returncode == 0:
         return Run(json.loads((place / "answer").read_bytes()), "", seconds)
     said = (place / "errors").read_text("utf-8", errors="replace").strip().splitlines()
-    late = process.returncode < 0 and seconds > 0.98 * longest
+    late = process.returncode in (-signal.SIGXCPU, -signal.SIGKILL) and seconds > 0.9 * longest
     return Run(None, f"no answer in {longest:.0f} CPU s" if late else f"error: {(said or ['?'])[-1]}", seconds)
 
 
@@ -153,15 +154,18 @@ def summary(found: Sequence[Row]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Prints the table; 1 where a question is not answered rightly or least squares leaves less, 2 without data."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    rigs = load_rigs()
     parser.add_argument("--data", type=Path)
-    parser.add_argument("--only", choices=[rig.name for rig in rigs], action="append")
+    parser.add_argument("--rigs", type=Path, default=HERE / "rigs.toml", help="another list of rigs")
+    parser.add_argument("--only", action="append", metavar="NAME")
     parser.add_argument("--as-they-are", action="store_true", help="without the alterations")
     parser.add_argument("--longest", type=float, default=LONGEST, help="CPU seconds a diagnosis may take")
     parser.add_argument("--keep", type=Path, help="folder for the answers' JSON and the rows")
     parser.add_argument("--list", action="store_true", help="list the repositories")
     options = parser.parse_args(arguments)
-    chosen = [rig for rig in rigs if not options.only or rig.name in options.only]
+    rigs = {rig.name: rig for rig in load_rigs(options.rigs)}
+    if unknown := set(options.only or ()) - set(rigs):
+        parser.error(f"--only {unknown.pop()}: there is {', '.join(rigs)}")
+    chosen = [rigs[name] for name in options.only or rigs]
     if options.list or options.data is None:
         for rig in chosen:
             print(f"{rig.name:<16} github.com/{rig.repository} at {rig.commit[:8]}  {rig.title}  ({rig.licence})")
