@@ -51,7 +51,8 @@ def judge(question: Question, answer: Answer, right: Iterable[str]) -> tuple[str
         return text, "right" if alone and whole and size else "half"
     withdrawn = [step for step in answer["steps"] if not step["adopted"] and told(step) & names]
     why = next((s["refusal"]["kind"] for s in withdrawn if s.get("refusal")), None)
-    text = verdict if verdict in (*SAID.values(), *HONEST) else "not named"
+    others = "; ".join(_text(step) for step in adopted(answer))
+    text = verdict if verdict in (*SAID.values(), *HONEST) else f"not named, only {others}"
     if why in WITHDRAWN:
         text += f" ({', '.join(sorted(told(withdrawn[0]) & names))} withdrawn: {why})"
     honest = verdict in HONEST and not wrong_names(answer, right)
