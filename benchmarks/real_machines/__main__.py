@@ -25,7 +25,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from benchmarks.figures import machine
-from benchmarks.real_machines.judge import judge, wrong_names
+from benchmarks.real_machines.judge import judge, moved, wrong_names
 from benchmarks.real_machines.records import MissingDataError, add_torque, read_columns, write_machine, write_record
 from benchmarks.real_machines.reference import gain_of, reference
 from benchmarks.real_machines.rigs import HERE, Alteration, Question, Rig, load_rigs
@@ -84,7 +84,8 @@ def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, ke
     title = f"{rig.name}: {alteration.what}" if alteration else rig.name
     with TemporaryDirectory() as folder:
         place = Path(folder)
-        model = write_machine(rig.machine, alteration.set if alteration else {}, place / "machine.toml")
+        changed = (alteration.set, alteration.remove) if alteration else ({}, ())
+        model = write_machine(rig.machine, *changed, place / "machine.toml")
         drives = [joint["drive"] for joint in tomllib.loads(rig.machine.read_text("utf-8"))["joints"]]
         records = [read_columns(rig, record, data) for record in (*rig.fitted, *rig.held_out)]
         if alteration and alteration.add:
@@ -106,6 +107,8 @@ def _row(title: str, question: Question, run: Run, right: set[str], linear: floa
     if run.answer is None:
         return Row(title, question.what, question.known, run.reason, "none", "", None, linear, run.seconds)
     answered, mark = judge(question, run.answer, right)
+    if mark in ("honest", "wrong") and (told := moved(question, _note(run.answer, "stated-numbers-moved"))):
+        answered, mark = f"{answered}; a warning: {told}", "half"
     wrong = "; ".join(wrong_names(run.answer, right))
     left = _note(run.answer, "torque-left").get("after")
     return Row(title, question.what, question.known, answered, mark, wrong, left, linear, run.seconds)

@@ -36,7 +36,8 @@ def wrong_names(answer: Answer, right: Iterable[str]) -> list[str]:
 def judge(question: Question, answer: Answer, right: Iterable[str]) -> tuple[str, str]:
     """What was answered to a question, and a mark: right, half, honest or wrong.
 
-    Half: the right name within a group of others, not on every joint or on a further one, or with another size.
+    Half: the right name within a group of others, not on every joint or on a further one, or with another size; a
+    warning that a number of the file is far off, in place of an effect, counts as half, too (`moved`).
     Honest: nothing wrong is named, and the answer says that something is missing. right: names that are not wrong.
     """
     names, joints = set(question.names), set(question.joints)
@@ -57,6 +58,15 @@ def judge(question: Question, answer: Answer, right: Iterable[str]) -> tuple[str
         text += f" ({', '.join(sorted(told(withdrawn[0]) & names))} withdrawn: {why})"
     honest = verdict in HONEST and not wrong_names(answer, right)
     return text, "honest" if honest else "wrong"
+
+
+def moved(question: Question, note: Mapping[str, Any]) -> str:
+    """The number of the file that a warning says is far off, where it is the one and comes out as it is known to be."""
+    number = question.moved
+    for each in note.get("numbers", ()):
+        if number is not None and each["name"] in number.of and number.low <= each["value"] <= number.high:
+            return f"{each['name']} {each['value']:.3g} {number.unit}"
+    return ""
 
 
 def _within(number: Number, joints: set[int], answer: Answer) -> bool:

@@ -87,9 +87,11 @@ def add_torque(columns: Columns, torque: Torque, gain: float) -> Columns:
     return columns | {drive: columns[drive] + torque.size * added / gain}
 
 
-def write_machine(source: Path, numbers: Mapping[str, float], path: Path) -> Path:
-    """A machine file with some numbers of it changed. numbers: by path, such as `joints.0.link.mass.value`."""
+def write_machine(source: Path, numbers: Mapping[str, float], removed: Sequence[str], path: Path) -> Path:
+    """A machine file with some numbers of it changed, by path such as `joints.0.link.mass.value`, or whole keys out."""
     document = tomlkit.parse(source.read_text("utf-8"))
+    for name in removed:
+        document.remove(name)
     for name, value in numbers.items():
         *way, last = name.split(".")
         place: Any = document

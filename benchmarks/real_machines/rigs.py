@@ -23,13 +23,15 @@ class Number:
 
 @dataclass(frozen=True)
 class Question:
-    """One thing that is known of a rig. joints: empty where an effect belongs to the whole machine."""
+    """One thing that is known of a rig. joints: empty where an effect belongs to the whole machine. moved: a number of
+    the file that a warning may say is far off, in place of an effect."""
 
     what: str
     names: tuple[str, ...]
     joints: tuple[int, ...]
     known: str
     number: Number | None = None
+    moved: Number | None = None
     lacking: bool = False
 
 
@@ -61,6 +63,7 @@ class Alteration:
     what: str
     question: Question
     set: Mapping[str, float]
+    remove: tuple[str, ...]
     add: Torque | None
 
 
@@ -115,6 +118,7 @@ def _rig(entry: Mapping[str, Any], folder: Path) -> Rig:
             altered["what"],
             _question(altered["question"]),
             altered.get("set", {}),
+            tuple(altered.get("remove", ())),
             Torque(**altered["add"]) if "add" in altered else None,
         ),
         entry.get("offset", True),
@@ -141,18 +145,19 @@ def _records(entries: Sequence[Mapping[str, Any]]) -> tuple[Record, ...]:
 
 
 def _question(entry: Mapping[str, Any]) -> Question:
-    number = entry.get("number")
     return Question(
         entry["what"],
         tuple(entry["names"]),
         tuple(entry["joints"]),
         entry["known"],
-        number
-        and Number(
-            (number["of"],) if isinstance(number["of"], str) else tuple(number["of"]),
-            number["low"],
-            number["high"],
-            number["unit"],
-        ),
+        _number(entry.get("number")),
+        _number(entry.get("moved")),
         entry.get("lacking", False),
     )
+
+
+def _number(entry: Mapping[str, Any] | None) -> Number | None:
+    if entry is None:
+        return None
+    of = (entry["of"],) if isinstance(entry["of"], str) else tuple(entry["of"])
+    return Number(of, entry["low"], entry["high"], entry["unit"])

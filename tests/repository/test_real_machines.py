@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks.real_machines.__main__ import rows, summary, table
-from benchmarks.real_machines.judge import judge, wrong_names
+from benchmarks.real_machines.judge import judge, moved, wrong_names
 from benchmarks.real_machines.records import (
     MissingDataError,
     add_torque,
@@ -36,8 +36,10 @@ def test_every_entry_fits_its_machine_file_and_its_alteration_is_one(rig: Any, t
     machine = load_machine(str(rig.machine))
     assert len(machine.joints) == rig.joints == len(rig.columns.get("position", rig.columns.get("velocity")))
     altered = rig.alteration
-    assert bool(altered.set) != bool(altered.add)
-    assert load_machine(str(write_machine(rig.machine, altered.set, tmp_path / "m.toml"))) == machine or altered.set
+    changes = bool(altered.set or altered.remove)
+    assert changes != bool(altered.add)
+    written = write_machine(rig.machine, altered.set, altered.remove, tmp_path / "m.toml")
+    assert (load_machine(str(written)) != machine) == changes
 
 
 def _repository(folder: Path) -> str:
@@ -163,6 +165,13 @@ def test_what_was_withdrawn_is_shown_and_names_that_nobody_asked_for_are_told() 
     )
     assert judge(COULOMB, answer, ())[0] == "unknown (coulomb_friction withdrawn: found-one-way)"
     assert wrong_names(answer, {"coulomb_friction"}) == ["spring_torque on 1"]
+
+
+def test_a_warning_of_a_number_that_is_far_off_counts_where_it_is_the_right_one() -> None:
+    question = replace(COULOMB, moved=Number(("link1.mass",), 85.0, 105.0, "kg"))
+    note = {"numbers": [{"name": "link1.mass", "value": 94.6}]}
+    assert moved(question, note) == "link1.mass 94.6 kg"
+    assert [moved(COULOMB, note), moved(question, {"numbers": [{"name": "link1.mass", "value": 130.0}]})] == ["", ""]
 
 
 def test_a_rig_that_takes_too_long_or_is_refused_has_no_answer(pendulum: Any, tmp_path: Path) -> None:
