@@ -65,4 +65,4 @@ def _print(found: Sequence[RecordFinding], traces: int) -> None:
     for one in found:
         joint = "" if one.joint is None else str(one.joint)
         table.add_row(one.consequence, one.record, joint, one.says, one.advice)
-    print_table(table, 140)
+    print_table(table)

@@ -97,6 +97,7 @@ def validate_by_distortion(
     )
     errors = error.by_joint(varied.best[None])[0]
     distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
+    verdict = _verdict(error, varied.best, errors)
     return Fidelity(
         model=model.identity,
         traces=tuple(t.record.trace_id for t in traces),
@@ -105,7 +106,7 @@ def validate_by_distortion(
         damping_ratio=damping_ratio,
         error=least,
         error_by_joint=tuple(map(float, errors)),
-        verdict=_verdict(error, varied.best, errors).doubted(doubts_headline(record)),
+        verdict=None if verdict is None else verdict.doubted(doubts_headline(record)),
         parameters=tuple(distortions),
         sum_of_contributions=math.fsum(d.contribution for d in distortions),
         curves=_curves(error, varied, distortions, curve_points, progress, cancel) if curve_points else (),

@@ -1,8 +1,8 @@
-"""The reference: linear least squares on the inverse dynamics, of the same regressors, with numpy alone.
+"""The reference: linear least squares on the inverse dynamics, of the usual regressors, with numpy alone.
 
-Torques are linear in every link's mass, first moments and inertia about its frame, in the rotor's inertia, and in the
-coefficients of viscous and Coulomb friction. Signals are low-passed by the gain of a Butterworth filter that runs
-forwards and backwards, applied to the spectrum; a quarter of a second at both ends is left out.
+Torques are linear in every link's mass, first moments and inertia about its frame, in the rotor's inertia, in the
+coefficients of viscous and Coulomb friction, and in an offset. Signals are low-passed by the gain of a Butterworth
+filter that runs forwards and backwards, applied to the spectrum. Samples at which a joint rests tell nothing of it.
 """
 
 from __future__ import annotations
@@ -29,16 +29,17 @@ LEAST = 0.01
 (Gautier asks for a condition number below 100). On six joints, a fit of all of them is twice as far off elsewhere."""
 EDGE = 1.0
 """Periods of the cutoff that are left out at both ends."""
+RESTS = 0.01
+"""Speed below which a joint rests, as a share of the largest of the record: friction then balances any torque."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What a linear fit leaves: √(Σ residual² / Σ torque²) on fitted and on held-out records, the same by joint as
-    root mean squares, and its number of columns."""
+    """What a linear fit leaves: √(Σ residual² / Σ torque²) on fitted and on held-out records, and its number of
+    columns."""
 
     fitted: float
     held_out: float
-    rms: tuple[float, ...]
     columns: int
 
 
@@ -48,44 +49,35 @@ def reference(
     held_out: Sequence[Mapping[str, Floats]],
     cutoff: float,
     *,
-    constant: bool,
-    springs: tuple[int, ...] = (),
+    offset: bool,
 ) -> Reference:
-    """The linear fit. constant: whether every joint has a constant torque, too. springs: joints that also have one in
-    proportion to their position, beside a constant one."""
+    """The linear fit. cutoff in Hz, of torques. offset: whether every joint has a constant torque, too."""
     document = tomllib.loads(machine.read_text("utf-8"))
     first, second = (
-        [_system(document, columns, cutoff, constant=constant, springs=springs) for columns in records]
-        for records in (fitted, held_out)
+        [_system(document, columns, cutoff, offset=offset) for columns in records] for records in (fitted, held_out)
     )
-    A, b = np.concatenate([s[0] for s in first]), np.concatenate([s[1] for s in first])
-    joints = b.shape[1]
+    A, b, moves = (np.concatenate([system[part] for system in first]) for part in range(3))
     size = np.linalg.norm(A, axis=(0, 1))
     used = size > 1e-12 * size.max()
-    weight = 1 / np.sqrt((b**2).mean(axis=0))  # joints count alike, whatever their torques
-    rows = (A[:, :, used] / size[used]) * weight[:, None]
+    weight = moves / np.sqrt(
+        (b**2 * moves).sum(axis=0) / moves.sum(axis=0)
+    )  # joints count alike, whatever their torques
+    rows = (A[:, :, used] / size[used]) * weight[:, :, None]
     found = np.linalg.lstsq(rows.reshape(-1, int(used.sum())), (b * weight).ravel(), rcond=LEAST)[0] / size[used]
 
-    def left(systems: Sequence[tuple[Floats, Floats]]) -> tuple[float, tuple[float, ...]]:
-        residual = np.concatenate([torque - columns[:, :, used] @ found for columns, torque in systems])
-        whole = np.concatenate([torque for _, torque in systems])
-        share = float(np.sqrt((residual**2).sum() / (whole**2).sum()))
-        return share, tuple(float(v) for v in np.sqrt((residual**2).mean(axis=0)))
+    def left(systems: Sequence[tuple[Floats, Floats, Floats]]) -> float:
+        over = sum(
+            float(((torque - columns[:, :, used] @ found) ** 2 * kept).sum()) for columns, torque, kept in systems
+        )
+        return float(np.sqrt(over / sum(float((torque**2 * kept).sum()) for _, torque, kept in systems)))
 
-    share, rms = left(second)
-    assert len(rms) == joints
-    return Reference(left(first)[0], share, rms, int(used.sum()))
+    return Reference(left(first), left(second), int(used.sum()))
 
 
 def _system(
-    document: Mapping[str, Any],
-    columns: Mapping[str, Floats],
-    cutoff: float,
-    *,
-    constant: bool,
-    springs: tuple[int, ...],
-) -> tuple[Floats, Floats]:
-    """Regressors (m, n, p) and torques (m, n) of one record."""
+    document: Mapping[str, Any], columns: Mapping[str, Floats], cutoff: float, *, offset: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Regressors (m, n, p), torques (m, n) and where a joint moves, 0 or 1 (m, n), of one record."""
     joints = document["joints"]
     names = range(1, len(joints) + 1)
     time = columns["time"]
@@ -101,23 +93,18 @@ def _system(
     position = _low_pass(position, wide, period)
     speed = np.gradient(position, period, axis=0) if speed is None else _low_pass(speed, wide, period)
     acceleration = np.gradient(speed, period, axis=0)
-    gain = np.array([_gain(joint["drive"]) for joint in joints])
-    torque = even("drive") * gain
-    parts = [_bodies(document, position, speed, acceleration)]
-    own = [acceleration, speed, np.sign(speed), *([np.ones_like(speed)] if constant else [])]
-    parts += [np.einsum("mj,jk->mjk", signal, np.eye(len(joints))) for signal in own]
-    sprung = np.eye(len(joints))[:, [j - 1 for j in springs]]
-    parts += [np.einsum("mj,jk->mjk", signal, sprung) for signal in (position, np.ones_like(position))]
-    A = np.concatenate(parts, axis=2)
-    kept = slice(
-        round(EDGE / cutoff / period), -round(EDGE / cutoff / period), max(1, round(1 / (GRID * cutoff * period)))
-    )
-    return _low_pass(A.reshape(len(grid), -1), cutoff, period).reshape(A.shape)[kept], _low_pass(
-        torque, cutoff, period
-    )[kept]
+    torque = even("drive") * np.array([gain_of(joint["drive"]) for joint in joints])
+    own = [acceleration, speed, np.sign(speed), *([np.ones_like(speed)] if offset else [])]
+    diagonal = [np.einsum("mj,jk->mjk", signal, np.eye(len(joints))) for signal in own]
+    A = np.concatenate([_bodies(document, position, speed, acceleration), *diagonal], axis=2)
+    edge = round(EDGE / cutoff / period)
+    kept = slice(edge, -edge, max(1, round(1 / (GRID * cutoff * period))))
+    moves = (np.abs(speed) > RESTS * np.abs(speed).max(axis=0)).astype(np.float64)
+    passed = _low_pass(A.reshape(len(grid), -1), cutoff, period).reshape(A.shape)
+    return passed[kept], _low_pass(torque, cutoff, period)[kept], moves[kept]
 
 
-def _gain(drive: Mapping[str, Any]) -> float:
+def gain_of(drive: Mapping[str, Any]) -> float:
     """Torque at the joint for a unit of drive, of a motor at rest."""
     if drive["kind"] == "gain":
         return float(drive["gain"]["value"])

@@ -1,0 +1,163 @@
+"""The entries of `rigs.toml`: records, what is known of a rig, and one honest alteration of it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Number:
+    """An interval in which a number of an effect has to lie. of: names such as `coulomb_friction.torque`."""
+
+    of: tuple[str, ...]
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Question:
+    """One thing that is known of a rig. joints: empty where an effect belongs to the whole machine. moved: a number of
+    the file that a warning may say is far off, in place of an effect."""
+
+    what: str
+    names: tuple[str, ...]
+    joints: tuple[int, ...]
+    known: str
+    number: Number | None = None
+    moved: Number | None = None
+    lacking: bool = False
+
+
+@dataclass(frozen=True)
+class Record:
+    """Files of one record, below the rig's folder, and the part of it, in s of its own clock."""
+
+    files: tuple[str, ...]
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Torque:
+    """A torque that is added to a record, as if the joint had had it. size in N·m/rad (spring) or N·m; cycles a turn
+    (ripple); frequency in Hz (periodic)."""
+
+    kind: str
+    joint: int
+    size: float
+    cycles: float = 0.0
+    frequency: float = 0.0
+
+
+@dataclass(frozen=True)
+class Alteration:
+    """One change of a rig whose answer is known: numbers of its machine file, or a torque in its records."""
+
+    what: str
+    question: Question
+    set: Mapping[str, float]
+    remove: tuple[str, ...]
+    add: Torque | None
+
+
+@dataclass(frozen=True)
+class Rig:
+    """One real machine. columns: by signal, and joint by joint, a key or the terms of a sum (`rigs.toml`)."""
+
+    name: str
+    title: str
+    repository: str
+    commit: str
+    licence: str
+    machine: Path
+    drive_unit: str
+    joints: int
+    folder: str
+    fitted: tuple[Record, ...]
+    held_out: tuple[Record, ...]
+    columns: Mapping[str, tuple[Any, ...]]
+    questions: tuple[Question, ...]
+    plausible: frozenset[str]
+    alteration: Alteration
+    offset: bool
+
+
+def load_rigs(path: Path = HERE / "rigs.toml") -> tuple[Rig, ...]:
+    """Every entry of a file."""
+    return tuple(_rig(entry, path.parent) for entry in tomllib.loads(path.read_text("utf-8"))["rig"])
+
+
+def _rig(entry: Mapping[str, Any], folder: Path) -> Rig:
+    signals = {name: terms for name, terms in entry["columns"].items() if name != "time"}
+    joints = entry.get("joints", max(len(terms) for terms in signals.values()))
+    columns = {name: _by_joint(terms, joints) for name, terms in signals.items()}
+    altered = entry["alteration"]
+    return Rig(
+        entry["name"],
+        entry["title"],
+        entry["repository"],
+        entry["commit"],
+        entry["licence"],
+        folder / entry["machine"],
+        entry["drive_unit"],
+        joints,
+        entry.get("folder", ""),
+        _records(entry["fitted"]),
+        _records(entry["held_out"]),
+        {"time": (entry["columns"]["time"],), **columns},
+        tuple(_question(each) for each in entry["question"]),
+        frozenset(entry["plausible"]),
+        Alteration(
+            altered["what"],
+            _question(altered["question"]),
+            altered.get("set", {}),
+            tuple(altered.get("remove", ())),
+            Torque(**altered["add"]) if "add" in altered else None,
+        ),
+        entry.get("offset", True),
+    )
+
+
+def _by_joint(terms: Sequence[Any], joints: int) -> tuple[Any, ...]:
+    """One item a joint; a single one is a pattern in which `{i}` counts joints from 0."""
+    if len(terms) == joints:
+        return tuple(terms)
+    return tuple(_numbered(terms[0], index) for index in range(joints))
+
+
+def _numbered(item: Any, index: int) -> Any:
+    if isinstance(item, str):
+        return item.replace("{i}", str(index))
+    return [_numbered(part, index) for part in item] if isinstance(item, list) else item
+
+
+def _records(entries: Sequence[Mapping[str, Any]]) -> tuple[Record, ...]:
+    return tuple(
+        Record(tuple(each["files"]), each.get("from", float("-inf")), each.get("to", float("inf"))) for each in entries
+    )
+
+
+def _question(entry: Mapping[str, Any]) -> Question:
+    return Question(
+        entry["what"],
+        tuple(entry["names"]),
+        tuple(entry["joints"]),
+        entry["known"],
+        _number(entry.get("number")),
+        _number(entry.get("moved")),
+        entry.get("lacking", False),
+    )
+
+
+def _number(entry: Mapping[str, Any] | None) -> Number | None:
+    if entry is None:
+        return None
+    of = (entry["of"],) if isinstance(entry["of"], str) else tuple(entry["of"])
+    return Number(of, entry["low"], entry["high"], entry["unit"])
