@@ -96,7 +96,7 @@ def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
 def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -> FalseReadings:
     """Jumps by what makes them. turns: whole turns of the joint, or of its sensor, in the reading's unit."""
     wraps = [j for j in jumps if any(_whole(j.size, turn) for turn in turns)]
-    left = [j for j in jumps if j not in wraps]
+    left = [j for j in jumps if j not in wraps and abs(j.size) > j.usual]
     spikes: list[Jump] = []
     stuck: list[tuple[int, Jump]] = []
     others: list[Jump] = []
@@ -110,8 +110,10 @@ def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -
         since = _unchanged_since(reading, left[k].row)
         if left[k].row - since >= STUCK:
             stuck.append((since, left[k]))
-        else:
+        elif _stays(reading, left[k]):
             others.append(left[k])
+        else:  # the way back hides in the noise
+            spikes.append(replace(left[k], back=left[k].row + 1))
         k += 1
     return FalseReadings(tuple(wraps), tuple(spikes), tuple(stuck), tuple(others))
 
@@ -160,6 +162,15 @@ def _returns(jumps: Sequence[Jump], first: int) -> int | None:
         if k > first and abs(total) < 0.5 * abs(jumps[first].size):
             return k
     return None
+
+
+def _stays(reading: Floats, jump: Jump) -> bool:
+    """Whether the reading stays where a jump has brought it, but for its motion."""
+    row, around = jump.row, 2 * RETURNS
+    before, after = reading[max(0, row + 1 - around) : row + 1], reading[row + 1 : row + 1 + around]
+    moved = float(reading[row + 1] - reading[row]) - jump.size
+    shift = float(np.median(after) - np.median(before)) - moved * 0.5 * (len(before) + len(after))
+    return abs(shift) > 0.5 * abs(jump.size)
 
 
 def _unchanged_since(reading: Floats, row: int) -> int:

@@ -5314,21 +5314,6 @@ export interface components {
             experiment: string | null;
         };
         /**
-         * RecordVerdict
-         * @description Whether a model explains records within their noise.
-         *
-         *     `left`: joints with more than noise, the worst first. `far`: numbers of the model far from the machine file, the
-         *     furthest first: they may have taken the place of an effect. `text`: the same in one to three sentences.
-         */
-        RecordVerdict: {
-            /** Explains */
-            explains: boolean;
-            /** Left */
-            left: components["schemas"]["JointLeft"][];
-            /** Far */
-            far: components["schemas"]["FarNumber"][];
-            /** Text */
-            text: string;
          * RecordFinding
          * @description One thing that a record, or the machine file beside it, says and that cannot be, or should be known.
          *
@@ -5343,7 +5328,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
             /**
              * Consequence
              * @enum {string}
@@ -5382,6 +5367,28 @@ export interface components {
              * @default
              */
             advice?: string;
+        };
+        /**
+         * RecordVerdict
+         * @description Whether a model explains records within their noise.
+         *
+         *     `left`: joints with more than noise, the worst first. `far`: numbers of the model far from the machine file, the
+         *     furthest first: they may have taken the place of an effect. `text`: the same in one to three sentences.
+         */
+        RecordVerdict: {
+            /** Explains */
+            explains: boolean;
+            /** Left */
+            left: components["schemas"]["JointLeft"][];
+            /** Far */
+            far: components["schemas"]["FarNumber"][];
+            /** Text */
+            text: string;
+            /**
+             * Doubt
+             * @default
+             */
+            doubt?: string;
         };
         /**
          * RecordedPath
