@@ -33,8 +33,8 @@ SLOWER = 3
 MOST_ROWS = 4000
 """Samples of a record that are balanced: enough to tell halves from wholes."""
 UNLIKE = 0.5
-"""Share of the torque (root mean squares) that is left, from which drive and motion do not belong together. Of 800
-records of sound rigs and of rigs with hidden effects none left as much."""
+"""Share of the torque (root mean squares) that is left, from which drive and motion may not belong together.
+Some rigs with hidden effects leave as much; no other way to read their records explains it."""
 EXPLAINS = 0.25
 """Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
 CLEAR = 5.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -11,6 +12,8 @@ import pytest
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace, TraceRecord
 from model.fitting.records import noise_floor, records_of, sensor_deviation
+from model.machine_model.model import base_model
+from model.record_check.check import check_records
 from tests.model.fitting.imagined import PERIOD, STARTS, arm, machine
 
 COUNT = 1.5 * np.pi / 4096
@@ -115,13 +118,10 @@ def joints_apart(*apart: float) -> Trace:
 @pytest.mark.parametrize(("apart", "allowed"), [(0.349, True), (0.351, False), (-0.351, False)])
 def test_positions_lie_within_half_of_the_largest_travel_of_their_set_points(apart: float, allowed: bool) -> None:
     """The largest travel is 0.7 rad, of joint 1."""
-    given = [joints_apart(0.0, apart, 0.0)]
-    if allowed:
-        assert records_of(given, machine(), "position")[0].samples > 0
-    else:
-        says = r"joint 2: set points \(to 0\.7\) and positions \(to .*\) are 0\.351 rad apart throughout"
-        with pytest.raises(TraceError, match=says):
-            records_of(given, machine(), "position")
+    fatal = [f for f in check_records(arm(), [joints_apart(0.0, apart, 0.0)]) if f.consequence == "fatal"]
+    assert len(fatal) == (0 if allowed else 1)
+    for one in fatal:
+        assert re.search(r"joint 2: set points \(to 0\.7\) and positions \(to .*\) are 0\.351 rad apart", one.line)
 
 
 def test_a_sensor_of_speeds_is_not_held_against_set_points_of_positions() -> None:
@@ -130,7 +130,8 @@ def test_a_sensor_of_speeds_is_not_held_against_set_points_of_positions() -> Non
     assert first.sensor is not None
     tachometer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"measures": "velocity"})})
     mixed = own.model_copy(update={"joints": (own.joints[0], tachometer, *own.joints[2:])})
-    assert records_of([joints_apart(0.0, 5.0, 0.0)], mixed, "position")[0].samples > 0
+    found = check_records(base_model(mixed), [joints_apart(0.0, 5.0, 0.0)])
+    assert "units-differ" not in [one.kind for one in found]
 
 
 def test_without_a_motion_that_is_asked_for_nothing_says_how_far_positions_may_be() -> None:
