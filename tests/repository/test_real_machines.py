@@ -31,7 +31,7 @@ from ma2000 import read_trace
 RIGS = {rig.name: rig for rig in load_rigs()}
 
 
-@pytest.mark.parametrize("rig", RIGS.values(), ids=str)
+@pytest.mark.parametrize("rig", RIGS.values(), ids=lambda rig: rig.name)
 def test_every_entry_fits_its_machine_file_and_its_alteration_is_one(rig: Any, tmp_path: Path) -> None:
     machine = load_machine(str(rig.machine))
     assert len(machine.joints) == rig.joints == len(rig.columns.get("position", rig.columns.get("velocity")))
