@@ -260,7 +260,9 @@ def _error(model: Model, motion: RecordedMotion, *, held_out: bool) -> tuple[Tor
 
 def _verdict(model: Model, traces: Sequence[Trace], motions: Sequence[RecordedMotion], cutoff: float) -> RecordVerdict:
     """The verdict on the records that were fitted to; the noise is that of the readings."""
-    residual = np.concatenate(TorqueBalance(model, tuple(motions)).residual({}))
+    balance = TorqueBalance(model, tuple(motions))
+    residual = np.concatenate(balance.residual({}))
+    torque = _rms(np.concatenate(balance.supplied_by_drive()))
     noise = torque_noise(model, traces, cutoff)
     joints = model.machine.modelled_joints
     left = [
@@ -269,6 +271,7 @@ def _verdict(model: Model, traces: Sequence[Trace], motions: Sequence[RecordedMo
             unit="N·m" if joint_unit(model.machine, joint) == "rad" else "N",
             rms=rms,
             noise=float(noise[column]),
+            there=torque[column],
         )
         for column, (joint, rms) in enumerate(zip(joints, _rms(residual), strict=True))
     ]

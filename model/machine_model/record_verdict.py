@@ -21,12 +21,18 @@ SCATTER = 4.0
 
 class JointLeft(FrozenRecord):
     """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-    of records that the model itself had made; both in `unit`."""
+    of records that the model itself had made; `there`: of the recorded torque, where torques are compared; in `unit`."""
 
     joint: int
     unit: str
     rms: float
     noise: float
+    there: float | None = None
+
+    @property
+    def is_more_than_there(self) -> bool:
+        """Whether nothing is explained, however large the noise seems to be: false readings raise that as well."""
+        return self.there is not None and self.rms >= self.there > 0.0
 
     @property
     def in_noises(self) -> float:
@@ -94,10 +100,11 @@ class RecordVerdict(FrozenRecord):
         """The verdict on a model that leaves these errors of records with so many samples a joint.
 
         A joint is left with more than noise where its excess variance is beyond the line from which a diagnosis looks
-        for a missing effect, and beyond the scatter of a variance of so many samples.
+        for a missing effect, and beyond the scatter of a variance of so many samples; or as large as what was recorded.
         """
         line = 1.0 + max(MORE_THAN_NOISE, SCATTER * math.sqrt(2.0 / max(samples, 1)))
-        left = sorted((e for e in errors if e.in_noises**2 > line), key=lambda e: e.in_noises, reverse=True)
+        beyond = (e for e in errors if e.in_noises**2 > line or e.is_more_than_there)
+        left = sorted(beyond, key=lambda e: e.in_noises, reverse=True)
         far = far_numbers(model)
         return cls(explains=not left, left=tuple(left), far=far, text=_text(left, far))
 
@@ -130,4 +137,6 @@ def _text(left: Sequence[JointLeft], far: Sequence[FarNumber]) -> str:
 def _left(one: JointLeft) -> str:
     factor, unit = shown_unit(one.unit)
     size = with_unit(f"{one.rms * factor:.3g}", unit)
+    if one.is_more_than_there and one.there is not None:
+        return f"joint {one.joint} is left with {size}, of {with_unit(f'{one.there * factor:.3g}', unit)} recorded"
     return f"joint {one.joint} is left with {one.in_noises:.2g} times its noise ({size})"

@@ -18,7 +18,15 @@ rigs of other worlds leave up to 2.6, where friction turns."""
 def doubts_of(found: Diagnosis) -> list[str]:
     """What speaks against an answer that names nothing, as clauses: what is left above noise, and the number that is
     farthest from the machine file."""
-    return [words for words in (_left_words(found), _moved_number_words(found)) if words is not None]
+    said = (_more_than_there_words(found), _left_words(found), _moved_number_words(found))
+    return [words for words in said if words is not None]
+
+
+def _more_than_there_words(found: Diagnosis) -> str | None:
+    """That as much torque is left as was recorded, as a clause: then nothing is explained, however large the noise seems
+    to be, since false readings raise that as well."""
+    left = [float(note.values["after"]) for note in found.notes_data if note.kind == "torque-left"]
+    return f"{plain(100.0 * left[0], 3)} % of the recorded torque is left" if left and left[0] >= 1.0 else None
 
 
 def _left_words(found: Diagnosis) -> str | None:

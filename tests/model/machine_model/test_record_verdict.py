@@ -51,3 +51,11 @@ def test_a_hidden_friction_is_not_explained_by_numbers_that_its_fit_has_moved() 
     assert found is not None
     assert found.text != "The model explains the records within their noise."
     assert "`daq diagnose`" in found.text
+
+
+def test_as_much_torque_left_as_was_recorded_is_no_explanation_however_large_the_noise_seems() -> None:
+    """False readings raise the noise of an acceleration as they raise what is left."""
+    one = JointLeft(joint=1, unit="N·m", rms=39.0, noise=100.0, there=1.0)
+    found = RecordVerdict.of(arm(), [one], MANY)
+    assert not found.explains
+    assert "joint 1 is left with 39 N·m, of 1 N·m recorded" in found.text
