@@ -21,7 +21,7 @@ SCATTER = 4.0
 
 class JointLeft(FrozenRecord):
     """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-    of records that the model itself had made; `there`: of the recorded torque, where torques are compared; in `unit`."""
+    of records that the model itself had made; `there`: of the recorded torque, if torques are compared; in `unit`."""
 
     joint: int
     unit: str

@@ -23,8 +23,8 @@ def doubts_of(found: Diagnosis) -> list[str]:
 
 
 def _more_than_there_words(found: Diagnosis) -> str | None:
-    """That as much torque is left as was recorded, as a clause: then nothing is explained, however large the noise seems
-    to be, since false readings raise that as well."""
+    """That as much torque is left as was recorded, as a clause: then nothing is explained. The noise says nothing here,
+    since false readings raise it as well."""
     left = [float(note.values["after"]) for note in found.notes_data if note.kind == "torque-left"]
     return f"{plain(100.0 * left[0], 3)} % of the recorded torque is left" if left and left[0] >= 1.0 else None
 
