@@ -60,7 +60,7 @@ def test_an_experiment_from_its_submission_to_its_trace(robot: Robot, tmp_path: 
     assert robot.traces.upload_unless_there(path, ended.trace).id == ended.trace
     robot.traces.delete(ended.trace)
     assert robot.traces.upload(path).id == ended.trace
-    with pytest.raises(TraceError, match="is no trace"):
+    with pytest.raises(TraceError, match="cannot be read"):
         robot.traces.upload(tmp_path / "table.txt")
 
 

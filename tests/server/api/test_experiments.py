@@ -74,7 +74,7 @@ def test_a_preset_may_be_named_and_actions_need_no_body(service: Service) -> Non
     for body in ({"preset": "rmap"}, {"preset": "ramp", "spec": SHORT}):
         assert service.robot.post("/experiments", json=body).status_code == 422
     assert service.robot.post(f"/experiments/{made.json()['id']}/cancel").status_code == 200
-    assert service.robot.post("/reset").status_code == 200
+    assert reset(service.robot).status_code == 200
     assert service.robot.post("/queue/resume").status_code == 200
     taken = service.robot.post("/control")
     assert taken.status_code == 201

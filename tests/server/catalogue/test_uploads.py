@@ -166,7 +166,7 @@ def test_no_upload_changes_the_model_of_somebody_else(service: Service) -> None:
 def test_a_model_names_only_traces_that_its_sender_can_see(service: Service) -> None:
     trace = service.robot.post("/traces", content=SOUND, headers=MCAP).json()["id"]
     refused = _send(service, _model() | {"lineage": {"traces": [trace, "no-such-trace"]}}, "x")
-    assert (refused.status_code, refused.json()["type"]) == (422, "docs/service.md#not-a-model")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/api/v1/problems#not-a-model")
     assert refused.json()["detail"] == "lineage.traces: 'no-such-trace' is no trace of this service"
     taken = _send(service, _model() | {"lineage": {"traces": [trace]}}, "x")
     assert taken.json()["traces"] == [trace]
@@ -208,5 +208,5 @@ def test_a_model_made_to_do_harm_is_refused_in_one_line(content: bytes, tmp_path
 
 def test_a_refused_model_is_told_so(service: Service) -> None:
     refused = _send(service, json.loads(HARM["mass"]), "x")
-    assert (refused.status_code, refused.json()["type"]) == (422, "docs/service.md#not-a-model")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/api/v1/problems#not-a-model")
     assert refused.json()["detail"] == "upload: link1.mass = -1000000000.0 kg: allowed are 0.0 to inf"

@@ -79,7 +79,7 @@ def test_a_model_is_compared_with_a_trace_and_the_trace_is_kept(service: Service
     assert report.headers["Content-Security-Policy"].endswith("sandbox")
     assert "<script" not in report.text
     refused = service.robot.delete(f"/traces/{trace}")
-    assert (refused.status_code, refused.json()["type"]) == (409, "docs/service.md#trace-in-use")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/api/v1/problems#trace-in-use")
     assert service.robot.delete(f"/jobs/{job['id']}").status_code == 204
     assert service.robot.delete(f"/traces/{trace}").status_code == 204
     assert service.robot.get(f"/traces/{trace}").status_code == 404

@@ -62,7 +62,7 @@ def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, tea
     said = robot.clock.monotonic()
     robot.clock.turn(DEAD_MAN / 2)  # type: ignore[attr-defined]
     teaching.jog(JOG, said)
-    assert robot.orders == [JogBegin(number=0, asked=robot.clock.monotonic()), JogDrive(velocities=JOG, said=said)]
+    assert robot.orders == [JogBegin(number=0, asked=said), JogDrive(velocities=JOG, said=said)]
 
 
 def test_a_command_that_was_held_up_begins_nothing(robot: Asked, teaching: TeachingService) -> None:

@@ -3948,7 +3948,7 @@ export interface components {
         /**
          * JointLeft
          * @description What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-         *     of records that the model itself had made; both in `unit`.
+         *     of records that the model itself had made; `there`: of the recorded torque, if torques are compared; in `unit`.
          */
         JointLeft: {
             /** Joint */
@@ -3959,6 +3959,8 @@ export interface components {
             rms: number;
             /** Noise */
             noise: number;
+            /** There */
+            there?: number | null;
         };
         /**
          * JointLimits
