@@ -32,6 +32,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.parameter_table import end_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -137,6 +138,7 @@ def diagnose(
         found = jobs.diagnose(begin, named, held_out, options, out, report, design=design)
         _save(found, out, next_file)
         _print_result(found, out, None, next_file, as_json=json)
+        end_if_doubted(found.record)
         return
     if acquire:
         ended = diagnose_and_acquire(
@@ -150,8 +152,14 @@ def diagnose(
     _print_result(found, out, page, next_file, as_json=json)
     if failure is not None:
         raise failure
+    end_if_doubted(found.record)
     if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
         raise typer.Exit(exit_codes.OF_OUTCOME[outcome])
+
+
+def _ended_at_the_record(found: Diagnosis) -> bool:
+    """Whether nothing was computed, since a record is doubted."""
+    return found.verdict == "check-the-record" and not found.steps
 
 
 def _save(found: Diagnosis, out: Path | None, next_file: Path | None) -> None:
@@ -159,7 +167,7 @@ def _save(found: Diagnosis, out: Path | None, next_file: Path | None) -> None:
     fail."""
     from model.machine_model.model_file import save_model
 
-    if out is not None:
+    if out is not None and not _ended_at_the_record(found):
         with replacing(out) as part:
             save_model(found.model_after, part)
     if next_file is not None and found.next_experiment is not None:
@@ -177,7 +185,9 @@ def _print_result(
         print_json(found.model_dump(mode="json"))
     else:
         print(answer_text(found))
-    if out is not None:
+    if out is not None and _ended_at_the_record(found):
+        console().print(f"no model is written to {out}: the record is to be checked first")
+    elif out is not None:
         console().print(f"model {found.model_after.identity}: {out}")
     if next_file is not None:
         asked = found.next_experiment is not None

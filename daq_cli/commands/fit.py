@@ -27,7 +27,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_record
+from daq_cli.models.parameter_table import end_if_doubted, print_on_the_edge, print_parameters, print_record
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -185,6 +185,7 @@ def _fit_motion(
         console().print(
             f"report: {write_report(fit_report(found, comparison, base, files_of([*traces, *held])), report)}"
         )
+    end_if_doubted(found.record)
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:

@@ -56,6 +56,7 @@ def validate(
     The time-domain form shows how every parameter would have to vary with time, and with what that correlates.
     """
     from daq_cli.app.progress import shown_progress
+    from daq_cli.models.parameter_table import end_if_doubted
     from model.simulation.prepared import Options
     from model.validation.conventions import in_convention
     from model.validation.fidelity import validate_by_distortion
@@ -70,6 +71,7 @@ def validate(
         named = NamedTraces(traces, found)
         done = jobs.validate(chosen, model, named, patterns(parameters), output, damping_ratio, report)
         _print_result(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
+        end_if_doubted(done.fidelity.record)
         return
     names = names_to_validate(chosen, patterns(parameters))
     with shown_progress("validating") as progress:
@@ -95,6 +97,7 @@ def validate(
 
         page = validation_report(model_label(model), (fidelity, three), in_time, chosen.machine)
         console().print(f"report: {write_report(page, report)}")
+    end_if_doubted(fidelity.record)
 
 
 def _print_result(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from daq_cli.app.context import console, print_json, print_prose, print_table
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import files_of
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_record
+from daq_cli.models.parameter_table import end_if_doubted, print_on_the_edge, print_parameters, print_record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -61,6 +61,7 @@ def fit_recorded_torques(
 
         curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
         console().print(f"report: {write_report(torque_report(found, curves, base, files), report)}")
+    end_if_doubted(found.record)
 
 
 def _print(found: TorqueFit, files: Mapping[str, str]) -> None:

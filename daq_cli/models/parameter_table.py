@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import typer
+
+from daq.contracts import exit_codes
 from daq_cli.app.context import print_table
 from model.record_check.finding import doubts_in, lines_of
 
@@ -26,6 +29,12 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     for p in parameters:
         table.add_row(*row_of(p))
     print_table(table)
+
+
+def end_if_doubted(findings: Sequence[RecordFinding]) -> None:
+    """Ends the command with the exit code of `daq check` where a record is doubted, behind all that it prints."""
+    if doubts_in(findings):
+        raise typer.Exit(exit_codes.WRONG_INPUT)
 
 
 def print_record(findings: Sequence[RecordFinding]) -> None:

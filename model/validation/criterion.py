@@ -76,7 +76,11 @@ class Fidelity(FrozenRecord):
     def said(self) -> str:
         """The verdict in words, and what expected deviations of the parameters make of what is left."""
         total = f"Σλ² = {self.sum_of_contributions:.3g}"
-        if self.explains:
+        if self.explains and self.verdict is not None and not self.verdict.explains:
+            share = (
+                f"{total}: its numbers alone, as far off as expected, could leave as much; so could a missing effect."
+            )
+        elif self.explains:
             share = f"{total}: deviations of its numbers as large as expected account for what is left (1 or more)."
         else:
             share = (
