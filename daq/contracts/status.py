@@ -33,6 +33,7 @@ class StatusReport(Wire):
     identity: RobotIdentity | None = None
     arm: ArmState
     cause: str = ""
+    stop: int | None = None
     activity: Activity
     experiment: str | None = None
     limp: tuple[int, ...] = ()

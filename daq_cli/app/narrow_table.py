@@ -27,6 +27,9 @@ def print_fitting(table: Table, console: Console) -> None:
     prose after a word; a table that is wider still is printed row by row."""
     for column in table.columns:
         column._cells = [printable(cell) if isinstance(cell, str) else cell for cell in column._cells]
+        for cell in column._cells:
+            if isinstance(cell, Text):
+                cell.plain = printable(cell.plain)
     columns = [[str(column.header), *map(_text, column.cells)] for column in table.columns]
     natural = [max(map(cell_len, column)) for column in columns]
     texts = [column.justify == "left" for column in table.columns]

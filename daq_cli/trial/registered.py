@@ -23,6 +23,7 @@ REGISTERED = (
     "model/simulation",
     "model/fitting",
     "model/machine_model",
+    "model/record_check",
     "model/dynamics",
     "model/drives",
     "model/kinematics",

@@ -28,7 +28,7 @@ class StoreError(DaqError):
 def address_of(section: ServiceSettings) -> URL:
     """Returns the address of a service's database: the configured one, or else that of a file in the service's folder.
     Raises StoreError."""
-    if section.database is not None:
+    if section.database:
         return parse_address(section.database)
     return file_address(section.folder.absolute() / "service.sqlite")
 

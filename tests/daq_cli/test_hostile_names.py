@@ -117,7 +117,7 @@ def test_in_an_e_mail(name: str) -> None:
     now = datetime(2026, 3, 1, 8, tzinfo=UTC)
     told = Notification(kind="fault", topic="arm.fault", at=now, text=name, robot=name)
     mail = Mail(EmailSettings(to="anna@lab.example"), SmtpSettings(host="localhost", port=25, sender="daq@lab.example"))
-    written = mail._written(message_of(told, now))
+    written = mail._written(message_of(told))
     read = message_from_bytes(written.as_bytes(policy=policy.SMTP), policy=policy.default)
     assert read["Bcc"] is None
     assert str(read["Subject"]).endswith(": FAULT (arm.fault)")

@@ -20,7 +20,7 @@ WITHOUT = {"serve", "mock", "demo", "docs"} | {
     for group, commands in {
         "gains": "set",
         "io": "set gripper",
-        "queue": "pause resume approve withdraw",
+        "queue": "pause resume approve withdraw unschedule",
         "token": "add revoke sign-out",
         "teach": "jog step program lead",
         "teach programs": "keep fetch delete",

@@ -66,7 +66,7 @@ def test_a_host_that_another_has_replaced_commands_no_more(
 def test_a_reset_takes_the_control_back(controller: Controller, endpoint: InProcess) -> None:
     greeted_by_another(endpoint)
     assert controller.stop().acknowledged
-    controller.release()
+    controller.release(controller.status().stop)
     assert not endpoint.board.frozen
     controller.set_points({1: 510})
 
@@ -75,18 +75,18 @@ def test_no_reset_passes_over_a_restart_of_the_board(controller: Controller, end
     endpoint.board.brown_out()
     endpoint.bridge.run_until(endpoint.board.time_us + 200_000)
     with pytest.raises(ControllerRestartedError):
-        controller.release()
+        controller.release(controller.status().stop)
     controller.hello()
-    controller.release()
+    controller.release(controller.status().stop)
 
 
 def test_a_stop_between_question_and_release_holds(controller: Controller, endpoint: InProcess) -> None:
     assert controller.stop().acknowledged
     endpoint.bridge.before = Release
     with pytest.raises(RequestRefusedError, match="another stop has come meanwhile, and holds"):
-        controller.release()
+        controller.release(controller.status().stop)
     assert endpoint.board.frozen
-    controller.release()
+    controller.release(controller.status().stop)
     assert not endpoint.board.frozen
 
 

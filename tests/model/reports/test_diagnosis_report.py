@@ -67,8 +67,8 @@ def test_the_gap_of_the_closed_loop_comes_first(answer: tuple[Diagnosis, Compari
         "traces",
         "joint",
         "model as given",
-        "its numbers fitted",
         "+ Coulomb friction, joint 2",
+        "everything refitted",
         "noise",
     )
     assert [(row[0].text, row[1].text) for row in table.rows[2:4]] == [("fitted to", "2"), ("held out", "2")]
