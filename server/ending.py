@@ -13,6 +13,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 
 END_WITHIN = 4.2
 """Time (s) from the signal to the end of this process."""
@@ -48,7 +49,8 @@ class EndInTime:
         still compute, until the time limit."""
         if self._armed.locked() and self._in_order():
             logging.shutdown()
-            sys.stdout.flush()
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
             os._exit(0)
 
     def _end(self) -> None:

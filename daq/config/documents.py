@@ -91,11 +91,14 @@ class Documents:
         address = address or INDEX
         if address == STYLE.name:
             return STYLE.read_bytes(), "text/css; charset=utf-8"
-        path = (self.folder / address).resolve()
-        if not path.is_relative_to(self.folder):
+        try:
+            path = (self.folder / address).resolve()
+            if not path.is_relative_to(self.folder):
+                return None
+            if path.suffix in PICTURES and path.is_file():
+                return path.read_bytes(), PICTURES[path.suffix]
+        except (ValueError, OSError):  # no name that a file can have
             return None
-        if path.suffix in PICTURES and path.is_file():
-            return path.read_bytes(), PICTURES[path.suffix]
         docname = path.relative_to(self.folder).with_suffix("").as_posix()
         if path.suffix != ".html" or docname not in self.names:
             return None

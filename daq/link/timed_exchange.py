@@ -8,7 +8,7 @@ from daq.link.connection import Connection
 from daq.link.errors import LinkError, LinkTimeoutError
 from daq.link.pending import Transaction
 from daq.transport.holders import sharing_words
-from firmware_protocol.commands import Request
+from firmware_protocol.commands import Request, Stop
 
 
 class TimedExchange:
@@ -82,5 +82,6 @@ def no_reply(connection: Connection, transaction: Transaction) -> str:
     """One line about a request that was never answered."""
     name = type(transaction.request).__name__
     why = connection.complaint or "is the controller on, and are port and baud rate the right ones?"
-    why += sharing_words(connection.description)
+    if not isinstance(transaction.request, Stop):  # looking for other programs takes a moment, which no stop has
+        why += sharing_words(connection.description)
     return f"{connection.description}: no reply to {name}, asked {transaction.written} times: {why}"

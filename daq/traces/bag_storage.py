@@ -5,6 +5,7 @@ A channel of another program is never decoded, so whatever its definitions are, 
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import struct
@@ -353,6 +354,15 @@ def _hold_to_its_own_metadata(
         found.hold(before, topics, _text(file.name))
 
 
+def _is_plain(journal: Path) -> bool:
+    """Whether a journal begins as one does, and names no other file: SQLite deletes the file that a journal of several
+    databases ends with."""
+    with journal.open("rb") as stream:
+        begin = stream.read(8)
+        stream.seek(-min(8, stream.seek(0, os.SEEK_END)), os.SEEK_END)
+        return begin in (_JOURNAL, bytes(8)) and stream.read(8) != _JOURNAL
+
+
 def _recovered(file: Path, folder: Path, found: Contents) -> Path:
     """The database with what its journals hold: itself, or a copy to which SQLite has applied them.
 
@@ -365,7 +375,7 @@ def _recovered(file: Path, folder: Path, found: Contents) -> Path:
     copy = folder / "copy.db3"
     copies = {file: copy} | {one: Path(f"{copy}{one.name.removeprefix(file.name)}") for one in beside}
     states = [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]
-    if journal in beside and journal.read_bytes()[:8] not in (_JOURNAL, bytes(8)):
+    if journal in beside and not _is_plain(journal):
         raise TraceError(
             f"{file}: was left in the middle of a change, and the damaged {journal.name} cannot take it back"
         )

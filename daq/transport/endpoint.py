@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
+import errno
 import socket
-import termios
-from contextlib import suppress
 from typing import Protocol
 
 import serial
@@ -14,7 +11,7 @@ import serial
 from daq.transport.channel import ByteChannel, DescriptorChannel
 from daq.transport.holders import FINDERS, other_holders
 from daq.transport.mock_process import MockProcess, start_mock
-from daq.transport.pseudo_terminal import NUMBERED, Terminal, require_same, terminal_at
+from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
 from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
 
 CONNECT_TIMEOUT_S = 3.0
@@ -135,15 +132,12 @@ def _connect_serial(port: SerialPort) -> ByteChannel:
     except (serial.SerialException, OSError, ValueError) as error:
         kind = PortBusyError if _is_busy(error) else TransportError
         raise kind(_why_serial_failed(port.device, error)) from error
-    with suppress(OSError):  # a program that is started later gets no part of the line; the last close frees it again
-        if NUMBERED.fullmatch(os.path.realpath(port.device)) is None and not other_holders(port.device):
-            fcntl.ioctl(device.fileno(), termios.TIOCEXCL)
     device.reset_input_buffer()
     return DescriptorChannel(device.fileno(), port.device, device.close)
 
 
 def _is_busy(error: Exception) -> bool:
-    return "exclusively lock" in str(error) or "Resource busy" in str(error)
+    return getattr(error, "errno", None) == errno.EBUSY or "exclusively lock" in str(error)
 
 
 def _why_serial_failed(device: str, error: Exception) -> str:

@@ -157,17 +157,12 @@ def diagnose(
         raise typer.Exit(exit_codes.OF_OUTCOME[outcome])
 
 
-def _ended_at_the_record(found: Diagnosis) -> bool:
-    """Whether nothing was computed, since a record is doubted."""
-    return found.verdict == "check-the-record" and not found.steps
-
-
 def _save(found: Diagnosis, out: Path | None, next_file: Path | None) -> None:
     """Writes the model and the experiment that is asked for, if requested, before the report is made, which may
     fail."""
     from model.machine_model.model_file import save_model
 
-    if out is not None and not _ended_at_the_record(found):
+    if out is not None and found.computed:
         with replacing(out) as part:
             save_model(found.model_after, part)
     if next_file is not None and found.next_experiment is not None:
@@ -185,7 +180,7 @@ def _print_result(
         print_json(found.model_dump(mode="json"))
     else:
         print(answer_text(found))
-    if out is not None and _ended_at_the_record(found):
+    if out is not None and not found.computed:
         console().print(f"no model is written to {out}: the record is to be checked first")
     elif out is not None:
         console().print(f"model {found.model_after.identity}: {out}")

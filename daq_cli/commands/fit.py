@@ -141,6 +141,7 @@ def fit(
         done = jobs.fit(begin, named, held_out, options, out, report)
         _save(done, out, quiet=json)
         _print_result(done, done.models, out, as_json=json)
+        end_if_doubted(done.record)
     elif torques:
         from daq_cli.models.fit_torques import fit_recorded_torques
 

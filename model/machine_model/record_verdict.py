@@ -103,7 +103,7 @@ class RecordVerdict(FrozenRecord):
         for a missing effect, and beyond the scatter of a variance of so many samples; or as large as what was recorded.
         """
         line = 1.0 + max(MORE_THAN_NOISE, SCATTER * math.sqrt(2.0 / max(samples, 1)))
-        beyond = (e for e in errors if e.in_noises**2 > line or e.is_more_than_there)
+        beyond = (e for e in errors if not e.in_noises**2 <= line or e.is_more_than_there)
         left = sorted(beyond, key=lambda e: e.in_noises, reverse=True)
         far = far_numbers(model)
         return cls(explains=not left, left=tuple(left), far=far, text=_text(left, far))
