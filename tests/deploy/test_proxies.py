@@ -176,6 +176,7 @@ def test_the_live_stream_comes_through(behind: Behind, origin: str, admitted: bo
 
 
 @pytest.mark.browser
+@pytest.mark.slow
 def test_the_page_works_below_a_path(behind: Behind) -> None:
     """In a real browser, which refuses what comes from elsewhere: the live stream, links, the reference of the API."""
     resolved = "--host-resolver-rules=MAP lab 127.0.0.1"
