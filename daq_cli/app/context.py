@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from daq_cli.app.printable import printable as printable  # noqa: PLC0414 - others take it from here
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -33,11 +35,6 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
-
-
-def printable(text: str) -> str:
-    """Text of a file that somebody else may have made, without control characters for the terminal."""
-    return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
 def print_table(table: Table) -> None:

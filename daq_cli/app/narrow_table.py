@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.cells import cell_len
 from rich.text import Text
 
-from daq_cli.app.context import printable
+from daq_cli.app.printable import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

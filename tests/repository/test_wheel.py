@@ -29,7 +29,8 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     expected = {name for name in tracked if name.startswith(tuple(f"{package}/" for package in PACKAGES))}
     expected -= {name for name in expected if name.startswith(NOT_INSTALLED)}
     assert {Path(name).suffix for name in expected} >= {".py", ".toml", ".msg"}
-    assert expected - packed == set()
+    moved = {name for name in expected if f"ma2000/documents/{name}" in packed}  # a page of the documents
+    assert expected - packed - moved == set()
     examples = {f"ma2000/{name}" for name in tracked if name.startswith("examples/")}
     assert {name for name in packed if name.startswith("ma2000/examples/")} == examples != set()
     assert not any(name.startswith("tests/") for name in packed)

@@ -39,7 +39,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 def test_a_trace_in_use_names_itself_and_its_users(store: Store) -> None:
     JobStore(store).submit(ROBOT, CompareRequest(traces=(TRACE.id,), models=("machine",)), NOW, "anna", None)
     model = NewModel("9d2f4b6c8e10", ROBOT, "rig b", "m.json", NOW, "anna", None, None, (TRACE.id,))
-    ModelStore(store).insert(model)
+    ModelStore(store).insert(model, lambda: None)
     with pytest.raises(ProblemError) as refused:
         TraceStore(store).remove(ROBOT, TRACE.id)
     users = "the comparison of 2026-10-05 14:03 UTC, model 'rig b'"

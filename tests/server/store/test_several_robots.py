@@ -17,13 +17,16 @@ def new_model(robot: str) -> NewModel:
 
 def test_the_same_model_belongs_to_each_robot_and_its_file_to_the_last(store: Store) -> None:
     models = ModelStore(store)
-    assert models.insert(new_model("left"))
-    assert models.insert(new_model("right"))
-    assert not models.insert(new_model("right"))
+    assert models.insert(new_model("left"), lambda: None)
+    assert models.insert(new_model("right"), lambda: None)
+    assert not models.insert(new_model("right"), lambda: None)
     assert (models.get("left", "m1").name, models.get("right", "m1").name) == ("of left", "of right")
-    assert models.remove("left", "m1") is None
+    deleted: list[str] = []
+    models.remove("left", "m1", deleted.append)
+    assert deleted == []
     assert models.get("right", "m1").traces == ("000000000001",)
-    assert models.remove("right", "m1") == "m1.json"
+    models.remove("right", "m1", deleted.append)
+    assert deleted == ["m1.json"]
 
 
 def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Store) -> None:
@@ -38,8 +41,8 @@ def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Stor
 
 def test_models_survive_the_migration_and_its_undoing(sqlite_store: Store) -> None:
     config = migrations()
-    ModelStore(sqlite_store).insert(new_model("left"))
-    ModelStore(sqlite_store).insert(new_model("right"))
+    ModelStore(sqlite_store).insert(new_model("left"), lambda: None)
+    ModelStore(sqlite_store).insert(new_model("right"), lambda: None)
     with sqlite_store.engine.connect() as connection:
         config.attributes["connection"] = connection
         command.downgrade(config, "0006")
