@@ -26,6 +26,7 @@ def print_fitting(table: Table, console: Console) -> None:
     """Prints a table without a box as wide as the console. A name goes on in a second line after a dot or an underline,
     prose after a word; a table that is wider still is printed row by row."""
     for column in table.columns:
+        column.header = printable(column.header) if isinstance(column.header, str) else column.header
         column._cells = [printable(cell) if isinstance(cell, str) else cell for cell in column._cells]
         for cell in column._cells:
             if isinstance(cell, Text):
