@@ -98,7 +98,8 @@ def _figure(trace: Recorded, joints: tuple[int, ...] | None) -> Figure:
         empty.set_visible(False)
     _legend(axes[0][0], trace)
     figure.align_ylabels()
-    figure.suptitle(title_of(trace), x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    shown = "".join(s if s.isprintable() else "\N{REPLACEMENT CHARACTER}" for s in title_of(trace))  # XML has no others
+    figure.suptitle(shown, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
     figure.supxlabel(_foot(trace, recorded), x=0.01, ha="left", fontsize=7.5, color=QUIET)
     return figure
 
