@@ -16,7 +16,7 @@ describe('signing in', () => {
   });
 
   it('comes back to the robot that was shown', () => {
-    expect(signInAddress('/api/v1/login/start', '')).toBe('/api/v1/login/start');
+    expect(signInAddress('/api/v1/login/start', '')).toBe(`${root}/api/v1/login/start`);
     expect(signInAddress('/api/v1/login/start', 'left')).toBe(`${root}/api/v1/login/start?robot=left`);
   });
 
