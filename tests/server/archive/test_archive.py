@@ -43,7 +43,7 @@ def bench(store: ObjectStore, proxy: FaultyStore, make: Make) -> Bench:
 def _model_of(bench: Bench, trace: str) -> ModelStore:
     models = ModelStore(bench.store)
     now = bench.clock.utc()
-    models.insert(NewModel("a" * 12, ROBOT, "rig b", "a.json", now, "anna", None, None, (trace,)))
+    models.insert(NewModel("a" * 12, ROBOT, "rig b", "a.json", now, "anna", None, None, (trace,)), lambda: None)
     return models
 
 

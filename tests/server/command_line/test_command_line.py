@@ -81,7 +81,8 @@ def test_ctrl_c_stops_the_arm_and_the_partial_trace_is_fetched(service: Service,
     out, err = running.communicate(timeout=60)
     assert running.returncode == 6, err
     assert out.startswith("stopped: ")
-    assert read_trace(tmp_path / out.splitlines()[-1].removeprefix("trace: ")).record.outcome == "stopped"
+    (trace,) = (line.removeprefix("trace: ") for line in out.splitlines() if line.startswith("trace: "))
+    assert read_trace(tmp_path / trace).record.outcome == "stopped"
     assert service.until_arm("stopped")["queue"]["paused"]
 
 
@@ -174,7 +175,7 @@ def test_traces_are_listed_fetched_and_sent(daq: Daq, tmp_path: Path) -> None:
     table = "time,set_point_1,position_1\n" + "".join(f"{0.02 * i},0.1,{0.1 + 0.002 * i}\n" for i in range(50))
     (tmp_path / "rig.csv").write_text(table)
     assert daq("traces", "import", "rig.csv").code == 0
-    sent = json.loads(daq("traces", "import", bag(tmp_path / "bag", [{}] * 5), "--json").out)
+    sent = json.loads(daq("traces", "import", bag(tmp_path / "bag", [{}] * 5), "--drive-unit", "Nm", "--json").out)
     assert "5 samples on joints 1, 2" in daq("traces", "show", sent["trace"]).out
 
 
