@@ -5,7 +5,7 @@ deviation are refitted by least squares to the readings of the true arm, in the 
 rounding. χ² is what remains, over the variance of the noise, and what the numbers of the file cost: each is stated with
 a deviation, as a share of itself, and costs the square of how many of these it is off, by its logarithm; what those of
 the true arm are off is subtracted. No file says that a number is never further off than rigs are drawn with, so that
-the judge does not know it either (docs/decisions/0072). d′ of a rival is √(χ² of the rival − χ² of the effect's own
+the judge does not know it either (docs/decisions/0053). d′ of a rival is √(χ² of the rival − χ² of the effect's own
 plainest law), and that of `none` is √χ² of the sound arm. Below 5 record and file do not tell.
 The file counts as it is: friction of twice what is stated to 30 % is what a sound arm with an unlucky file has,
 whatever the true friction would have been without the effect.

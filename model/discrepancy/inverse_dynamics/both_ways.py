@@ -1,4 +1,4 @@
-"""What fitted and held-out traces show, each fitted to in turn while the others are held out (docs/decisions/0072).
+"""What fitted and held-out traces show, each fitted to in turn while the others are held out (docs/decisions/0053).
 
 One motion may hardly show what another one shows plainly: a step excites what a slow sweep leaves alone. And what only
 one of them shows may be a part of something else that the library has no law for.
