@@ -39,7 +39,8 @@ COLUMN = 10
 def answer_text(found: Diagnosis) -> str:
     """The whole answer."""
     verdict = found.verdict.replace("-", " ").upper()
-    lines = _filled(verdict, headline(found), len(verdict) + 2)
+    doubted = found.verdict == "check-the-record"  # what is doubted follows
+    lines = [verdict] if doubted else _filled(verdict, headline(found), len(verdict) + 2)
     for line in lines_of(doubts_in(found.record)):
         lines += ["", *_filled("CHECK", line)]
     if not found.computed:

@@ -79,14 +79,14 @@ class RecordVerdict(FrozenRecord):
         """The verdict beside a doubt about the records; an empty one changes nothing."""
         if not doubt:
             return self
-        text = f"{doubt[0].upper()}{doubt[1:]}. Nothing is said of the model until then."
+        text = f"Check the record first: {doubt}. Nothing is said of the model until then."
         return self.model_copy(update={"explains": False, "doubt": doubt, "text": text})
 
     @property
     def headline(self) -> str:
         """The verdict in a few words, for a list."""
         if self.doubt:
-            return self.doubt
+            return f"check the record: {self.doubt}"
         if self.left:
             return f"does not explain the records (joint{'s' if len(self.left) > 1 else ''} {self._joints})"
         return "explains the records" + (", with numbers far from the file" if self.far else "")

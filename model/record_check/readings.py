@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from daq.contracts.machine import Sensor
 from model.arrays import Floats
 
 TAIL = 0.2
@@ -139,7 +140,13 @@ def is_bridged(gap: float, usual: float) -> bool:
     return gap <= BRIDGED[0] * usual + BRIDGED[1]
 
 
-def noise_of(reading: Floats, step: float) -> float:
+def sensor_deviation(sensor: Sensor) -> float:
+    """Standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
+    noise = 0.0 if sensor.noise is None else sensor.noise.value
+    return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.range.value / 2**sensor.bits
+
+
+def noise_of(reading: Floats, step: float = 0.0) -> float:
     """Standard deviation of a reading's noise and rounding, from its second differences, which false readings hardly
     move. step: of the sensor."""
     second = np.diff(reading, 2)
