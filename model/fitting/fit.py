@@ -35,7 +35,7 @@ from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import doubts_headline
-from model.record_check.replicas import noise_left
+from model.record_check.replicas import motion_there, noise_left
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
@@ -281,7 +281,12 @@ def _result(
         errors=errors,
         verdict=RecordVerdict.of(
             fitted,
-            [JointLeft(joint=e.joint, unit=e.unit, rms=e.after, noise=e.noise or e.floor) for e in errors],
+            [
+                JointLeft(
+                    joint=e.joint, unit=e.unit, rms=e.after, noise=e.noise or e.floor, there=_there(problem, e, traces)
+                )
+                for e in errors
+            ],
             sum(r.samples for r in problem.records),
         ),
         whitened_mean_square=estimate.mean_square,
@@ -297,6 +302,10 @@ def _result(
         message=solution.message,
         on_the_edge=on_the_edge(model, fitted, options),
     )
+
+
+def _there(problem: SimulatedProblem, error: JointError, traces: Sequence[Trace]) -> float | None:
+    return motion_there(problem.model.machine, error.joint, traces) if problem.signal == "position" else None
 
 
 def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:

@@ -21,7 +21,8 @@ SCATTER = 4.0
 
 class JointLeft(FrozenRecord):
     """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-    of records that the model itself had made; `there`: of the recorded torque, if torques are compared; in `unit`."""
+    of records that the model itself had made; `there`: of the recorded torque, or of the recorded motion about its mean
+    (None where that is hardly more than noise of the readings); in `unit`."""
 
     joint: int
     unit: str

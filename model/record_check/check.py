@@ -23,6 +23,7 @@ from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.readings import (
     FalseReadings,
     Jump,
+    find_bounds,
     find_gaps,
     find_jumps,
     is_bridged,
@@ -159,6 +160,7 @@ def _on_readings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
     yield from _on_gaps(trace)
     for joint in machine.modelled_joints:
         yield from _on_jumps(trace, machine, joint)
+        yield from _on_bounds(trace, machine, joint)
     yield from _on_units(trace, machine)
 
 
@@ -212,6 +214,32 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
         )
         advice = "The sensor or its line was stuck: use a piece without."
         yield told.finding("stuck", [replace(jump, row=since - 1)], says, advice)
+
+
+def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
+    """Readings that are cut off: at the end of a sensor's range, or of an amplifier's or a converter's."""
+    source = trace.velocity if measures_speed(machine, joint) and trace.velocity is not None else trace.position
+    reading = source[:, trace.column(joint)]
+    bounds = find_bounds(reading)
+    if not bounds:
+        return
+    times = [float(trace.time[first]) for first, _ in bounds]
+    longest = max(float(trace.time[last] - trace.time[first]) for first, last in bounds)
+    unit = machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else "")
+    value = float(reading[bounds[0][0]])
+    yield RecordFinding(
+        kind="saturated",
+        consequence="doubt",
+        record=trace.called,
+        joint=joint,
+        times=tuple(times[:MOST_KEPT]),
+        count=len(bounds),
+        value=value,
+        unit=unit,
+        says=f"its reading comes to {number(value)} {unit} at full speed and stands there, {at_times(times)}, for "
+        f"{number(longest)} s at most.",
+        advice="Is the sensor at the end of its range, or the joint at a stop? Use a piece without.",
+    )
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from model.record_check.balance import (
     WAYS,
     Motion,
     balance,
+    inertia_scales,
     likelier,
     motion_of,
 )
@@ -197,6 +198,10 @@ class _Witnesses:
                 yield self._of_way(way, joint)
                 return
         if not holds:
+            stretched = self._stretched(motion)
+            if stretched is not None:
+                yield stretched
+                return
             yield from self._out_of_scale(motion)
             yield from self._behind(motion)
         if not isinstance(self.model.machine.controller, NoController) and not holds:
@@ -216,6 +221,17 @@ class _Witnesses:
                 says = f"its drive comes {number(late)} samples after the motion that it makes: it stands too low."
                 advice = "Move the drive up by one row, if each row is read at one moment."
                 yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
+
+    def _stretched(self, motion: Motion) -> RecordFinding | None:
+        """Times that are another unit's, or a clock's of another speed, told by what accelerates the bodies: friction
+        and back-EMF may take nearly all of the torque. A load that nobody stated would do the same as a slow clock."""
+        factors = [factor for factor in inertia_scales(self.model, motion) if factor is not None and factor > 0.0]
+        for ratio, sure in ((1e3, True), (2.0, False), (0.5, False)):
+            if factors and all(_near(math.sqrt(factor), ratio) for factor in factors):
+                says = f"drive and motion ask for {number(factors[0])} times the inertia that the machine file states."
+                advice = f"Are times {ratio:g} times as long as they were{', as in ms' if sure else ''}? They are in s."
+                return self._doubt("time-scale", None, says, advice, value=ratio, allowed=1.0, sure=sure)
+        return None
 
     def _out_of_scale(self, motion: Motion) -> Iterator[RecordFinding]:
         found = balance(self.model, motion)

@@ -21,6 +21,7 @@ FindingKind = Literal[
     "jump",
     "no-sensor",
     "position-unit",
+    "saturated",
     "spikes",
     "stuck",
     "time-scale",

@@ -30,6 +30,8 @@ RETURNS = 3
 """Samples within which a spike returns."""
 STUCK = 5
 """Least samples with the same reading before a jump, for a reading that was stuck."""
+ENTRY = 3
+"""Intervals before a bound, in each of which a reading that is cut off there moves on."""
 MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
 BRIDGED = (10.0, 0.05)
@@ -126,6 +128,21 @@ def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) ->
         turn = next(turn for turn in turns if _whole(jump.size, turn))
         whole[jump.row + 1 :] -= turn * round(jump.size / turn)
     return whole
+
+
+def find_bounds(reading: Floats) -> list[tuple[int, int]]:
+    """First and last row of each stretch in which a reading stands at its largest or its smallest value, that it comes
+    to at full speed: a torque needs longer to stop a joint than from one sample to the next."""
+    rates = np.abs(np.diff(reading))
+    usual = float(np.sqrt(np.mean(rates**2)))
+    found = []
+    for bound in (reading.max(), reading.min()):
+        at = np.flatnonzero(np.diff(np.concatenate([[0], (reading == bound).astype(int), [0]])))
+        for first, last in zip(at[::2], at[1::2] - 1, strict=True):
+            before = rates[max(0, first - ENTRY) : first]
+            if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
+                found.append((int(first), int(last)))
+    return sorted(found)
 
 
 def find_gaps(time: Floats) -> list[tuple[int, float]]:

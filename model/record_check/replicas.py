@@ -26,6 +26,8 @@ FEWEST, MOST = 6, 20
 """Least and largest number of replicas of a record."""
 SECONDS = 200.0
 """Total length of motion (s) of a record's replicas: in a short record friction changes sign only a few times."""
+LEAST_MOTION = 3.0
+"""Motion, in noises of a reading, from which more than that motion may be left of a record."""
 SEED = 1991
 
 
@@ -37,13 +39,20 @@ def noise_left(model: Model, traces: Sequence[Trace], loop: Loop = "closed") -> 
     Args:
         loop: how the model is compared with the records.
     """
-    reading = np.array([_of_reading(model.machine, j, traces) for j in model.machine.modelled_joints])
+    reading = np.array([reading_noise(model.machine, j, traces) for j in model.machine.modelled_joints])
     try:
         squares = np.array([_mean_square(model, trace, loop) for trace in traces])
     except DaqError:
         return reading
     mean = np.average(squares, axis=0, weights=[len(trace) for trace in traces])
     return np.asarray(np.maximum(np.sqrt(mean), reading)) if np.isfinite(mean).all() else reading
+
+
+def motion_there(machine: Machine, joint: int, traces: Sequence[Trace]) -> float | None:
+    """Root mean square of a joint's measured motion about its mean, rad (m); None where that is hardly more than noise
+    of the readings."""
+    there = float(np.concatenate([trace.position[:, trace.column(joint)] for trace in traces]).std())
+    return there if there > LEAST_MOTION * reading_noise(machine, joint, traces) else None
 
 
 def made_by(model: Model, trace: Trace, rng: np.random.Generator, loop: Loop = "closed") -> Trace:
@@ -64,7 +73,7 @@ def made_by(model: Model, trace: Trace, rng: np.random.Generator, loop: Loop = "
     return replace(trace, position=position, drive=drive)
 
 
-def _of_reading(machine: Machine, joint: int, traces: Sequence[Trace]) -> float:
+def reading_noise(machine: Machine, joint: int, traces: Sequence[Trace]) -> float:
     """Standard deviation of a reading, as its sensor states it; else as the records show it."""
     sensor = machine.joint(joint).sensor
     if sensor is not None and sensor.measures == "position":

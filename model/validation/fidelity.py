@@ -17,7 +17,7 @@ from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import doubts_headline
-from model.record_check.replicas import noise_left
+from model.record_check.replicas import motion_there, noise_left
 from model.simulation.prepared import Options
 from model.units import joint_unit
 from model.validation.criterion import (
@@ -98,7 +98,13 @@ def validate_by_distortion(
     machine = model.machine
     noises = dict(zip(machine.modelled_joints, map(float, noise_left(model, error.traces)), strict=True))
     left = [
-        JointLeft(joint=j, unit=joint_unit(machine, j), rms=math.sqrt(e), noise=noises[j])
+        JointLeft(
+            joint=j,
+            unit=joint_unit(machine, j),
+            rms=math.sqrt(e),
+            noise=noises[j],
+            there=motion_there(machine, j, traces),
+        )
         for j, e in zip(error.outputs, errors, strict=True)
     ]
     verdict = RecordVerdict.of(model, left, sum(map(len, error.traces)))
