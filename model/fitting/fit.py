@@ -281,12 +281,7 @@ def _result(
         errors=errors,
         verdict=RecordVerdict.of(
             fitted,
-            [
-                JointLeft(
-                    joint=e.joint, unit=e.unit, rms=e.after, noise=e.noise or e.floor, there=_there(problem, e, traces)
-                )
-                for e in errors
-            ],
+            [_left(problem, error, traces) for error in errors],
             sum(r.samples for r in problem.records),
         ),
         whitened_mean_square=estimate.mean_square,
@@ -304,8 +299,10 @@ def _result(
     )
 
 
-def _there(problem: SimulatedProblem, error: JointError, traces: Sequence[Trace]) -> float | None:
-    return motion_there(problem.model.machine, error.joint, traces) if problem.signal == "position" else None
+def _left(problem: SimulatedProblem, error: JointError, traces: Sequence[Trace]) -> JointLeft:
+    there = motion_there(problem.model.machine, error.joint, traces) if problem.signal == "position" else None
+    noise = error.noise or error.floor
+    return JointLeft(joint=error.joint, unit=error.unit, rms=error.after, noise=noise, there=there)
 
 
 def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:

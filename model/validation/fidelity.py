@@ -97,14 +97,9 @@ def validate_by_distortion(
     distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
     machine = model.machine
     noises = dict(zip(machine.modelled_joints, map(float, noise_left(model, error.traces)), strict=True))
+    there = {j: motion_there(machine, j, traces) for j in error.outputs}
     left = [
-        JointLeft(
-            joint=j,
-            unit=joint_unit(machine, j),
-            rms=math.sqrt(e),
-            noise=noises[j],
-            there=motion_there(machine, j, traces),
-        )
+        JointLeft(joint=j, unit=joint_unit(machine, j), rms=math.sqrt(e), noise=noises[j], there=there[j])
         for j, e in zip(error.outputs, errors, strict=True)
     ]
     verdict = RecordVerdict.of(model, left, sum(map(len, error.traces)))
