@@ -83,6 +83,8 @@ class Tally:
     faults: Counter[str] = field(default_factory=Counter)
     examples: list[str] = field(default_factory=list)
     slowest: float = 0.0
+    """s that this process computed for one file: what it waited on a busy computer says nothing of a reader."""
+    slowest_file: str = ""
 
     def fault(self, fault: str, kind: Kind, way: str, detail: str) -> None:
         """Counts a fault."""
@@ -235,11 +237,13 @@ class Campaign:
     def run(self, cases: Iterator[tuple[Kind, str, bytes]]) -> Tally:
         """Reads each file."""
         for kind, way, data in cases:
-            begun = time.monotonic()
+            begun = time.process_time()
             kind.damaged.write_bytes(data)
             self._case(kind, way, data)
             kind.damaged.write_bytes(kind.data)
-            self.tally.slowest = max(self.tally.slowest, time.monotonic() - begun)
+            took = time.process_time() - begun
+            if took > self.tally.slowest:
+                self.tally.slowest, self.tally.slowest_file = took, f"{kind.name}, {way}"
             self.tally.cases += 1
         return self.tally
 
@@ -293,7 +297,7 @@ def figures(tally: Tally) -> list[Figure]:
     return [
         at_least("damaged files", tally.cases, 50_000, "", ends),
         *(at_most(fault, tally.faults[fault], 0, "") for fault in faults),
-        at_most("slowest file", tally.slowest, 5.0, "s"),
+        at_most("slowest file", tally.slowest, 5.0, "s", tally.slowest_file),
     ]
 
 

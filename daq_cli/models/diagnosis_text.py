@@ -146,7 +146,7 @@ def _errors_of(found: Diagnosis) -> list[str]:
 
 def _beside(label: str, lines: Sequence[str]) -> list[str]:
     """Lines beside a label, as they are."""
-    return [f"{'' if number else label:<{INDENT}}{line}" for number, line in enumerate(lines)]
+    return [f"{'' if number else label:<{INDENT}}{line}".rstrip() for number, line in enumerate(lines)]
 
 
 def _error(e: SignalError) -> str:

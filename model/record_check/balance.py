@@ -158,21 +158,24 @@ def _torques(model: Model, motion: Motion, width: int) -> _Torques:
     return _Torques(given, needed, braked, gravity_along(chain, position), rate, speed)
 
 
-def inertia_scales(model: Model, motion: Motion) -> list[float | None]:
-    """Of each joint, the factor on what accelerates its bodies with which drive and motion belong together; None where
-    that is not clear. Weight has a factor of its own, and friction of any size, back-EMF and a constant are free.
+def time_ratios(model: Model, motion: Motion) -> list[float | None]:
+    """Of each joint, how many times too long times are for drive and motion to belong together; None where that is not
+    clear. It is told by what accelerates the bodies: weight has a factor of its own, and friction of any size, back-EMF
+    and a constant are free.
 
-    Times that are r times too long make accelerations r² times too small, and leave weight as it is.
+    Times that are r times too long make accelerations r² times too small (r times, where speeds are measured).
     """
     width = _width(motion)
     if width is None:
         return [None] * motion.position.shape[1]
     torques = _torques(model, motion, width)
     inertial = torques.needed - torques.weight
-    return [
+    power = 0.5 if motion.speed is None else 1.0
+    factors = [
         _factor(torques.given[:, j], inertial[:, j], torques.weight[:, j], torques.speed[:, j], width)
         for j in range(inertial.shape[1])
     ]
+    return [None if factor is None else factor**power for factor in factors]
 
 
 def _factor(given: Floats, inertial: Floats, weight: Floats, speed: Floats, width: int) -> float | None:

@@ -19,9 +19,9 @@ from model.record_check.balance import (
     WAYS,
     Motion,
     balance,
-    inertia_scales,
     likelier,
     motion_of,
+    time_ratios,
 )
 from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
@@ -225,10 +225,10 @@ class _Witnesses:
     def _stretched(self, motion: Motion) -> RecordFinding | None:
         """Times that are another unit's, or a clock's of another speed, told by what accelerates the bodies: friction
         and back-EMF may take nearly all of the torque. A load that nobody stated would do the same as a slow clock."""
-        factors = [factor for factor in inertia_scales(self.model, motion) if factor is not None and factor > 0.0]
+        ratios = [found for found in time_ratios(self.model, motion) if found is not None]
         for ratio, sure in ((1e3, True), (2.0, False), (0.5, False)):
-            if factors and all(_near(math.sqrt(factor), ratio) for factor in factors):
-                says = f"drive and motion ask for {number(factors[0])} times the inertia that the machine file states."
+            if ratios and all(_near(found, ratio) for found in ratios):
+                says = "drive and motion ask for another inertia than the machine file's, as if times were false."
                 advice = f"Are times {ratio:g} times as long as they were{', as in ms' if sure else ''}? They are in s."
                 return self._doubt("time-scale", None, says, advice, value=ratio, allowed=1.0, sure=sure)
         return None
