@@ -8,11 +8,9 @@ of what the file has, or its notes say what is missing. The files of traces them
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import random
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -28,7 +26,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from benchmarks.damaged_traces import AT_RANDOM
-from benchmarks.figures import Figure, at_least, at_most, show
+from benchmarks.figures import Figure, at_least, at_most, show_campaign
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import load_settings
 from daq.contracts.documents import read_document
@@ -303,14 +301,7 @@ def figures(tally: Tally) -> list[Figure]:
 
 def main() -> int:
     """The exit code: 1 when a target was missed."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks file_fuzz", description=__doc__)
-    parser.add_argument("--cases", type=int, default=CASES, help=f"damaged files (default {CASES})")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        tally = campaign(given.cases, given.seed, Path(folder))
-    print("\n".join(tally.examples))
-    return show("Damaged files of every kind", "python -m benchmarks file_fuzz", figures(tally))
+    return show_campaign("file_fuzz", "Damaged files of every kind", CASES, campaign, figures, __doc__)
 
 
 if __name__ == "__main__":
