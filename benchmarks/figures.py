@@ -76,8 +76,8 @@ def show_campaign(
     figures: Callable[[Tally], list[Figure]],
     description: str | None,
 ) -> int:
-    """Runs a campaign of damaged files as the command line asks, prints its examples of faults and its figures; the exit
-    code is 1 when a target was missed. cases: the default number of files."""
+    """Runs a campaign of damaged files as the command line asks, and prints its examples of faults and its figures. The
+    exit code is 1 when a target was missed. cases: the default number of files."""
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks {module}", description=description)
     parser.add_argument("--cases", type=int, default=cases, help=f"damaged files (default {cases})")
     parser.add_argument("--seed", type=int, default=1)

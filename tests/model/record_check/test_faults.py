@@ -22,7 +22,7 @@ from tests.model.record_check.faults import FAULTS, Faulty
 from tests.model.record_check.rigs import RIGS, mock, world
 
 NOT_TOLD = {("linear_axis", "late_drive"), ("planar-torques", "late_drive")}
-"""Faults that a record does not hold: where friction takes nearly all torque, or noise is large, one sample is within it."""
+"""Faults that a record does not hold: one sample is within friction that takes nearly all torque, or within noise."""
 ONLY_NOTED = {"late_drive", "wraps", "slow_times"}
 """Faults that may be said as a note: wraps that are taken out; and what a record without a controller leaves open."""
 NEAR = 0.3
