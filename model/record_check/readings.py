@@ -139,7 +139,7 @@ def find_bounds(reading: Floats) -> list[tuple[int, int]]:
     for bound in (reading.max(), reading.min()):
         at = np.flatnonzero(np.diff(np.concatenate([[0], (reading == bound).astype(int), [0]])))
         for first, last in zip(at[::2], at[1::2] - 1, strict=True):
-            before = rates[max(0, first - ENTRY) : first]
+            before = rates[max(0, first - 1 - ENTRY) : max(0, first - 1)]  # the last step is cut short
             if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
                 found.append((int(first), int(last)))
     return sorted(found)
