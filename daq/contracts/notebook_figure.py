@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font, get_font_names
 from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter
 
 if TYPE_CHECKING:
     from matplotlib.backend_bases import RendererBase
@@ -54,8 +53,9 @@ class NotebookFigure(Figure):
         for text in self.findobj(Text):
             text.set_text(drawable(text.get_text()))
         for axis in (axis for axes in self.axes for axis in (axes.xaxis, axes.yaxis)):
-            if isinstance(labels := axis.get_major_formatter(), FixedFormatter):
-                labels.seq = [drawable(label) for label in labels.seq]
+            for texts in getattr(getattr(axis.get_major_formatter(), "func", None), "args", ()):
+                if isinstance(texts, dict):  # labels by place, of which matplotlib makes texts while it draws
+                    texts.update({place: drawable(text) for place, text in texts.items()})
         super().draw(renderer)
 
     def _repr_png_(self) -> bytes:

@@ -38,6 +38,7 @@ NAMES = pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
 def test_in_the_figure_and_the_page_of_a_trace(tmp_path: Path, name: str) -> None:
     """A warning would end the test, as every warning does."""
     trace = read_trace(write(tmp_path / "a.mcap", 20, robot=name, notes=name, operator=name))
+    name = name.replace("\n", "\N{REPLACEMENT CHARACTER}")
     assert printable(name) in figure_of(trace).get_suptitle()
     picture(trace, "png")
     ET.fromstring(picture(trace, "svg"))
