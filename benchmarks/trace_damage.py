@@ -9,12 +9,10 @@ deleted.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import random
 import resource
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -35,7 +33,7 @@ from benchmarks.damaged_traces import (
     of_records,
     originals,
 )
-from benchmarks.figures import Figure, at_least, at_most, show
+from benchmarks.figures import Figure, at_least, at_most, show_campaign
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace, TraceRecord
@@ -228,14 +226,7 @@ def campaign(cases: int, seed: int, folder: Path, share: float = 1.0) -> Tally:
 
 def main() -> int:
     """The exit code: 1 when a target was missed."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks trace_damage", description=__doc__)
-    parser.add_argument("--cases", type=int, default=CASES, help=f"damaged files (default {CASES})")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        tally = campaign(given.cases, given.seed, Path(folder))
-    print("\n".join(tally.examples))
-    return show("Damaged trace files", "python -m benchmarks trace_damage", figures(tally))
+    return show_campaign("trace_damage", "Damaged trace files", CASES, campaign, figures, __doc__)
 
 
 if __name__ == "__main__":

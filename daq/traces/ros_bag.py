@@ -259,7 +259,7 @@ class _Table:
         velocity, effort = self._optional("velocity"), self._optional("effort")
         if effort is not None and unit is None:
             line = "its effort may be in N·m, as ROS defines it, or in amperes, as many drivers send it"
-            raise TraceError(f"{self._origin}: {line}; say --drive-unit Nm, N, A or V, or none to leave it out")
+            raise TraceError(f"{self._origin}: {line}; say --drive-unit N·m, N, A or V, or none to leave it out")
         drive = None if unit == "none" else effort
         update: dict[str, Any] = {"notes": " ".join([record.notes, *self._said]).strip(), "created": created}
         update |= {"drive_unit": unit if drive is not None else None} | ({"outcome": "interrupted"} if lost else {})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from dataclasses import dataclass, field
@@ -26,6 +27,13 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real arm without being asked.")]
 
 
+LABEL = 7
+"""Widest indentation of what follows a label, columns."""
+_TIED = "\xa0"
+"""A blank at which no line ends."""
+_BEFORE_UNIT = re.compile(r"(?<=[\d±]) (?=\S)|(?<=\S) (?=±)")
+
+
 @cache
 def console() -> Console:
     """The console for people: progress, questions and remarks on standard error. Results go to standard output.
@@ -46,10 +54,17 @@ def print_table(table: Table) -> None:
     print_fitting(table, Console(highlight=False, markup=False))
 
 
-def print_prose(text: str) -> None:
-    """Prints a sentence of a result on standard output, broken at words to the terminal's width."""
+def print_prose(text: str, label: str = "") -> None:
+    """Prints sentences of a result on standard output, broken at words to the terminal's width.
+
+    Args:
+        label: begins the first line; the others begin below its first word's end. A number keeps its unit beside it.
+    """
     width = shutil.get_terminal_size().columns
-    print("\n".join(wrap(text, width, break_long_words=False, break_on_hyphens=False)))
+    whole = _BEFORE_UNIT.sub(_TIED, printable(text))
+    indent = " " * min(len(label), LABEL)
+    lines = wrap(label + whole, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    print("\n".join(lines).replace(_TIED, " "))
 
 
 @dataclass

@@ -20,6 +20,10 @@ BESIDE = 2
 INDENT = "  "
 _JOINTS = re.compile(r"(?<=[./_-])(?=[^\W\d])")
 """Where a name may go on in the next line: after a dot, a slash or an underline."""
+_UNIT = re.compile(r"[^._/-]+/[^._/-]+")
+"""Two words with a slash between them, as N·m·s/rad: a unit, which stays in one line."""
+_BLANKS = re.compile(r"(?<![\d±])\s+|(?<=\d)\s+(?=[\d(])")
+"""Where a line may end: not between a number and its unit."""
 
 
 def print_fitting(table: Table, console: Console) -> None:
@@ -59,22 +63,28 @@ def _shrunk(natural: list[int], least: list[int], texts: list[bool], room: int) 
 
 def _least(column: list[str]) -> int:
     """Width of the longest piece that is not broken."""
-    return max((cell_len(piece) for cell in column for word in cell.split() for piece in _pieces(word)), default=0)
+    return max((cell_len(piece) for cell in column for word in _words(cell) for piece in _pieces(word)), default=0)
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in _BLANKS.split(text.strip()) if word]
+
+
+def _parts(word: str) -> list[str]:
+    return [word] if _UNIT.fullmatch(word) else _JOINTS.split(word)
 
 
 def _pieces(word: str) -> list[str]:
-    first, *others = _JOINTS.split(word)
+    first, *others = _parts(word)
     return [first, *(INDENT + piece for piece in others)]
 
 
 def _broken(cell: object, width: int) -> Any:
     """The cell with line breaks after joints of its names, where a word is longer than the width."""
     text = _text(cell)
-    if all(cell_len(word) <= width for word in text.split()):
-        return cell
     lines = [""]
-    for word in text.split():
-        for number, piece in enumerate(_JOINTS.split(word)):
+    for word in _words(text):
+        for number, piece in enumerate(_parts(word) if cell_len(word) > width else [word]):
             glue = " " if number == 0 and lines[-1].strip() else ""
             if lines[-1].strip() and cell_len(lines[-1] + glue + piece) > width:
                 lines.append(INDENT)

@@ -19,6 +19,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.record_doubts import DespiteDoubtsOption, stop_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import robot_of
 
@@ -41,6 +42,7 @@ def compare(
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
+    despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
     """Simulate the same traces with two or more models: whose error is smaller, where, and where the models differ.
@@ -62,6 +64,7 @@ def compare(
         there = jobs.compare(models, read, NamedTraces(traces, found), report)
         _print_result(there.models, there.differences, as_json=json)
         return
+    stop_if_doubted(read[0], found, despite_doubts=despite_doubts, as_json=json)
     held_out = _held_out(read, [t.record.trace_id for t in found])
     with shown_progress("comparing") as progress:
         comparison = compare(list(zip(model_labels(models), read, strict=True)), found, held_out, progress=progress)

@@ -32,7 +32,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import end_if_doubted
+from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
 
@@ -100,9 +100,7 @@ def diagnose(
         bool,
         typer.Option("--design", help="Search for a motion of its own to ask for; it takes some 10 s more."),
     ] = False,
-    despite_doubts: Annotated[
-        bool, typer.Option("--despite-doubts", help="Compute although the check of the records raises doubts.")
-    ] = False,
+    despite_doubts: DespiteDoubtsOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -181,7 +179,7 @@ def _print_result(
     else:
         print(answer_text(found))
     if out is not None and not found.computed:
-        console().print(f"no model is written to {out}: the record is to be checked first")
+        console().print(f"no model is written to {out}: check the record first")
     elif out is not None:
         console().print(f"model {found.model_after.identity}: {out}")
     if next_file is not None:

@@ -27,9 +27,11 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import end_if_doubted, print_on_the_edge, print_parameters, print_record
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_undetermined
+from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted, print_record, stop_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import RobotAccess, robot_of
+from model.record_check.finding import doubts_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,6 +110,7 @@ def fit(
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
+    despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
     """Find the parameters with which a model best reproduces traces, and name those that the traces do not
@@ -139,10 +142,13 @@ def fit(
     if (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
         done = jobs.fit(begin, named, held_out, options, out, report)
-        _save(done, out, quiet=json)
+        if despite_doubts or not doubts_in(done.record):
+            _save(done, out, quiet=json)
         _print_result(done, done.models, out, as_json=json)
         end_if_doubted(done.record)
-    elif torques:
+        return
+    stop_if_doubted(begin, [*fitted_to, *held], despite_doubts=despite_doubts, as_json=json)
+    if torques:
         from daq_cli.models.fit_torques import fit_recorded_torques
 
         fit_recorded_torques(begin, fitted_to, held, options, out, as_json=json, report=report)
@@ -258,12 +264,11 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
     known = sum(p.verdict == "known" for p in found.parameters)
     print(f"\nknown: {known} of {len(found.parameters)}", end="")
     print("; of the others, in brackets, the model has one value of many" if known < len(found.parameters) else "")
-    for combination in found.identifiability.undetermined:
-        print(f"  not determined: {combination.text}")
+    print_undetermined(found.identifiability)
     if base is not None:
         from model.base_parameters.result import headline
 
-        print(headline(base))
+        print_prose(headline(base))
     print()
     print_agreement(agreement)
     if not found.converged:

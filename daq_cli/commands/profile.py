@@ -22,6 +22,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.record_doubts import DespiteDoubtsOption, stop_if_doubted
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -79,6 +80,7 @@ def profile(
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
+    despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
     """Show how much worse the best fit becomes when a parameter is moved and all others are fitted again.
@@ -100,6 +102,7 @@ def profile(
         starts=starts,
         seed=seed,
     )
+    stop_if_doubted(read_model(model), read, despite_doubts=despite_doubts, as_json=json)
     fitted = _fitted(model, effects, read, options, parameter)
     found = []
     for name in parameter:

@@ -24,6 +24,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.record_doubts import DespiteDoubtsOption, stop_if_doubted
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ def simulate(
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
+    despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
     """Simulate traces from their recorded set points, and show the difference between measured and simulated.
@@ -74,6 +76,7 @@ def simulate(
         if output.suffix == ".csv":
             check_csv(output)
     chosen = read_model(model)
+    stop_if_doubted(chosen, found, despite_doubts=despite_doubts, as_json=json)
     options = Options(loop="open" if open_loop else "closed", quantise=not no_rounding)
     with shown_progress("simulating") as progress:
         comparison = compare([(model_label(model), chosen)], found, options=options, progress=progress)

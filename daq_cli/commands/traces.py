@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from daq.contracts.service.archive import ArchiveStatus, TraceArchive
     from daq.contracts.trace import Trace, TraceRecord
     from daq.traces.salvage import Salvaged
+    from daq_cli.robot.access import RobotAccess
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 
@@ -196,7 +197,9 @@ def import_(
     received: Annotated[bool, typer.Option("--received", help="Of a bag: the times of reception.")] = False,
     drive_unit: Annotated[
         str | None,
-        typer.Option(help="Unit of the drive: V, A, Nm or N; of a bag, that of its effort, which `none` leaves out."),
+        typer.Option(
+            help="Unit of the drive: V, A, N or N·m (or Nm); of a bag, that of its effort, which `none` leaves out."
+        ),
     ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
@@ -211,6 +214,40 @@ def import_(
         print(made.text)
         if made.notes:
             typer.echo(printable(made.notes), err=True)
+        if robot.call.server is None:
+            _print_imported(robot, Path(made.file))
+
+
+def _print_imported(robot: RobotAccess, file: Path) -> None:
+    """What was read, whether the check of records doubts it, and the next command, as remarks."""
+    from daq.traces.files import open_trace
+
+    trace = open_trace(file, robot.call.trace_limits)
+    joints = "joint" if len(trace.joints) == 1 else "joints"
+    columns = ["position", *(name.replace("_", " ") for name in ("set_point", "velocity") if _has(trace, name))]
+    columns += [f"drive ({trace.drive_unit})"] if _has(trace, "drive") else []
+    length = float(trace.time[-1] - trace.time[0])
+    said = f"read: {len(trace)} samples of {joints} {', '.join(map(str, trace.joints))} over {length:.2f} s"
+    typer.echo(printable(f"{said}: {', '.join(columns)}"), err=True)
+    configured = "machine" in robot.call.settings.robot.model_fields_set
+    machine = trace.record.machine or (robot.machine if configured else None)
+    if machine is None or max(trace.joints) > len(machine.joints):
+        why = "names no machine" if machine is None else f"has more joints than {machine.name}"
+        typer.echo(printable(f"not checked: it {why}\nnext: daq check {file} --model MACHINE.toml"), err=True)
+        return
+    try:
+        from model.machine_model.model import base_model
+        from model.record_check.check import check_records
+        from model.record_check.finding import doubts_in, lines_of
+    except ImportError:  # a plain installation reads traces and computes nothing
+        return
+    doubts = lines_of(doubts_in(check_records(base_model(machine), [trace])))
+    lines = [f"CHECK  {line}" for line in doubts] or ["check: nothing is doubted"]
+    typer.echo(printable("\n".join([*lines, f"next: daq {'check' if doubts else 'diagnose'} {file}"])), err=True)
+
+
+def _has(trace: Trace, signal: str) -> bool:
+    return getattr(trace, signal) is not None
 
 
 @app.command("verify")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -19,6 +20,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.record_doubts import DespiteDoubtsOption
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import robot_of
 
@@ -49,6 +51,10 @@ def validate(
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
+    details: Annotated[
+        bool, typer.Option("--details", help="Print every parameter, and how each would vary with time.")
+    ] = False,
+    despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
     """Validate a model by distortion: Σλ² says whether expected parameter deviations explain the model's errors.
@@ -56,7 +62,7 @@ def validate(
     The time-domain form shows how every parameter would have to vary with time, and with what that correlates.
     """
     from daq_cli.app.progress import shown_progress
-    from daq_cli.models.parameter_table import end_if_doubted
+    from daq_cli.models.record_doubts import end_if_doubted, stop_if_doubted
     from model.simulation.prepared import Options
     from model.validation.conventions import in_convention
     from model.validation.fidelity import validate_by_distortion
@@ -70,9 +76,10 @@ def validate(
     if (jobs := service_jobs(robot)) is not None:
         named = NamedTraces(traces, found)
         done = jobs.validate(chosen, model, named, patterns(parameters), output, damping_ratio, report)
-        _print_result(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
+        _print_result(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json, details=details)
         end_if_doubted(done.fidelity.record)
         return
+    stop_if_doubted(chosen, found, despite_doubts=despite_doubts, as_json=json)
     names = names_to_validate(chosen, patterns(parameters))
     with shown_progress("validating") as progress:
         fidelity = validate_by_distortion(
@@ -90,7 +97,7 @@ def validate(
             progress(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
             in_time.append(vary_in_time(chosen, trace, names))
     three = in_convention(fidelity, chosen, "three_sigma")
-    _print_result(fidelity, three, in_time, chosen.machine, as_json=json)
+    _print_result(fidelity, three, in_time, chosen.machine, as_json=json, details=details)
     if report is not None:
         from model.reports.page import write_report
         from model.reports.validation_report import validation_report
@@ -101,7 +108,13 @@ def validate(
 
 
 def _print_result(
-    fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine, *, as_json: bool
+    fidelity: Fidelity,
+    three: Fidelity,
+    in_time: Sequence[TimeDomain],
+    machine: Machine,
+    *,
+    as_json: bool,
+    details: bool,
 ) -> None:
     if as_json:
         three_sigma = {"sum_of_contributions": three.sum_of_contributions}
@@ -109,17 +122,42 @@ def _print_result(
         print_json(
             {"fidelity": fidelity.model_dump(mode="json"), "three_sigma": three_sigma, "time_domain": time_domain}
         )
-    else:
-        _print(fidelity, three, in_time, machine)
-
-
-def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
-    from rich.table import Table
-
-    from daq_cli.models.parameter_table import print_record
+        return
+    from daq_cli.models.record_doubts import print_record
 
     print_record(fidelity.record)
+    print_prose(fidelity.said)
+    print()
+    _print_joints(fidelity, machine)
+    if details:
+        _print_details(fidelity, three, in_time, machine)
+    else:
+        console().print("--details: every parameter, and how each would vary with time; --report draws both")
 
+
+def _print_joints(fidelity: Fidelity, machine: Machine) -> None:
+    """What is left of each joint's records beside its noise, a line each."""
+    from rich.table import Table
+
+    from model.units import joint_unit, shown_unit, with_unit
+
+    table = Table(box=None, header_style="bold")
+    for name in ("joint", "rms left", "noise", "times its noise"):
+        table.add_column(name, justify="right")
+    noises = fidelity.noise_by_joint or [math.nan] * len(fidelity.outputs)
+    for joint, square, noise in zip(fidelity.outputs, fidelity.error_by_joint, noises, strict=True):
+        factor, unit = shown_unit(joint_unit(machine, joint))
+        left = math.sqrt(square)
+        sizes = (with_unit(f"{size * factor:.4f}", unit) for size in (left, noise))
+        table.add_row(str(joint), *sizes, f"{left / noise:.2f}")
+    print_table(table)
+
+
+def _print_details(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
+    """Every parameter, and how each would have to vary with time."""
+    from rich.table import Table
+
+    print()
     table = Table(box=None, header_style="bold")
     for name in ("parameter", "value", "doubles the error at", "σ needed", "τ′ expected", "λ²", "unit"):
         table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
@@ -132,13 +170,12 @@ def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], m
         )
     print_table(table)
     for note in fidelity.notes:
-        print(f"  {note}")
-    for one in in_time:
-        print(f"\n{one.trace}, variation with time (accelerations smoothed over {1e3 * one.smoothing:.0f} ms):")
-        _print_in_time(one, machine)
-    print()
-    print_prose(fidelity.said)
+        print_prose(note, "  ")
     print_prose(f"Σλ² with τ′ = â/3 instead of the source's â/(3√2): {three.sum_of_contributions:.4f}")
+    for one in in_time:
+        print()
+        print_prose(f"{one.trace}, variation with time (accelerations smoothed over {1e3 * one.smoothing:.0f} ms):")
+        _print_in_time(one, machine)
 
 
 def _print_in_time(one: TimeDomain, machine: Machine) -> None:
@@ -157,9 +194,10 @@ def _print_in_time(one: TimeDomain, machine: Machine) -> None:
     for j in one.joints:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]
         unit = f"{joint_unit(machine, j.joint)}/s²"
-        print(
-            f"  joint {j.joint}: acceleration residual rms {j.rms:.3g} {unit}, {j.in_floors:.2g} × the noise floor"
-            f" ({j.noise:.3g})" + (f", goes with {', '.join(strongest)}" if strongest else "")
+        print_prose(
+            f"joint {j.joint}: acceleration residual rms {j.rms:.3g} {unit}, {j.in_floors:.2g} times its noise"
+            f" ({j.noise:.3g} {unit})" + (f", goes with {', '.join(strongest)}" if strongest else ""),
+            "  ",
         )
     for note in one.notes:
-        print(f"  {note}")
+        print_prose(note, "  ")

@@ -39,7 +39,8 @@ COLUMN = 10
 def answer_text(found: Diagnosis) -> str:
     """The whole answer."""
     verdict = found.verdict.replace("-", " ").upper()
-    lines = _filled(verdict, headline(found), len(verdict) + 2)
+    doubted = found.verdict == "check-the-record"  # what is doubted follows
+    lines = [verdict] if doubted else _filled(verdict, headline(found), len(verdict) + 2)
     for line in lines_of(doubts_in(found.record)):
         lines += ["", *_filled("CHECK", line)]
     if not found.computed:
@@ -145,7 +146,7 @@ def _errors_of(found: Diagnosis) -> list[str]:
 
 def _beside(label: str, lines: Sequence[str]) -> list[str]:
     """Lines beside a label, as they are."""
-    return [f"{'' if number else label:<{INDENT}}{line}" for number, line in enumerate(lines)]
+    return [f"{'' if number else label:<{INDENT}}{line}".rstrip() for number, line in enumerate(lines)]
 
 
 def _error(e: SignalError) -> str:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from daq_cli.app.context import console, print_json, print_prose, print_table
 from daq_cli.app.output_file import replacing
 from daq_cli.models.model_input import files_of
-from daq_cli.models.parameter_table import end_if_doubted, print_on_the_edge, print_parameters, print_record
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_undetermined
+from daq_cli.models.record_doubts import end_if_doubted, print_record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -50,7 +51,7 @@ def fit_recorded_torques(
         print_json(found.model_dump(mode="json", exclude={"model"}) | own)
     else:
         _print(found, files)
-        print(headline(base))
+        print_prose(headline(base))
         if found.verdict is not None:
             print_prose(found.verdict.text)
         console().print(f"model {found.model.identity}: {out}")
@@ -74,8 +75,7 @@ def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
 
     print_record(found.record)
     print_parameters(found.parameters)
-    for combination in found.identifiability.undetermined:
-        print(f"  not determined: {combination.text}")
+    print_undetermined(found.identifiability)
     errors = Table("trace", "", "left of the torque", "rms by joint", box=None, header_style="bold")
     for one, name in zip(found.errors, trace_names([e.trace for e in found.errors], files), strict=True):
         rms = ", ".join(f"{left:.3f} of {torque:.3f}" for left, torque in zip(one.rms, one.torque, strict=True))
@@ -84,5 +84,5 @@ def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")
     for note in on_drives_at_limit(found.at_limit, found.unknown_joints):
-        print(sentence(note_words(note)))
+        print_prose(sentence(note_words(note)))
     print_on_the_edge(found.on_the_edge)

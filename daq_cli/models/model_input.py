@@ -202,6 +202,8 @@ def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str]
     named = zip(_names(traces, names), traces, strict=True)
     unnamed = [(name, trace) for name, trace in named if trace.record.machine is None]
     for name, trace in unnamed:
+        if max(trace.joints) > len(taken.joints):
+            raise SpecError(f"{name}: {_surplus(trace, taken)}; name its machine or model with --model")
         if lacking := [joint for joint in taken.modelled_joints if joint not in trace.joints]:
             raise SpecError(
                 f"{name}: names no machine, and has no joint {_listed(lacking)} of {taken.name}, "
@@ -221,6 +223,8 @@ def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[st
         own = trace.record.machine
         if own is not None and own.name != machine.name:
             raise SpecError(f"{name}: was made on {own.name}, the model describes {machine.name}")
+        if max(trace.joints) > len(machine.joints):
+            raise SpecError(f"{name}: {_surplus(trace, machine)}; is it of another machine?")
         if lacking := [joint for joint in machine.modelled_joints if joint not in trace.joints]:
             raise SpecError(
                 f"{name}: has no joint {_listed(lacking)}, which the model of {machine.name} moves; it has "
@@ -230,6 +234,11 @@ def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[st
             raise SpecError(
                 f"{name}: has no velocity, which the sensors of {machine.name} measure; is it of another machine?"
             )
+
+
+def _surplus(trace: Trace, machine: Machine) -> str:
+    count = len(machine.joints)
+    return f"has a joint {max(trace.joints)}, and {machine.name} has {count} joint{'' if count == 1 else 's'}"
 
 
 def _names(traces: Sequence[Trace], names: Sequence[str]) -> list[str]:

@@ -13,8 +13,8 @@ from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import TraceLimits
 from daq_cli.robot.answers import BagChoice
 
-UNITS = {"V": "V", "A": "A", "N": "N", "Nm": "N·m", "N·m": "N·m", "none": "none"}
-"""What a person may write for the unit of a drive, and what a trace calls it."""
+UNITS = {"V": "V", "A": "A", "N": "N", "N·m": "N·m", "none": "none", "Nm": "N·m", "N.m": "N·m"}
+"""What a person may write for the unit of a drive, and what a trace calls it: the last two are N·m as it is typed."""
 
 
 def foreign_trace(file: Path, limits: TraceLimits, choice: BagChoice, numbering: tuple[str, ...]) -> Trace:
@@ -27,7 +27,7 @@ def foreign_trace(file: Path, limits: TraceLimits, choice: BagChoice, numbering:
     from daq.traces.csv_table import import_csv
 
     if choice.drive_unit is not None and choice.drive_unit not in UNITS:
-        raise SpecError(f"--drive-unit {choice.drive_unit}: write {', '.join(UNITS)}")
+        raise SpecError(f"--drive-unit {choice.drive_unit}: write {', '.join(dict.fromkeys(UNITS.values()))}")
     unit: Any = UNITS.get(choice.drive_unit or "")
     if kind_of(file, limits) != "csv":
         times: ros_bag.Times | None = "received" if choice.received else None

@@ -25,7 +25,7 @@ def print_figures(trace: Trace) -> None:
         if not one.moved:
             continue
         rise = "–" if one.rise_time is None else f"{one.rise_time:.2f} s"
-        drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.record.drive_unit or ''}"
+        drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.drive_unit}"
         ends = (_angle(value, one.unit) for value in (one.start, one.end, one.overshoot))
         errors = (_angle(value, one.unit) for value in (one.largest_error, one.final_error))
         table.add_row(str(one.joint), *ends, rise, *errors, drive)

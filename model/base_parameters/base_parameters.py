@@ -25,6 +25,7 @@ from model.base_parameters.standard import (
 )
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
+from model.record_check.check import as_used
 from model.simulation.chain_of_model import chain_of
 
 POSTURES_PER_PARAMETER = 3
@@ -81,7 +82,7 @@ def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0
         return found
     sizes = np.array([parameter.value for parameter in found.parameters])
     try:
-        told = excitation_of(model, traces, standards, grouping, sizes)
+        told = excitation_of(model, as_used(traces, model.machine), standards, grouping, sizes)
     except (TraceError, SpecError) as error:
         return found.model_copy(update={"no_excitation": str(error)})
     return found.model_copy(update={"excitation": told})

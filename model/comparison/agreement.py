@@ -12,9 +12,10 @@ from daq.contracts.frozen import FrozenRecord
 class JointAgreement(FrozenRecord):
     """One joint over one or more traces.
 
-    `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-    count of the sensor (None where it has none), all in `unit`. `share` is `rmse` divided by the root mean
-    square of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+    `rmse` and `largest` of measured − simulated, `floor` its noise: what the model would leave of records that it had
+    made itself, noise of the sensors included (of speeds: its own). `count`: one count of the sensor, None
+    where it has none. All are in `unit`. `share` is `rmse` divided by the root mean square of the measured motion about
+    its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
     """
 
     joint: int
@@ -32,7 +33,7 @@ class JointAgreement(FrozenRecord):
 
     @property
     def floor_counts(self) -> float | None:
-        """The measurement's own noise in counts of the sensor."""
+        """The noise in counts of the sensor."""
         return None if self.count is None else self.floor / self.count
 
 
@@ -80,6 +81,7 @@ def pooled(traces: Sequence[TraceAgreement]) -> tuple[JointAgreement, ...] | Non
             first.model_copy(
                 update={
                     "rmse": math.sqrt(square),
+                    "floor": math.sqrt(sum(j.floor**2 * t.samples for j, t in zip(own, traces, strict=True)) / total),
                     "largest": max(j.largest for j in own),
                     "share": math.sqrt(square * total / motion) if motion > 0 else None,
                 }

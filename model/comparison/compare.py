@@ -10,14 +10,14 @@ from typing import Literal
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
 from model.machine_model.model import Model
-from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.check import Loop, as_used, check_records, require_computable
+from model.record_check.replicas import noise_left
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 
@@ -91,8 +91,8 @@ def compare(
                 f"{list(machine.modelled_joints)}: they cannot be compared"
             )
     require_computable(check_records(models[0][1], traces))
-    if isinstance(machine.controller, NoController):
-        traces = [repaired(trace, machine) for trace in traces]
+    loop: Loop = "closed" if options is None else options.loop
+    traces = as_used(traces, machine, loop)
     records = records_of(traces, machine, signal)
     floor = noise_floor(records, machine, signal)
     simulated: list[list[Floats]] = []
@@ -109,7 +109,14 @@ def compare(
     agreements = []
     for place, (label, model) in enumerate(models):
         own = tuple(
-            _agreement(record, simulated[k][place], floor, model, signal, _role(record, held_out))
+            _agreement(
+                record,
+                simulated[k][place],
+                noise_left(model, traces[k : k + 1], loop) if signal == "position" else floor,
+                model,
+                signal,
+                _role(record, held_out),
+            )
             for k, record in enumerate(records)
         )
         agreements.append(

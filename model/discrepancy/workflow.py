@@ -14,7 +14,7 @@ from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
-from model.record_check.check import check_records, repaired
+from model.record_check.check import as_used, check_records
 from model.record_check.finding import RecordFinding, doubts_in
 
 
@@ -66,8 +66,9 @@ def _computed(
     if choose_method(model, (*traces, *holdout), options, designs=designs) == "inverse-dynamics":
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
-        whole, held = ([repaired(trace, model.machine) for trace in some] for some in (traces, holdout))
+        whole, held = (as_used(some, model.machine) for some in (traces, holdout))
         return diagnose_torques(model, whole, held, options, progress, cancel)
+    traces, holdout = (as_used(some, model.machine, "closed") for some in (traces, holdout))
     return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser)
 
 

@@ -12,10 +12,11 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model import layout as at
 from model.fitting.options import FitOptions, Prior
-from model.fitting.records import Record, Signal, resolution, sensor_deviation
+from model.fitting.records import Record, Signal, resolution
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter, initial_position, presliding, presliding_shape
+from model.record_check.readings import sensor_deviation
 
 BEND = "potentiometer_nonlinearity"
 BEND_SHARE = 0.5

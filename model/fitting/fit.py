@@ -21,7 +21,7 @@ from model.fitting.covariance import sandwich
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
 from model.fitting.least_squares import Search, Solution, solve
 from model.fitting.nelder_mead import climb
-from model.fitting.noise import NoiseEffect, noise_effect
+from model.fitting.noise import noise_effect
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import Signal, noise_floor, records_of
@@ -33,8 +33,9 @@ from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
-from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import doubts_headline
+from model.record_check.replicas import motion_there, noise_left
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
@@ -70,21 +71,18 @@ def fit(
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
     record = check_records(model, traces)
     require_computable(record)
-    if _loop(model, options) == "open":  # no controller has used the readings as they are
-        traces = [repaired(trace, model.machine) for trace in traces]
     problem = fit_problem(model, traces, options)
     coordinates = coordinates_of(problem.model, problem.unknowns, options)
     before = problem.evaluate(_starts(problem), derivatives=False)
     solution = _first_search(problem, coordinates, options, progress, cancel)
     evaluations = solution.evaluations
     whiteners: list[Whitener] = [white(d) for d in problem.floor]
-    noise: NoiseEffect | None = None
     for number in range(options.rounds):
         last, most = solution, options.most_evaluations or LEAST_SQUARES_EVALUATIONS
         if number + 1 < options.rounds:
             most = min(most, ROUND_EVALUATIONS)
         progress(0.5 + 0.4 * number / options.rounds, f"round {number + 1}: noise and whitening")
-        problem, whiteners, noise = with_noise(problem, solution.values, options)
+        problem, whiteners = with_noise(problem, solution.values, options)
         if options.method == "nelder_mead":
             break
         search = Search(options.robust, options.tolerance, most)
@@ -97,8 +95,7 @@ def fit(
     estimate = _estimate(problem, whiteners, solution.values, options)
     progress(1.0, "done")
     solution = replace(solution, evaluations=evaluations)
-    size = problem.floor if noise is None else np.maximum(noise.size, problem.floor)
-    result = _result(model, problem, solution, estimate, before, size, options, time.perf_counter() - begun)
+    result = _result(model, problem, solution, estimate, before, traces, options, time.perf_counter() - begun)
     assert result.verdict is not None
     return result.model_copy(update={"record": record, "verdict": result.verdict.doubted(doubts_headline(record))})
 
@@ -107,7 +104,8 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     """Residuals and unknowns of a fit, before any search. Raises TraceError and SpecError as `fit` does."""
     signal = _signal(model, options)
     unknowns = chosen_unknowns(model, options)
-    records = records_of(traces, model.machine, signal)
+    loop = _loop(model, options)
+    records = records_of(as_used(traces, model.machine, loop), model.machine, signal)
     samples = sum(r.samples for r in records)
     if samples <= len(unknowns):
         raise TraceError(
@@ -119,7 +117,6 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     if options.start_posture and signal == "position" and not simple:
         postures = start_postures(model.machine, records, any(use.name == BEND for use in wider.effects))
     forms = friction_forms(wider) if options.friction_form and not simple else ()
-    loop = _loop(model, options)
     every = (*unknowns, *bends, *forms, *postures)
     floor = noise_floor(records, model.machine, signal)
     return SimulatedProblem(wider, records, every, floor, signal, loop, options.step)
@@ -185,13 +182,11 @@ def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
 
 def with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
-) -> tuple[SimulatedProblem, list[Whitener], NoiseEffect | None]:
-    """The problem with the mean effect of the noise subtracted, whiteners fitted to its residual, and that effect where
-    noise goes round the loop."""
-    noise = None
+) -> tuple[SimulatedProblem, list[Whitener]]:
+    """The problem with the mean effect of noise that goes round the loop subtracted, and whiteners fitted to its
+    residual."""
     if options.replicas and problem.loop == "closed" and problem.signal == "position":
-        noise = noise_effect(problem, values, options.replicas, options.seed)
-        problem = problem.with_offset(noise.mean)
+        problem = problem.with_offset(noise_effect(problem, values, options.replicas, options.seed))
     evaluations = problem.evaluate(values, derivatives=False)
     whiteners = []
     for column, floor in enumerate(problem.floor):
@@ -200,7 +195,7 @@ def with_noise(
             whiteners.append(fitted_whitener(runs, options.longest_memory, floor))
         else:
             whiteners.append(white(max(floor, float(np.sqrt(np.mean(np.concatenate(runs) ** 2))))))
-    return problem, whiteners, noise
+    return problem, whiteners
 
 
 @dataclass(frozen=True)
@@ -252,13 +247,17 @@ def _result(
     solution: Solution,
     estimate: _Estimate,
     before: Sequence[Evaluation],
-    noise: Floats,
+    traces: Sequence[Trace],
     options: FitOptions,
     seconds: float,
 ) -> FitResult:
     names = tuple(u.name for u in problem.unknowns)
     own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
     identities = tuple(record.name for record in problem.records)
+    fitted = model.with_values(own)
+    noise = problem.floor
+    if problem.signal == "position":
+        noise = noise_left(fitted, as_used(traces, model.machine, problem.loop), problem.loop)
     errors = _errors(model, problem, before, estimate.after, noise)
     deviations = np.sqrt(np.diag(estimate.covariance))
     parameters = tuple(
@@ -274,7 +273,7 @@ def _result(
         "known": list(estimate.report.known),
         **summarise_posterior(model.lineage, identities, ((p.name, p.model_value, p.deviation) for p in parameters)),
     }
-    fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
+    fitted = fitted.with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
     return FitResult(
         model=fitted,
         parameters=parameters,
@@ -282,7 +281,7 @@ def _result(
         errors=errors,
         verdict=RecordVerdict.of(
             fitted,
-            [JointLeft(joint=e.joint, unit=e.unit, rms=e.after, noise=e.noise or e.floor) for e in errors],
+            [_left(problem, error, traces) for error in errors],
             sum(r.samples for r in problem.records),
         ),
         whitened_mean_square=estimate.mean_square,
@@ -298,6 +297,12 @@ def _result(
         message=solution.message,
         on_the_edge=on_the_edge(model, fitted, options),
     )
+
+
+def _left(problem: SimulatedProblem, error: JointError, traces: Sequence[Trace]) -> JointLeft:
+    there = motion_there(problem.model.machine, error.joint, traces) if problem.signal == "position" else None
+    noise = error.noise or error.floor
+    return JointLeft(joint=error.joint, unit=error.unit, rms=error.after, noise=noise, there=there)
 
 
 def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:

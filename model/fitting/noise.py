@@ -10,34 +10,21 @@ residual, and the estimates of inertia and delay are then wrong by several of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from model.arrays import Floats
 from model.fitting.simulated import SimulatedProblem
 
 
-@dataclass(frozen=True)
-class NoiseEffect:
-    """What noise does to the residual of a right model: its mean (m, n) a record, and its root mean square (n,)."""
-
-    mean: tuple[Floats, ...]
-    size: Floats
-
-
-def noise_effect(problem: SimulatedProblem, values: Floats, replicas: int, seed: int) -> NoiseEffect:
-    """Mean and size of the residual over replicas in which the model with these values takes the arm's place.
+def noise_effect(problem: SimulatedProblem, values: Floats, replicas: int, seed: int) -> tuple[Floats, ...]:
+    """Mean (m, n) a record of the residual over replicas in which the model with these values takes the arm's place.
 
     The same seed draws the same noise, so that the result changes smoothly with the values.
     """
     plain, rng = problem.with_offset(None), np.random.default_rng([seed, 7])
     totals = [np.zeros_like(record.measured) for record in problem.records]
-    squares, samples = np.zeros(len(problem.floor)), 0
     for _ in range(replicas):
         replica = plain.with_readings(plain.noisy_readings(values, rng))
         residuals = [one.residual for one in replica.evaluate(values, derivatives=False)]
         totals = [total + own for total, own in zip(totals, residuals, strict=True)]
-        squares += sum((own**2).sum(axis=0) for own in residuals)
-        samples += sum(len(own) for own in residuals)
-    return NoiseEffect(tuple(total / replicas for total in totals), np.sqrt(squares / samples))
+    return tuple(total / replicas for total in totals)

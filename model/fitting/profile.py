@@ -121,7 +121,7 @@ def profile(
     problem = fit_problem(fitted.model, traces, options)
     if tuple(record.name for record in problem.records) != fitted.traces:
         raise SpecError(f"profile of {name}: needs the traces that were fitted to, {', '.join(fitted.traces)}")
-    problem, whiteners, _ = with_noise(problem, values, options)
+    problem, whiteners = with_noise(problem, values, options)
     search = Search(options.robust, options.tolerance, options.most_evaluations or LEAST_SQUARES_EVALUATIONS)
     index = fitted.names.index(name)
     size = min(float(np.sqrt(fitted.covariance_matrix[index, index])), problem.unknowns[index].scale)

@@ -13,6 +13,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.machine import Machine, NoController, Sensor
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.record_check.readings import noise_of, sensor_deviation
 from model.simulation.inputs import RunInputs, inputs_of
 
 Signal = Literal["position", "velocity"]
@@ -76,23 +77,17 @@ def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> 
         if sensor is not None and signal == "position":
             floor.append(sensor_deviation(sensor))
             continue
-        second = np.concatenate([np.diff(r.measured[run, column], 2) for r in records for run in r.runs])
-        if not len(second):
+        readings = [r.measured[run, column] for r in records for run in r.runs if run.stop - run.start > 2]
+        if not readings:
             names = ", ".join(r.name for r in records)
             raise TraceError(
                 f"{names}: no three samples follow one another, so the noise of joint {joint} is not known; state its "
                 "`sensor` in the machine file, or use a record without gaps"
             )
-        spread = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
+        spread = float(np.median([noise_of(reading) for reading in readings]))
         size = max(float(np.abs(r.measured[:, column]).max()) for r in records)
         floor.append(max(spread, 1e-6 * size, 1e-12))
     return np.array(floor)
-
-
-def sensor_deviation(sensor: Sensor) -> float:
-    """Standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
-    noise = 0.0 if sensor.noise is None else sensor.noise.value
-    return float(np.sqrt(1.0 / 12.0 + noise**2)) * resolution(sensor)
 
 
 def resolution(sensor: Sensor) -> float:

@@ -114,7 +114,8 @@ class FitResult(FrozenRecord):
     def doubt(self) -> str:
         """One line where the traces are to be checked first, or the model ends much farther from them than it began;
         empty where neither is so."""
-        return doubts_headline(self.record) or doubt_of(self.errors)
+        doubt = doubts_headline(self.record)
+        return f"check the record first: {doubt}" if doubt else doubt_of(self.errors)
 
     def parameter(self, name: str) -> FittedParameter:
         """The parameter of that name. Raises SpecError when it was not fitted."""

@@ -56,8 +56,11 @@ class Unknown:
 
     @property
     def within_stated(self) -> Unknown:
-        """The same, to be found within one stated deviation of what is expected; itself where none is stated."""
-        spread = self.as_stated.deviation
+        """The same, to be found within one stated deviation of what is expected; itself where none is stated.
+
+        A nuisance has its own: a file states the linearity of a potentiometer, of which each of its bends is a share.
+        """
+        spread = self.deviation if self.nuisance else self.as_stated.deviation
         if spread is None:
             return self
         low, high = max(self.low, self.expected - spread), min(self.high, self.expected + spread)

@@ -28,14 +28,14 @@ from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.problem import TorqueProblem
-from model.inverse_dynamics.readings import torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
+from model.inverse_dynamics.repeats import noise_left
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
-from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import RecordFinding, doubts_headline
 from model.units import joint_unit
 
@@ -136,7 +136,7 @@ def fit_torques(
     _check_effects(model)
     record = check_records(model, (*traces, *held_out))
     require_computable(record)
-    traces, held_out = ([repaired(trace, model.machine) for trace in some] for some in (traces, held_out))
+    traces, held_out = (as_used(some, model.machine) for some in (traces, held_out))
     records_of([*traces, *held_out], model.machine, "position")
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
@@ -198,7 +198,8 @@ def fit_torques(
 
 def torque_curves(model: Model, trace: Trace, cutoff: float = CUTOFF) -> TorqueCurves:
     """Recorded and residual torque along a trace, by a model. Raises TraceError and SpecError as `fit_torques` does."""
-    motion = recorded_motion(repaired(trace, model.machine), model.machine, cutoff)
+    (whole,) = as_used([trace], model.machine)
+    motion = recorded_motion(whole, model.machine, cutoff)
     balance = TorqueBalance(model, (motion,))
     return TorqueCurves(
         trace.record.trace_id,
@@ -259,11 +260,11 @@ def _error(model: Model, motion: RecordedMotion, *, held_out: bool) -> tuple[Tor
 
 
 def _verdict(model: Model, traces: Sequence[Trace], motions: Sequence[RecordedMotion], cutoff: float) -> RecordVerdict:
-    """The verdict on the records that were fitted to; the noise is that of the readings."""
+    """The verdict on the records that were fitted to; the noise is that of a diagnosis."""
     balance = TorqueBalance(model, tuple(motions))
     residual = np.concatenate(balance.residual({}))
     torque = _rms(np.concatenate(balance.supplied_by_drive()))
-    noise = torque_noise(model, traces, cutoff)
+    noise = noise_left(model, traces, balance, cutoff)
     joints = model.machine.modelled_joints
     left = [
         JointLeft(

@@ -12,9 +12,16 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.inverse_dynamics.readings import torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.model import Model
 
+LEAST_OF_TORQUE = 1e-3
+"""Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
+a sound rig with 20 bits, gears were said to lose 0.09 % of it."""
 APART = 1.0
 """Least time between two passages, s: closer samples are the same passage."""
 NEIGHBOURS = 60
@@ -24,6 +31,19 @@ ALIKE = 0.05
 all joints, as a root mean square. Over that distance, a torque that follows from the motion hardly changes."""
 FEWEST = 100
 """Samples that must recur for their differences to be an estimate."""
+
+
+def noise_left(model: Model, traces: Sequence[Trace], balance: TorqueBalance, cutoff: float) -> Floats:
+    """Root mean square (n,), N·m or N, of the torque below a cutoff (Hz) that a right model leaves: what noise of the
+    readings makes of accelerations, what differs between repeated motions, and what digits of a record leave.
+
+    Args:
+        traces: those of the balance's records.
+    """
+    torques = np.concatenate(balance.supplied_by_drive())
+    digits = LEAST_OF_TORQUE * np.sqrt(np.mean(torques**2, axis=0))
+    repeated = repeated_noise(balance.records, balance.residual({}))
+    return np.asarray(np.maximum(np.maximum(torque_noise(model, traces, cutoff), repeated), digits))
 
 
 def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats]) -> Floats:

@@ -21,7 +21,8 @@ SCATTER = 4.0
 
 class JointLeft(FrozenRecord):
     """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-    of records that the model itself had made; `there`: of the recorded torque, if torques are compared; in `unit`."""
+    of records that the model itself had made; `there`: of the recorded torque, or of the recorded motion about its mean
+    (None where that is hardly more than noise of the readings); in `unit`."""
 
     joint: int
     unit: str
@@ -79,14 +80,14 @@ class RecordVerdict(FrozenRecord):
         """The verdict beside a doubt about the records; an empty one changes nothing."""
         if not doubt:
             return self
-        text = f"{doubt[0].upper()}{doubt[1:]}. Nothing is said of the model until then."
+        text = f"Check the record first: {doubt}. Nothing is said of the model until then."
         return self.model_copy(update={"explains": False, "doubt": doubt, "text": text})
 
     @property
     def headline(self) -> str:
         """The verdict in a few words, for a list."""
         if self.doubt:
-            return self.doubt
+            return f"check the record: {self.doubt}"
         if self.left:
             return f"does not explain the records (joint{'s' if len(self.left) > 1 else ''} {self._joints})"
         return "explains the records" + (", with numbers far from the file" if self.far else "")

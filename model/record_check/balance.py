@@ -113,6 +113,32 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     width = _width(motion)
     if width is None:
         return None
+    torques = _torques(model, motion, width)
+    given, needed, weight = torques.given, torques.needed, torques.weight
+    found = [
+        _left(given[:, j] - torques.braked[:, j], torques.speed[:, j], torques.rate[:, j], width)
+        for j in range(given.shape[1])
+    ]
+    left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
+    parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
+    size, needs = (np.mean(torque**2, axis=0) for torque in (given, torques.braked))
+    return Balance(left, size, needs, parts, _gravity_turned(given, torques.braked, weight), behind)
+
+
+@dataclass(frozen=True)
+class _Torques:
+    """Torques (k, n) along a motion: given by the drive, needed without and with back-EMF, that of weight, the change
+    of the given one in a sample; and speeds."""
+
+    given: Floats
+    needed: Floats
+    braked: Floats
+    weight: Floats
+    rate: Floats
+    speed: Floats
+
+
+def _torques(model: Model, motion: Motion, width: int) -> _Torques:
     joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     rows = slice(width // 2, len(motion.position) - width // 2, max(1, len(motion.position) // MOST_ROWS))
 
@@ -129,12 +155,44 @@ def balance(model: Model, motion: Motion) -> Balance | None:
     needed = inverse_dynamics_along(chain, position, speed, acceleration)
     braked = needed + gain * joints[:, at.GEAR] * joints[:, at.BACK_EMF] * speed
     rate = smooth(motion.drive, 1) * gain * motion.period
-    found = [_left(given[:, j] - braked[:, j], speed[:, j], rate[:, j], width) for j in range(given.shape[1])]
-    left, behind = np.array([one[0] for one in found]), np.array([one[1] for one in found])
-    weight = gravity_along(chain, position)
-    parts = np.mean(weight**2, axis=0) + np.mean((needed - weight) ** 2, axis=0)
-    size, needs = (np.mean(torque**2, axis=0) for torque in (given, braked))
-    return Balance(left, size, needs, parts, _gravity_turned(given, braked, weight), behind)
+    return _Torques(given, needed, braked, gravity_along(chain, position), rate, speed)
+
+
+def time_ratios(model: Model, motion: Motion) -> list[float | None]:
+    """Of each joint, how many times too long times are for drive and motion to belong together; None where that is not
+    clear. It is told by what accelerates the bodies: weight has a factor of its own, and friction of any size, back-EMF
+    and a constant are free.
+
+    Times that are r times too long make accelerations r² times too small (r times, where speeds are measured).
+    """
+    width = _width(motion)
+    if width is None:
+        return [None] * motion.position.shape[1]
+    torques = _torques(model, motion, width)
+    inertial = torques.needed - torques.weight
+    power = 0.5 if motion.speed is None else 1.0
+    factors = [
+        _factor(torques.given[:, j], inertial[:, j], torques.weight[:, j], torques.speed[:, j], width)
+        for j in range(inertial.shape[1])
+    ]
+    return [None if factor is None else factor**power for factor in factors]
+
+
+def _factor(given: Floats, inertial: Floats, weight: Floats, speed: Floats, width: int) -> float | None:
+    size = float(np.sqrt(np.mean(speed**2)))
+    scale = float(np.sqrt(np.mean((inertial - inertial.mean()) ** 2)))
+    if size == 0.0 or scale == 0.0:
+        return None
+    columns = [inertial / scale, np.tanh(speed / size / 0.05), speed / size]
+    columns += [weight] if np.ptp(weight) > 0.0 else []
+    table = np.column_stack([column - column.mean() for column in columns])
+    level = given - given.mean()
+    line, _, rank, _ = np.linalg.lstsq(table, level, rcond=None)
+    if rank < table.shape[1]:
+        return None
+    spread = float(np.mean((level - table @ line) ** 2)) * width
+    deviation = float(np.sqrt(spread * np.linalg.inv(table.T @ table)[0, 0]))
+    return float(line[0]) / scale if line[0] > CLEAR * deviation else None
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:

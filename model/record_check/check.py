@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.readings import (
     FalseReadings,
     Jump,
+    find_bounds,
     find_gaps,
     find_jumps,
     is_bridged,
@@ -33,6 +35,7 @@ from model.record_check.words import at_times, number, times_of
 
 ON_EARTH = (9.76, 9.84)
 """Least and largest gravity on the ground, m/s²: on a mountain at the equator, and at a pole, rounded outwards."""
+Loop = Literal["closed", "open"]
 WITHIN_NOISE = 3.0
 """Times its noise that a model may leave of a record and still explain it: spikes that alone leave more are no note."""
 MOST_KEPT = 100
@@ -59,10 +62,7 @@ def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding,
 
 def repaired(trace: Trace, machine: Machine) -> Trace:
     """The trace with whole turns added behind each wrap of its encoders, and spikes replaced by what lies beside them;
-    the same trace where there are none.
-
-    It is for torques along the motion alone: a controller in a simulated loop has used the readings as they were.
-    """
+    the same trace where there are none."""
     position = trace.position
     for joint in machine.modelled_joints:
         column, found = trace.column(joint), false_readings(trace, machine, joint)
@@ -73,6 +73,17 @@ def repaired(trace: Trace, machine: Machine) -> Trace:
         whole = unwrapped(position[:, column], found.wraps, turns_of(machine, joint))
         position[:, column] = _without_spikes(whole, found)
     return trace if position is trace.position else replace(trace, position=position)
+
+
+def as_used(traces: Sequence[Trace], machine: Machine, loop: Loop = "open") -> list[Trace]:
+    """Traces as every computation takes them: repaired, unless a controller in a simulated loop reads them itself.
+
+    Args:
+        loop: `closed`: the machine's controller is simulated. `open`: the recorded drive is applied or balanced.
+    """
+    if loop == "closed" and not isinstance(machine.controller, NoController):
+        return list(traces)
+    return [repaired(trace, machine) for trace in traces]
 
 
 def require_computable(findings: Sequence[RecordFinding]) -> None:
@@ -131,7 +142,7 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
         )
     for joint in machine.modelled_joints:
         if machine.joint(joint).sensor is None and all(joint in trace.joints for trace in traces):
-            sizes = [noise_of(trace.position[:, trace.column(joint)], 0.0) for trace in traces if len(trace) > 2]
+            sizes = [noise_of(trace.position[:, trace.column(joint)]) for trace in traces if len(trace) > 2]
             unit = machine.joint(joint).units.position
             size = float(np.median(sizes)) if sizes else 0.0
             yield RecordFinding(
@@ -149,6 +160,7 @@ def _on_readings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
     yield from _on_gaps(trace)
     for joint in machine.modelled_joints:
         yield from _on_jumps(trace, machine, joint)
+        yield from _on_bounds(trace, machine, joint)
     yield from _on_units(trace, machine)
 
 
@@ -202,6 +214,32 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
         )
         advice = "The sensor or its line was stuck: use a piece without."
         yield told.finding("stuck", [replace(jump, row=since - 1)], says, advice)
+
+
+def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
+    """Readings that are cut off: at the end of a sensor's range, or of an amplifier's or a converter's."""
+    source = trace.velocity if measures_speed(machine, joint) and trace.velocity is not None else trace.position
+    reading = source[:, trace.column(joint)]
+    bounds = find_bounds(reading)
+    if not bounds:
+        return
+    times = [float(trace.time[first]) for first, _ in bounds]
+    longest = max(float(trace.time[last] - trace.time[first]) for first, last in bounds)
+    unit = machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else "")
+    value = float(reading[bounds[0][0]])
+    yield RecordFinding(
+        kind="saturated",
+        consequence="doubt",
+        record=trace.called,
+        joint=joint,
+        times=tuple(times[:MOST_KEPT]),
+        count=len(bounds),
+        value=value,
+        unit=unit,
+        says=f"its reading comes to {number(value)} {unit} at full speed and stands there, {at_times(times)}, for "
+        f"{number(longest)} s at most.",
+        advice="Is the sensor at the end of its range, or the joint at a stop? Use a piece without.",
+    )
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from model.record_check.balance import (
     balance,
     likelier,
     motion_of,
+    time_ratios,
 )
 from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
@@ -197,6 +198,10 @@ class _Witnesses:
                 yield self._of_way(way, joint)
                 return
         if not holds:
+            stretched = self._stretched(motion)
+            if stretched is not None:
+                yield stretched
+                return
             yield from self._out_of_scale(motion)
             yield from self._behind(motion)
         if not isinstance(self.model.machine.controller, NoController) and not holds:
@@ -216,6 +221,17 @@ class _Witnesses:
                 says = f"its drive comes {number(late)} samples after the motion that it makes: it stands too low."
                 advice = "Move the drive up by one row, if each row is read at one moment."
                 yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
+
+    def _stretched(self, motion: Motion) -> RecordFinding | None:
+        """Times that are another unit's, or a clock's of another speed, told by what accelerates the bodies: friction
+        and back-EMF may take nearly all of the torque. A load that nobody stated would do the same as a slow clock."""
+        ratios = [found for found in time_ratios(self.model, motion) if found is not None]
+        for ratio, sure in ((1e3, True), (2.0, False), (0.5, False)):
+            if ratios and all(_near(found, ratio) for found in ratios):
+                says = "drive and motion ask for another inertia than the machine file's, as if times were false."
+                advice = f"Are times {ratio:g} times as long as they were{', as in ms' if sure else ''}? They are in s."
+                return self._doubt("time-scale", None, says, advice, value=ratio, allowed=1.0, sure=sure)
+        return None
 
     def _out_of_scale(self, motion: Motion) -> Iterator[RecordFinding]:
         found = balance(self.model, motion)

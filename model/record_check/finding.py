@@ -21,6 +21,7 @@ FindingKind = Literal[
     "jump",
     "no-sensor",
     "position-unit",
+    "saturated",
     "spikes",
     "stuck",
     "time-scale",
@@ -66,10 +67,10 @@ def doubts_in(findings: Iterable[RecordFinding]) -> tuple[RecordFinding, ...]:
 
 
 def doubts_headline(findings: Sequence[RecordFinding]) -> str:
-    """The gravest doubt, and how many there are beside it. A clause."""
+    """The gravest doubt, and how many there are beside it; empty where nothing is doubted. A clause."""
     doubts = lines_of(doubts_in(findings))
     more = "" if len(doubts) < 2 else f" ({len(doubts) - 1} more)"
-    return f"the record is to be checked first: {doubts[0].rstrip('.')}{more}" if doubts else ""
+    return f"{doubts[0].rstrip('.')}{more}" if doubts else ""
 
 
 def lines_of(findings: Sequence[RecordFinding]) -> list[str]:

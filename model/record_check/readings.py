@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from daq.contracts.machine import Sensor
 from model.arrays import Floats
 
 TAIL = 0.2
@@ -29,6 +30,8 @@ RETURNS = 3
 """Samples within which a spike returns."""
 STUCK = 5
 """Least samples with the same reading before a jump, for a reading that was stuck."""
+ENTRY = 3
+"""Intervals before a bound, in each of which a reading that is cut off there moves on."""
 MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
 BRIDGED = (10.0, 0.05)
@@ -127,6 +130,21 @@ def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) ->
     return whole
 
 
+def find_bounds(reading: Floats) -> list[tuple[int, int]]:
+    """First and last row of each stretch in which a reading stands at its largest or its smallest value, that it comes
+    to at full speed: a torque needs longer to stop a joint than from one sample to the next."""
+    rates = np.abs(np.diff(reading))
+    usual = float(np.sqrt(np.mean(rates**2)))
+    found = []
+    for bound in (reading.max(), reading.min()):
+        at = np.flatnonzero(np.diff(np.concatenate([[0], (reading == bound).astype(int), [0]])))
+        for first, last in zip(at[::2], at[1::2] - 1, strict=True):
+            before = rates[max(0, first - 1 - ENTRY) : max(0, first - 1)]  # the last step is cut short
+            if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
+                found.append((int(first), int(last)))
+    return sorted(found)
+
+
 def find_gaps(time: Floats) -> list[tuple[int, float]]:
     """Row before each gap, and its length in s: at least one sample is missing there."""
     intervals = np.diff(time)
@@ -139,7 +157,13 @@ def is_bridged(gap: float, usual: float) -> bool:
     return gap <= BRIDGED[0] * usual + BRIDGED[1]
 
 
-def noise_of(reading: Floats, step: float) -> float:
+def sensor_deviation(sensor: Sensor) -> float:
+    """Standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
+    noise = 0.0 if sensor.noise is None else sensor.noise.value
+    return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.range.value / 2**sensor.bits
+
+
+def noise_of(reading: Floats, step: float = 0.0) -> float:
     """Standard deviation of a reading's noise and rounding, from its second differences, which false readings hardly
     move. step: of the sensor."""
     second = np.diff(reading, 2)

@@ -34,7 +34,7 @@ VERDICTS = {
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
     "suspected": "suspected: more of this motion would settle it",
     "unknown-effect": "an effect that is not among the known ones",
-    "check-the-record": "the record is to be checked first",
+    "check-the-record": "check the record",
 }
 LABELS = ("before", "after")
 """Labels of the models in the comparison that this report shows."""

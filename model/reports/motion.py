@@ -133,16 +133,17 @@ def _joint(
 
 
 def agreement_table(models: Sequence[ModelAgreement]) -> Table:
-    """By model, kind of trace and joint: root mean square, largest, and the noise floor beside it."""
+    """By model, kind of trace and joint: root mean square, largest, and the noise beside it."""
     rows = []
     for model in models:
         for kind, joints in ((in_sample(model), model.in_sample), (ROLES[True], model.held_out)):
             rows += [_row(model.label, kind, one) for one in joints or ()]
     return Table(
-        ("model", "traces", "joint", "rms", "in counts", "largest", "noise floor", "floor in counts", "of the motion"),
+        ("model", "traces", "joint", "rms", "in counts", "largest", "noise", "noise in counts", "of the motion"),
         tuple(rows),
-        "Measured − simulated over all samples of these traces. The noise floor is what rounding and noise of the "
-        "sensor alone would leave. Of the motion: rms of the residual over that of the motion about its mean.",
+        "Measured − simulated over all samples of these traces. Noise is what a right model would leave: the "
+        "sensor's noise and rounding, as they go round the loop. Of the motion: rms of the residual over that of the "
+        "motion about its mean.",
     )
 
 

@@ -64,6 +64,8 @@ class Fidelity(FrozenRecord):
     damping_ratio: float
     error: float
     error_by_joint: tuple[float, ...]
+    noise_by_joint: tuple[float, ...] = ()
+    """Root mean square error (rad, m) that a right model would leave; empty in results of older versions."""
     parameters: tuple[ParameterDistortion, ...]
     sum_of_contributions: float
     curves: tuple[Curve, ...] = ()

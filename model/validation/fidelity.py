@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
-from model.record_check.check import check_records, repaired, require_computable
+from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import doubts_headline
+from model.record_check.replicas import motion_there, noise_left
 from model.simulation.prepared import Options
 from model.units import joint_unit
 from model.validation.criterion import (
@@ -30,7 +30,6 @@ from model.validation.criterion import (
 )
 from model.validation.doubling import Doubling, doubling_changes
 from model.validation.expected_deviation import expected_deviation
-from model.validation.noise_floor import position_floor
 from model.validation.squared_error import SquaredError, squared_error
 
 SEARCH_DEVIATIONS = 50.0
@@ -81,8 +80,7 @@ def validate_by_distortion(
     required_deviation(1.0, damping_ratio)
     record = check_records(model, traces)
     require_computable(record)
-    if isinstance(model.machine.controller, NoController):
-        traces = [repaired(trace, model.machine) for trace in traces]
+    traces = as_used(traces, model.machine, "closed" if options is None else options.loop)
     error = squared_error(model, traces, names, outputs, options)
     varied = _varied(tuple(model.parameter(name) for name in names))
     share = 0.8 if curve_points else 1.0
@@ -97,7 +95,14 @@ def validate_by_distortion(
     )
     errors = error.by_joint(varied.best[None])[0]
     distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
-    verdict = _verdict(error, varied.best, errors)
+    machine = model.machine
+    noises = dict(zip(machine.modelled_joints, map(float, noise_left(model, error.traces)), strict=True))
+    there = {j: motion_there(machine, j, traces) for j in error.outputs}
+    left = [
+        JointLeft(joint=j, unit=joint_unit(machine, j), rms=math.sqrt(e), noise=noises[j], there=there[j])
+        for j, e in zip(error.outputs, errors, strict=True)
+    ]
+    verdict = RecordVerdict.of(model, left, sum(map(len, error.traces)))
     return Fidelity(
         model=model.identity,
         traces=tuple(t.record.trace_id for t in traces),
@@ -106,27 +111,14 @@ def validate_by_distortion(
         damping_ratio=damping_ratio,
         error=least,
         error_by_joint=tuple(map(float, errors)),
-        verdict=None if verdict is None else verdict.doubted(doubts_headline(record)),
+        noise_by_joint=tuple(one.noise for one in left),
+        verdict=verdict.doubted(doubts_headline(record)),
         parameters=tuple(distortions),
         sum_of_contributions=math.fsum(d.contribution for d in distortions),
         curves=_curves(error, varied, distortions, curve_points, progress, cancel) if curve_points else (),
         notes=tuple(_notes(varied.parameters, doublings)),
         record=record,
     )
-
-
-def _verdict(error: SquaredError, best: Floats, errors: Floats) -> RecordVerdict | None:
-    """Whether more is left than noise; None where the model cannot be simulated along the records."""
-    noise = position_floor(
-        error.model, error.traces, lambda made: replace(error, traces=tuple(made)).by_joint(best[None])[0]
-    )
-    if noise is None:
-        return None
-    left = [
-        JointLeft(joint=j, unit=joint_unit(error.model.machine, j), rms=math.sqrt(e), noise=math.sqrt(n))
-        for j, e, n in zip(error.outputs, errors, noise, strict=True)
-    ]
-    return RecordVerdict.of(error.model, left, sum(map(len, error.traces)))
 
 
 def _varied(parameters: tuple[Parameter, ...]) -> _Varied:

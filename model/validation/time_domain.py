@@ -11,6 +11,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
 from model.machine_model.model import Model
+from model.record_check.check import as_used
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
 from model.validation.measured_motion import SmoothedTrace, smooth
@@ -60,6 +61,7 @@ def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain
     """
     if not names:
         raise SpecError("no parameters: name at least one")
+    (trace,) = as_used([trace], model.machine)  # no controller is simulated along the measured motion
     smoothed = smooth(model, trace)
     floor, simulated = noise_floor(model, trace, smoothed)
     smoothed = replace(smoothed, noise=floor)

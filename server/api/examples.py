@@ -104,7 +104,7 @@ PICK = Program(name="pick", instructions=(Absolute(angles={1: 3.14, 2: 1.4}), Gr
 PROGRAM = ProgramEntry(name="pick", robot=ROBOT, revision=3, instructions=3, changed=NOON, changed_by="anna")
 CONTENT = "5f3c9a1be4d277885f3c9a1be4d277885f3c9a1be4d277885f3c9a1be4d27788"
 COULOMB = ParameterWords(joint=2, group="joint 2", short="Coulomb friction torque", label="J2 Coulomb friction torque")
-COULOMB_NOW = {"name": "joint2.coulomb_friction.torque", "unit": "N m"}
+COULOMB_NOW = {"name": "joint2.coulomb_friction.torque", "unit": "N·m"}
 QUEUE = QueueStatus(paused=False, reason="resumed by anna", since=NOON, queued=2, running=EXPERIMENT)
 NOBODY = Control(holder="nobody")
 IDENTITY = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=3)

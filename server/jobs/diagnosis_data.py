@@ -16,6 +16,7 @@ from model.effects.names import placed
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.parameter_words import words_by_name
+from model.record_check.check import as_used
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
@@ -70,7 +71,7 @@ def _words(found: Diagnosis) -> dict[str, ParameterWords]:
 def where_given(model: Model, traces: Sequence[Trace]) -> Where | None:
     """Returns where a model disagrees with traces before anything is fitted; None if its simulation does not stay
     finite. Raises TraceError, SpecError for traces that cannot be simulated."""
-    records = records_of(traces, model.machine, "position")
+    records = records_of(as_used(traces, model.machine, "closed"), model.machine, "position")
     runs = [simulate(model, record.inputs, Options(quantise=False)) for record in records]
     left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]
     if not all(np.isfinite(one).all() for one in left):

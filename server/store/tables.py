@@ -19,9 +19,6 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-TABLES_OF_THE_SEARCH = ("trace_numbers", "trace_words")
-"""SQLite's tables that a migration makes and triggers fill. No row of theirs is an object here."""
-
 
 class Utc(TypeDecorator[datetime]):
     """A time with its time zone, stored as UTC, because SQLite has no time zones."""

@@ -12,6 +12,7 @@ import pytest
 
 from daq.config.notifications import EmailSettings, SmtpSettings
 from daq.contracts.figure import figure_of
+from daq.contracts.notebook_figure import drawable
 from daq.progress_bar import in_notebook
 from daq.traces.plot import html_page, picture
 from daq.traces.reader import read_trace
@@ -44,7 +45,9 @@ def test_in_the_figure_and_the_page_of_a_trace(tmp_path: Path, name: str) -> Non
     for shown in (page, trace._repr_html_()):
         assert "<script>" not in shown
         assert "49" not in shown.partition("<svg")[0]
-    trace.plot()._repr_png_()  # type: ignore[attr-defined]
+    shown = trace.plot()
+    shown._repr_png_()  # type: ignore[attr-defined]
+    assert drawable(printable(name)) in shown.get_suptitle(), "as it is, or as escapes where no font has it: no boxes"
 
 
 @NAMES

@@ -48,7 +48,7 @@ def agreement() -> None:
 
 
 def validation() -> None:
-    from daq_cli.commands.validate import _print
+    from daq_cli.commands.validate import _print_result
 
     distortion = ParameterDistortion(
         name=LONG,
@@ -69,6 +69,7 @@ def validation() -> None:
         damping_ratio=0.5,
         error=1.0,
         error_by_joint=(1.0,),
+        noise_by_joint=(0.5,),
         parameters=(distortion,),
         sum_of_contributions=0.3,
     )
@@ -78,7 +79,7 @@ def validation() -> None:
     in_time = TimeDomain(
         model="m", trace="t", convention="source", smoothing=0.05, time=(), joints=(), parameters=(moving,)
     )
-    _print(fidelity, fidelity, [in_time], load_machine("ma2000"))
+    _print_result(fidelity, fidelity, [in_time], load_machine("ma2000"), as_json=False, details=True)
 
 
 def gap() -> None:
@@ -127,6 +128,8 @@ def fits(text: str) -> None:
     assert max(map(len, lines)) <= 80, text
     assert "…" not in text
     assert not re.findall(r"\d\.$", text, re.MULTILINE), "a number goes on in the next line"
+    assert not re.findall(r"[\d±]\n\s*[^\W\d_]", text), "a number stands apart from its unit"
+    assert not re.findall(r"/$", text, re.MULTILINE), "a unit goes on in the next line"
 
 
 def test_every_table_goes_through_the_door_that_makes_it_fit() -> None:

@@ -27,7 +27,7 @@ def headline(found: Diagnosis) -> str:
     """The effects that were found, with joints and sizes; or that none was found, or none that is known; and joints
     that were not examined. A clause."""
     if found.verdict == "check-the-record":
-        return doubts_headline(found.record)
+        return f"check the record: {doubts_headline(found.record)}"
     return "; ".join([_finding_of(found), *not_examined_words(found.not_examined)])
 
 

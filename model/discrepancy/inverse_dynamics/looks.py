@@ -11,7 +11,6 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, part_of
 from daq.contracts.trace import Trace
-from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis, Step
 from model.discrepancy.explanation.notes import on_unfinished
 from model.discrepancy.grounds import Note
@@ -23,9 +22,9 @@ from model.discrepancy.inverse_dynamics.resolution import REPEATING
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.effects.library import find_named_effect
-from model.inverse_dynamics.readings import choose_cutoff, torque_noise
+from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
-from model.inverse_dynamics.repeats import repeated_noise
+from model.inverse_dynamics.repeats import noise_left
 from model.inverse_dynamics.shaking import find_shaking
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
@@ -37,9 +36,6 @@ sensor's scale, show below a lower one as well; gears that give and delays show 
 JUMPING = frozenset({"amplifier_threshold", "dead_zone", "gear_loss", "direction_dependent_gear_loss", "supply_limit"})
 """Effects that are no friction, and whose torque jumps as friction's does, where motion or drive turns, or breaks off
 where the drive is at its limit."""
-LEAST_OF_TORQUE = 1e-3
-"""Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
-a sound rig with 20 bits, gears were said to lose 0.09 % of it."""
 LONG = 20.0
 """Least duration of a record for a lower cutoff, in periods of that cutoff."""
 
@@ -207,11 +203,10 @@ class Records:
         progress(0.0, f"low-passing the records at {cutoff:g} Hz")
         records = recorded_motions(self.traces, model.machine, cutoff)
         balance = TorqueBalance(model, records)
-        noise = np.maximum(torque_noise(model, self.traces, cutoff), repeated_noise(records, balance.residual({})))
         case = TorqueCase(
             records,
             recorded_motions(self.held_out, model.machine, cutoff),
-            np.maximum(noise, LEAST_OF_TORQUE * _root_mean_squares(balance.supplied_by_drive())),
+            noise_left(model, self.traces, balance, cutoff),
             self.options,
         )
         steps = TorqueWorkflow(model, case, self.controller, progress, self.cancel)
@@ -229,8 +224,3 @@ class Records:
         shaking = find_shaking((*self.traces, *self.held_out), self.model.machine, cutoff)
         values = {"cutoff": cutoff, "joints": [asdict(one) for one in shaking]}
         return (Note(kind="shakes-above-cutoff", values=values, warning=True),) if shaking else ()
-
-
-def _root_mean_squares(torques: Sequence[Floats]) -> Floats:
-    """(n,) of torques (m, n), one array a record."""
-    return np.asarray(np.sqrt(np.mean(np.concatenate(torques) ** 2, axis=0)))

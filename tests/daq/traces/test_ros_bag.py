@@ -132,7 +132,7 @@ def test_a_velocity_that_is_not_measured_is_left_out(tmp_path: Path) -> None:
     [
         ([{}, {"position": []}], {}, "message 2: has 2 names and 0 positions"),
         ([{"position": [float("nan"), 0]}], {}, "no number, left out: 1, the first is message 1. None is left"),
-        ([{}], {"drive_unit": None}, "its effort may be in N·m, .*, or in amperes.*; say --drive-unit Nm, N, A or V"),
+        ([{}], {"drive_unit": None}, "its effort may be in N·m, .*, or in amperes.*; say --drive-unit N·m, N, A or V"),
         ([{}, {"stamp": START - 5}], {}, "message 2: its time .* does not come after .*--received"),
         ([{}], {"topic": "/other"}, "topic /other: has no joint states; there are some on /joint_states"),
         ([{}], {"joints": ("elbow",)}, "has no joint 'elbow'; it has pan, lift"),

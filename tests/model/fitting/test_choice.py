@@ -11,8 +11,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.quantity import Quantity
 from model.fitting.choice import chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.options import FitOptions, Prior
-from model.fitting.records import records_of, resolution, sensor_deviation
+from model.fitting.records import records_of, resolution
 from model.machine_model.model import base_model
+from model.record_check.readings import sensor_deviation
 from tests.model.fitting.imagined import arm, machine
 from tests.model.fitting.test_records import record_of
 

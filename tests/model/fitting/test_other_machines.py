@@ -124,18 +124,15 @@ def test_what_was_simulated_with_derivatives_is_not_simulated_again_without() ->
 
 def test_what_the_noise_does_on_average_is_the_mean_over_replicas_of_the_model_as_the_arm() -> None:
     problem, values = problem_of(NOISY), np.array([1.0])
-    found = noise_effect(problem, values, 3, seed=4)
-    (mean,) = found.mean
-    rng, total, square = np.random.default_rng([4, 7]), 0.0, 0.0
+    (mean,) = noise_effect(problem, values, 3, seed=4)
+    rng, total = np.random.default_rng([4, 7]), 0.0
     for _ in range(3):
         readings = problem.noisy_readings(values, rng)
-        own = problem.with_readings(readings).evaluate(values, False)[0].residual
-        total, square = total + own, square + (own**2).mean(axis=0)
+        total = total + problem.with_readings(readings).evaluate(values, False)[0].residual
     np.testing.assert_allclose(mean, total / 3)
-    np.testing.assert_allclose(found.size, np.sqrt(square / 3))
-    (offset,) = noise_effect(problem.with_offset([np.ones_like(mean)]), values, 3, seed=4).mean
+    (offset,) = noise_effect(problem.with_offset([np.ones_like(mean)]), values, 3, seed=4)
     np.testing.assert_array_equal(offset, mean)  # an offset of before takes no part
-    assert not np.array_equal(noise_effect(problem, values, 3, seed=5).mean[0], mean)
+    assert not np.array_equal(noise_effect(problem, values, 3, seed=5)[0], mean)
     assert np.abs(mean).max() < 3 * resolution_of(problem)
 
 

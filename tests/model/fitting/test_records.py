@@ -11,9 +11,10 @@ import pytest
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace, TraceRecord
-from model.fitting.records import noise_floor, records_of, sensor_deviation
+from model.fitting.records import noise_floor, records_of
 from model.machine_model.model import base_model
 from model.record_check.check import check_records
+from model.record_check.readings import sensor_deviation
 from tests.model.fitting.imagined import PERIOD, STARTS, arm, machine
 
 COUNT = 1.5 * np.pi / 4096

@@ -7,7 +7,8 @@ import pytest
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions
 from model.machine_model.record_verdict import JointLeft, RecordVerdict, far_numbers
-from tests.model.fitting.imagined import arm, trace
+from model.validation.fidelity import validate_by_distortion
+from tests.model.fitting.imagined import arm, changed, trace
 
 MANY = 10**6
 
@@ -59,3 +60,15 @@ def test_as_much_torque_left_as_was_recorded_is_no_explanation_however_large_the
     found = RecordVerdict.of(arm(), [one], MANY)
     assert not found.explains
     assert "joint 1 is left with 39 N·m, of 1 N·m recorded" in found.text
+
+
+def test_as_much_motion_left_as_was_recorded_is_no_explanation_either() -> None:
+    """Readings that are lost, in a closed loop."""
+    recorded = trace(arm(), 0)
+    false = recorded.position.copy()
+    false[::3] = 0.0
+    broken = changed(recorded, position=false)
+    found = validate_by_distortion(arm(), [broken], ["link2.mass"]).verdict
+    assert found is not None
+    assert not found.explains
+    assert "The model explains" not in found.text

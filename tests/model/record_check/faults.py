@@ -93,6 +93,21 @@ def stuck(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
     return Faulty(_with(trace, name, joint, signal), ("stuck",), joint, float(trace.time[row]))
 
 
+def saturated(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """Readings that end at a value which the motion passes at speed, and goes beyond for a while."""
+    joint = _joint(machine, draw)
+    name, signal = _source(trace, machine, joint)
+    bound = float(np.quantile(signal, draw.uniform(0.7, 0.9)))
+    cut = np.minimum(signal, bound)
+    above = np.flatnonzero(np.diff(np.concatenate([[0], (signal >= bound).astype(int), [0]])))
+    usual = float(np.sqrt(np.mean(np.diff(cut) ** 2)))
+    entered = [int(k) for k, end in zip(above[::2], above[1::2], strict=True) if end - k >= 8 and k > 8]
+    entered = [k for k in entered if np.diff(signal[k - 4 : k + 1]).min() > 1.5 * usual]
+    if not entered:
+        return None
+    return Faulty(_with(trace, name, joint, cut), ("saturated",), joint, float(trace.time[entered[0]]))
+
+
 def cut_out(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     """Two seconds that are not in the file."""
     rows = round(2.0 / float(np.median(np.diff(trace.time))))
@@ -173,6 +188,7 @@ FAULTS: dict[str, Fault] = {
         spikes,
         wraps,
         stuck,
+        saturated,
         cut_out,
         milliseconds,
         slow_times,

@@ -9,7 +9,7 @@ from daq.contracts.service.fleet import FittedNumber
 from server.fleet.drift import CHANCE, Pair, changes_of
 
 
-def number(value: float, deviation: float = 0.01, unit: str = "N m", name: str = "a") -> FittedNumber:
+def number(value: float, deviation: float = 0.01, unit: str = "N·m", name: str = "a") -> FittedNumber:
     half = 1.96 * deviation
     return FittedNumber(name=name, unit=unit, value=value, deviation=deviation, low=value - half, high=value + half)
 
@@ -56,6 +56,6 @@ def test_noise_alone_seldom_makes_any_arm_count_as_changed() -> None:
 
 def test_numbers_that_only_one_fit_determines_or_in_another_unit_are_not_compared() -> None:
     before = {"a": number(0.2), "b": number(1.0, name="b")}
-    after = {"a": number(0.2, unit="mN m"), "c": number(1.0, name="c")}
+    after = {"a": number(0.2, unit="mN·m"), "c": number(1.0, name="c")}
     assert changes_of((Pair("left", before, after),)) == {"left": ()}
     assert changes_of(()) == {}

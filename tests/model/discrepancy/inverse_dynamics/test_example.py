@@ -48,7 +48,6 @@ def test_a_record_of_speeds_alone_has_their_integral_as_position(tmp_path: Path)
     assert "integrals" in trace.record.notes
 
 
-@pytest.mark.slow
 def test_the_example_names_the_friction_that_the_rig_hides(tmp_path: Path) -> None:
     first, second = (import_csv(path) for path in written(tmp_path))
     model = base_model(load_machine(str(ROOT / "examples" / "motor_bench.toml")))

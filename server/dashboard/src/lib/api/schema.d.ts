@@ -2935,6 +2935,11 @@ export interface components {
             error: number;
             /** Error By Joint */
             error_by_joint: number[];
+            /**
+             * Noise By Joint
+             * @default []
+             */
+            noise_by_joint?: number[];
             /** Parameters */
             parameters: components["schemas"]["ParameterDistortion"][];
             /** Sum Of Contributions */
@@ -3862,9 +3867,10 @@ export interface components {
          * JointAgreement
          * @description One joint over one or more traces.
          *
-         *     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-         *     count of the sensor (None where it has none), all in `unit`. `share` is `rmse` divided by the root mean
-         *     square of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+         *     `rmse` and `largest` of measured − simulated, `floor` its noise: what the model would leave of records that it had
+         *     made itself, noise of the sensors included (of speeds: its own). `count`: one count of the sensor, None
+         *     where it has none. All are in `unit`. `share` is `rmse` divided by the root mean square of the measured motion about
+         *     its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
          */
         JointAgreement: {
             /** Joint */
@@ -3948,7 +3954,8 @@ export interface components {
         /**
          * JointLeft
          * @description What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-         *     of records that the model itself had made; `there`: of the recorded torque, if torques are compared; in `unit`.
+         *     of records that the model itself had made; `there`: of the recorded torque, or of the recorded motion about its mean
+         *     (None where that is hardly more than noise of the readings); in `unit`.
          */
         JointLeft: {
             /** Joint */
@@ -5330,7 +5337,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
             /**
              * Consequence
              * @enum {string}

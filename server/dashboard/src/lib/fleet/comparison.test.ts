@@ -14,7 +14,7 @@ function fit(job: string, day: number, value: number): Arm['fits'][number] {
     whitened_mean_square: 1.05,
     residuals: [],
     numbers: [
-      { name: 'a', unit: 'N m', value, deviation: 0.01, low: value - 0.02, high: value + 0.02 },
+      { name: 'a', unit: 'N·m', value, deviation: 0.01, low: value - 0.02, high: value + 0.02 },
       { name: 'b', unit: 's', value: 1, deviation: 0.1, low: 0.8, high: 1.2 },
     ],
   };
@@ -22,7 +22,7 @@ function fit(job: string, day: number, value: number): Arm['fits'][number] {
 
 const change = (name: string, difference: number, changed: boolean): Arm['changes'][number] => ({
   name,
-  unit: 'N m',
+  unit: 'N·m',
   before: 0.2,
   after: 0.2 + difference,
   difference,
