@@ -18,6 +18,7 @@ from daq_cli.models.model_input import (
     MODEL_HELP,
     Comparison,
     ComparisonOption,
+    DespiteDoubtsOption,
     EffectFileOption,
     JudgedByOption,
     MostOption,
@@ -100,9 +101,7 @@ def diagnose(
         bool,
         typer.Option("--design", help="Search for a motion of its own to ask for; it takes some 10 s more."),
     ] = False,
-    despite_doubts: Annotated[
-        bool, typer.Option("--despite-doubts", help="Compute although the check of the records raises doubts.")
-    ] = False,
+    despite_doubts: DespiteDoubtsOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:

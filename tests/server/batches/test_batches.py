@@ -18,13 +18,14 @@ from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from daq.traces.reader import read_trace
 from model.discrepancy.inverse_dynamics.options import torque_options
+from model.discrepancy.options import DiagnosisOptions
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.batches.choice import chosen_traces
 from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened, take_over
 from server.batches.run import Chosen, Standing, run_batch
-from server.batches.study import Answer, Common, diagnosis_options
+from server.batches.study import Answer, Common, options_of
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.server.batches.traces import MACHINE, folder_of_traces, number
 
@@ -70,7 +71,7 @@ def test_the_table_has_what_a_simulation_of_each_trace_gives(tmp_path: Path, tra
 def test_a_number_of_steps_that_is_not_given_is_the_methods_own(
     study: DiagnoseStudy, simulated: int, balanced: int
 ) -> None:
-    options = diagnosis_options(DiagnoseStudy.model_validate_json(study.model_dump_json()))
+    options = options_of(DiagnoseStudy.model_validate_json(study.model_dump_json()), DiagnosisOptions)
     assert (options.most_steps, torque_options(options).most_steps) == (simulated, balanced)
 
 
