@@ -42,6 +42,7 @@ from firmware_protocol.commands import (
     Refusal,
     Release,
     Released,
+    Reply,
     ReportErrorsPositionsPowers,
     ReportGains,
     SetGains,
@@ -221,10 +222,15 @@ class Controller:
         """
         asked = (ReadStatus(), Stop(), ReadStatus())
         together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
+        replies: list[Reply] = []
+        within: list[float] = []
         try:
-            before, stopped, after = (reply for requests in together for reply in self.link.exchange(*requests))
+            for requests in together:
+                replies += self.link.exchange(*requests)
+                within += self.link.answered_within
+            before, stopped, after = replies
             was_frozen = StatusFlag.FROZEN in StatusFlag(expect(ReadStatus(), before, Status).status)
-            confirmation = self._frozen(expect(Stop(), stopped, Stopped))
+            confirmation = replace(self._frozen(expect(Stop(), stopped, Stopped)), seconds=within[1])
             return confirmation, None if was_frozen else expect(ReadStatus(), after, Status).stop
         except LinkError as error:
             return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error)), None

@@ -86,6 +86,9 @@ class Link:
         self._exchange = TurnExchange(self._connection) if endpoint.lock_step else TimedExchange(self._connection)
         self._clean = CLEAN_TRANSACTIONS
         self._unanswered = False
+        self._now = now
+        self.answered_within: tuple[float, ...] = ()
+        """Time (s) from the begin of the last exchange to each of its replies."""
 
     @classmethod
     def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
@@ -162,12 +165,14 @@ class Link:
 
         Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value.
         """
+        begun = self._now()
         try:
             transactions = self._exchange.run(requests)
         except LinkError:
             self._unanswered = True
             raise
         self._unanswered = False
+        self.answered_within = tuple(transaction.answered_at - begun for transaction in transactions)
         at_once = all(transaction.written == 1 for transaction in transactions)
         self._clean = self._clean + 1 if at_once else 0
         replies = tuple(transaction.reply for transaction in transactions if transaction.reply is not None)

@@ -24,9 +24,11 @@ from daq_cli.commands.simulate import NoRoundingOption
 from daq_cli.models.batch import LOCAL, Asked, run_at_service, run_here
 from daq_cli.models.model_input import (
     MODEL_HELP,
+    CandidatesOption,
     ComparisonOption,
     DespiteDoubtsOption,
     EffectFileOption,
+    ExaminedOption,
     ExecutorOption,
     MostOption,
 )
@@ -155,17 +157,8 @@ def diagnose(
     executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            help="Candidate effects, such as backlash,coulomb (default: every effect of the library).",
-            autocompletion=completion.effects,
-        ),
-    ] = None,
-    joints: Annotated[
-        str | None,
-        typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
-    ] = None,
+    effects: CandidatesOption = None,
+    joints: ExaminedOption = None,
     most: MostOption = None,
     method: ComparisonOption = None,
     despite_doubts: DespiteDoubtsOption = False,
