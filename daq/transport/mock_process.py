@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -93,11 +94,13 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
             os.set_blocking(process.stdout.fileno(), False)
             return MockProcess(ready["url"], ready.get("control"), process)
         except (ValueError, KeyError, TypeError) as error:
-            code = process.poll()
+            seconds, code = time.monotonic() - begun, None
+            with contextlib.suppress(subprocess.TimeoutExpired):  # one that ends closes its output a moment before
+                code = process.wait(0.0 if seconds >= START_TIMEOUT_S else END_TIMEOUT_S)
             MockProcess("", None, process).close()
             complaints.seek(0)
             words = complaints.read().decode(errors="replace").strip()[-LAST_WORDS:]
-            last_line = words.splitlines()[-1] if words else _silent(code, time.monotonic() - begun)
+            last_line = words.splitlines()[-1] if words else _silent(code, seconds)
             raise TransportError(f"the mock controller did not start: {last_line}") from error
 
 

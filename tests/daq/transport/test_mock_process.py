@@ -63,7 +63,7 @@ def test_a_mock_that_ends_without_a_word_has_its_end_named(
 def test_a_mock_that_gets_no_processor_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mock_process, "processor_time", lambda _process: ProcessorTime(0.0, 1e9))
     monkeypatch.setattr(mock_process, "STARVED_TIMEOUT_S", 0.0)
-    with pytest.raises(TransportError, match="was not ready after .* s; see what keeps this computer busy"):
+    with pytest.raises(TransportError, match=r"was not ready after .* s; see what keeps this computer busy"):
         start_mock(MockPort())
 
 

@@ -14,7 +14,7 @@ import pytest
 from sqlalchemy.event import listen
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.errors import ReachError
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import (
@@ -32,6 +32,7 @@ from daq.executors import Workers
 from daq.executors.program import OtherVersionError
 from daq.executors.workers import BlamedError
 from model.machine_model.model import base_model
+from model.machine_model.model_file import file_of
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
 from server.experiments.states import Event
