@@ -42,7 +42,6 @@ from firmware_protocol.commands import (
     Refusal,
     Release,
     Released,
-    Reply,
     ReportErrorsPositionsPowers,
     ReportGains,
     SetGains,
@@ -222,15 +221,12 @@ class Controller:
         """
         asked = (ReadStatus(), Stop(), ReadStatus())
         together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
-        replies: list[Reply] = []
-        within: list[float] = []
         try:
-            for requests in together:
-                replies += self.link.exchange(*requests)
-                within += self.link.answered_within
-            before, stopped, after = replies
+            parts = [self.link.exchange_timed(*requests) for requests in together]
+            before, stopped, after = (reply for replies, _ in parts for reply in replies)
+            seconds = [time for _, times in parts for time in times][1]
             was_frozen = StatusFlag.FROZEN in StatusFlag(expect(ReadStatus(), before, Status).status)
-            confirmation = replace(self._frozen(expect(Stop(), stopped, Stopped)), seconds=within[1])
+            confirmation = replace(self._frozen(expect(Stop(), stopped, Stopped)), seconds=seconds)
             return confirmation, None if was_frozen else expect(ReadStatus(), after, Status).stop
         except LinkError as error:
             return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error)), None

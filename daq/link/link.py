@@ -87,8 +87,6 @@ class Link:
         self._clean = CLEAN_TRANSACTIONS
         self._unanswered = False
         self._now = now
-        self.answered_within: tuple[float, ...] = ()
-        """Time (s) from the begin of the last exchange to each of its replies."""
 
     @classmethod
     def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
@@ -165,6 +163,10 @@ class Link:
 
         Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value.
         """
+        return self.exchange_timed(*requests)[0]
+
+    def exchange_timed(self, *requests: Request) -> tuple[tuple[Reply, ...], tuple[float, ...]]:
+        """The same, with the time (s) from its begin to each reply."""
         begun = self._now()
         try:
             transactions = self._exchange.run(requests)
@@ -172,14 +174,13 @@ class Link:
             self._unanswered = True
             raise
         self._unanswered = False
-        self.answered_within = tuple(transaction.answered_at - begun for transaction in transactions)
         at_once = all(transaction.written == 1 for transaction in transactions)
         self._clean = self._clean + 1 if at_once else 0
         replies = tuple(transaction.reply for transaction in transactions if transaction.reply is not None)
         refused = sum(isinstance(reply, Refused) for reply in replies)
         if refused:
             self.tally.count("refused", refused)
-        return replies
+        return replies, tuple(transaction.answered_at - begun for transaction in transactions)
 
     def greet(self) -> HelloReply:
         """Begins a session, without which no command is obeyed. Moves nothing.

@@ -65,6 +65,8 @@ def serve(robot: OwnedRobot) -> None:
                 last = None
             except HardwareFaultError as error:
                 _trip_once(robot, str(error))
+                with suppress(LinkError):  # the next turn meets it
+                    robot.number_stop()  # no sample comes, and the stop is released by its number
                 last = None
             except (LinkError, NoSampleError) as error:
                 _link_lost(robot, str(error))
@@ -73,11 +75,11 @@ def serve(robot: OwnedRobot) -> None:
 
 def _watch(robot: OwnedRobot, last: int | None) -> int:
     """Reads the next sample of an arm that nobody moves. Returns its tick."""
-    robot.number_stop()  # first: a damaged drive has no next sample, and its stop is released by its number, too
     every = robot.controller.line_rate().every
     snapshot = robot.controller.next_snapshot(None if last is None else last + every - 1)
     if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
         robot.control.stop("on the board, by somebody else")
+    robot.number_stop()
     return snapshot.tick
 
 

@@ -43,7 +43,7 @@ def bench(store: ObjectStore, proxy: FaultyStore, make: Make) -> Bench:
 def _model_of(bench: Bench, trace: str) -> ModelStore:
     models = ModelStore(bench.store)
     now = bench.clock.utc()
-    models.insert(NewModel("a" * 12, ROBOT, "rig b", "a.json", now, "anna", None, None, (trace,)))
+    models.insert(NewModel("a" * 12, ROBOT, "rig b", "a.json", now, "anna", None, None, (trace,)), lambda: None)
     return models
 
 
@@ -226,7 +226,7 @@ def test_the_oldest_copies_go_when_all_take_too_much(store: ObjectStore, make: M
     bench.until(lambda: not bench.path(first).exists() and not bench.path(second).exists())
     with pytest.raises(ProblemError, match="is used by model 'rig b'"):
         bench.catalogue.remove(second)
-    models.remove(ROBOT, "a" * 12)
+    models.remove(ROBOT, "a" * 12, lambda _file: None)
     bench.catalogue.remove(second)
 
 
