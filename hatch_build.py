@@ -66,10 +66,10 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def _documents() -> list[str]:
-    """The pages and their pictures, and the pages that lie elsewhere, from the root on."""
+    """The pages and their pictures, and the pages that lie in no package, from the root on."""
     found = [*ROOT.glob("docs/**/*.md"), *ROOT.glob("docs/images/*")]
     inside = [path.relative_to(ROOT).as_posix() for path in found if SITE not in path.parents]
-    return [*inside, "firmware_protocol/PROTOCOL.md", "CHANGELOG.md", "CONTRIBUTING.md", "README.md"]
+    return [*inside, "CHANGELOG.md", "CONTRIBUTING.md", "README.md"]
 
 
 def build_page() -> None:

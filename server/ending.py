@@ -26,12 +26,13 @@ log = logging.getLogger("server")
 
 class EndInTime:
     """A time limit for the end of this process, armed once. `children` ends this service's processes before a
-    forced end; `in_order` says whether everything that had to end in order has ended: then only threads are left that
-    nobody waits for, and the exit code is 0."""
+    forced end; `in_order` says whether everything that had to end in order has ended but for `last`, which is ended
+    then: only threads are left that nobody waits for, and the exit code is 0."""
 
-    def __init__(self, children: Callable[[], None], in_order: Callable[[], bool]) -> None:
+    def __init__(self, children: Callable[[], None], in_order: Callable[[], bool], last: Callable[[], None]) -> None:
         self._children = children
         self._in_order = in_order
+        self._last = last
         self._armed = threading.Lock()
 
     def arm(self) -> None:
@@ -48,6 +49,7 @@ class EndInTime:
         """Ends this process now if everything has ended in order after a signal. Python would wait for threads that
         still compute, until the time limit."""
         if self._armed.locked() and self._in_order():
+            self._last()
             logging.shutdown()
             with suppress(OSError, ValueError):
                 sys.stdout.flush()

@@ -70,7 +70,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         # The web server raises the signal again when it has ended; the with-blocks then end everything else.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         door.wait_ready()
-        end = EndInTime(services.end_processes, lambda: services.closed)
+        end = EndInTime(services.end_processes, lambda: services.closed, door.close)
         with suppress(KeyboardInterrupt):  # by then the web server has ended in order
             _Server(config, lambda: ready(address), ending, end.arm).run([listener])
     end.finish()

@@ -30,7 +30,7 @@ BROUGHT = {
     "reference/changes": "CHANGELOG.md",
     "explanation/contributing": "CONTRIBUTING.md",
 }
-"""Pages of the site whose text lies elsewhere in the repository."""
+"""Pages of the site whose text lies elsewhere in the repository; that of the protocol stays in its package."""
 PICTURES = {".png": "image/png", ".svg": "image/svg+xml"}
 LINK = re.compile(r"(\[[^\]]*)(\]\(<?)([^)\s>]+)(>?\))")
 CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)
@@ -122,7 +122,8 @@ class Documents:
         return frozenset(path.with_suffix("").as_posix() for path in paths if path.parts[0] != "_site")
 
     def _text(self, docname: str) -> str:
-        path = self.root / BROUGHT.get(docname, f"docs/{docname}.md")
+        name = BROUGHT.get(docname, f"docs/{docname}.md")
+        path = next((root / name for root in (self.root, _HERE) if (root / name).is_file()), self.root / name)
         return HEADER.sub("", path.read_text("utf-8"))
 
     def _title(self, docname: str) -> str:

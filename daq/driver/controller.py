@@ -222,9 +222,11 @@ class Controller:
         asked = (ReadStatus(), Stop(), ReadStatus())
         together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
         try:
-            before, stopped, after = (reply for requests in together for reply in self.link.exchange(*requests))
+            parts = [self.link.exchange_timed(*requests) for requests in together]
+            before, stopped, after = (reply for replies, _ in parts for reply in replies)
+            seconds = [time for _, times in parts for time in times][1]
             was_frozen = StatusFlag.FROZEN in StatusFlag(expect(ReadStatus(), before, Status).status)
-            confirmation = self._frozen(expect(Stop(), stopped, Stopped))
+            confirmation = replace(self._frozen(expect(Stop(), stopped, Stopped)), seconds=seconds)
             return confirmation, None if was_frozen else expect(ReadStatus(), after, Status).stop
         except LinkError as error:
             return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error)), None

@@ -86,6 +86,7 @@ class Link:
         self._exchange = TurnExchange(self._connection) if endpoint.lock_step else TimedExchange(self._connection)
         self._clean = CLEAN_TRANSACTIONS
         self._unanswered = False
+        self._now = now
 
     @classmethod
     def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
@@ -162,6 +163,11 @@ class Link:
 
         Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value.
         """
+        return self.exchange_timed(*requests)[0]
+
+    def exchange_timed(self, *requests: Request) -> tuple[tuple[Reply, ...], tuple[float, ...]]:
+        """The same, with the time (s) from its begin to each reply."""
+        begun = self._now()
         try:
             transactions = self._exchange.run(requests)
         except LinkError:
@@ -174,7 +180,7 @@ class Link:
         refused = sum(isinstance(reply, Refused) for reply in replies)
         if refused:
             self.tally.count("refused", refused)
-        return replies
+        return replies, tuple(transaction.answered_at - begun for transaction in transactions)
 
     def greet(self) -> HelloReply:
         """Begins a session, without which no command is obeyed. Moves nothing.

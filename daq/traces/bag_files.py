@@ -12,7 +12,7 @@ from mcap.writer import MCAP0_MAGIC
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
-from daq.traces.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC
+from daq.traces.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC, journals_of
 from daq.traces.ends import first_metadata
 
 Kind = Literal["trace", "bag", "csv"]
@@ -45,7 +45,7 @@ def check_files(path: Path, limits: TraceLimits) -> None:
         wanted = f"a folder with {METADATA}, or a file {', '.join(STORAGES)}"
         raise TraceError(f"{path}: {f'is no bag: that is {wanted}' if path.exists() else 'there is no such bag'}")
     try:
-        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        files = sorted(path.iterdir()) if path.is_dir() else [path, *journals_of(path)]
         total = 0
         for file in files:  # of any name: metadata.yaml chooses which are read
             if not file.is_dir():

@@ -35,6 +35,7 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 LARGEST_MESSAGE = 1 << 20
 """Largest message (bytes) of joint states: that of some ten thousand joints."""
 NEVER_ENDED = "its recording was never ended, and what it had not yet written is missing"
+JOURNALS = "-wal", "-journal"
 SQLITE_MAGIC = b"SQLite format 3\0"
 ROS_1_MAGIC = b"#ROSBAG V"
 
@@ -363,14 +364,19 @@ def _is_plain(journal: Path) -> bool:
         return begin in (_JOURNAL, bytes(8)) and stream.read(8) != _JOURNAL
 
 
+def journals_of(file: Path) -> list[Path]:
+    """The journals of SQLite beside a file that have content."""
+    beside = (Path(f"{file}{end}") for end in JOURNALS)
+    return [one for one in beside if one.is_file() and one.stat().st_size]
+
+
 def _recovered(file: Path, folder: Path, found: Contents) -> Path:
     """The database with what its journals hold: itself, or a copy to which SQLite has applied them.
 
     Raises TraceError where the database is being written or a journal cannot be applied, OSError.
     """
-    wal, journal = Path(f"{file}-wal"), Path(f"{file}-journal")
-    beside = [one for one in (wal, journal) if one.is_file() and one.stat().st_size]
-    if not beside:
+    wal, journal = (Path(f"{file}{end}") for end in JOURNALS)
+    if not (beside := journals_of(file)):
         return file
     copy = folder / "copy.db3"
     copies = {file: copy} | {one: Path(f"{copy}{one.name.removeprefix(file.name)}") for one in beside}

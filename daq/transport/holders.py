@@ -15,8 +15,10 @@ def other_holders(device: str) -> list[str]:
     found: list[str] = []
     with suppress(OSError):
         wanted = os.stat(device).st_rdev
-        for process in Path("/proc").iterdir():
-            if process.name.isdecimal() and not _is_ours(int(process.name)) and _holds(process, wanted):
+        processes = [entry for entry in Path("/proc").iterdir() if entry.name.isdecimal()]
+        ours = _ours({int(process.name): _parent(process) for process in processes})
+        for process in processes:
+            if int(process.name) not in ours and _holds(process, wanted):
                 with suppress(OSError):
                     found.append(f"{(process / 'comm').read_text().strip()} (process {process.name})")
     return found
@@ -40,15 +42,23 @@ def _holds(process: Path, wanted: int) -> bool:
     return False
 
 
-def _is_ours(process: int) -> bool:
-    """Whether a process is this one, one that it descends from, or one that it started."""
-    return process in _ancestors(os.getpid()) or os.getpid() in _ancestors(process)
+def _ours(parents: dict[int, int]) -> set[int]:
+    """This process, those that it descends from, and those that it started. `parents`: each process's."""
+    children: dict[int, list[int]] = {}
+    for process, parent in parents.items():
+        children.setdefault(parent, []).append(process)
+    ours, ancestor = {os.getpid()}, parents.get(os.getpid(), 0)
+    descendants = [os.getpid()]
+    for process in descendants:  # it grows
+        descendants += children.get(process, ())
+    while ancestor > 1 and ancestor not in ours:
+        ours.add(ancestor)
+        ancestor = parents.get(ancestor, 0)
+    return ours.union(descendants)
 
 
-def _ancestors(process: int) -> list[int]:
-    found: list[int] = []
+def _parent(process: Path) -> int:
+    """0 where it has ended meanwhile."""
     with suppress(OSError, ValueError, IndexError):
-        while process > 1 and len(found) < 100:
-            found.append(process)
-            process = int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
-    return found
+        return int((process / "stat").read_text().rpartition(")")[2].split()[1])
+    return 0

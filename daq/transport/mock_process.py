@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -18,7 +19,9 @@ from daq.transport.url import SERVOS, MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
 """Longest time for a mock to start: the first import of the physics engine from a cold disk takes seconds. The time in
-which it waits for a processor does not count."""
+which it waits for a processor does not count, up to STARVED_TIMEOUT_S."""
+STARVED_TIMEOUT_S = 300.0
+"""Longest time for a mock to start on a computer that gives it no processor: whoever waits wants to know by then."""
 END_TIMEOUT_S = 3.0
 PIECE = 1 << 16
 """Bytes that a pipe holds on Linux: one reading empties it, and cuts no line."""
@@ -76,6 +79,7 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
     module = "mock_controller.servos" if port.dialect == SERVOS else "mock_controller"
     waiting = ("--waits",) if waits and port.dialect != SERVOS else ()
     command = [sys.executable, "-m", module, *where, "--owned", *waiting, *port.arguments]
+    begun = time.monotonic()
     with tempfile.TemporaryFile() as complaints:
         process = subprocess.Popen(
             command,
@@ -90,11 +94,13 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
             os.set_blocking(process.stdout.fileno(), False)
             return MockProcess(ready["url"], ready.get("control"), process)
         except (ValueError, KeyError, TypeError) as error:
-            code = process.poll()
+            seconds, code = time.monotonic() - begun, None
+            with contextlib.suppress(subprocess.TimeoutExpired):  # one that ends closes its output a moment before
+                code = process.wait(0.0 if seconds >= START_TIMEOUT_S else END_TIMEOUT_S)
             MockProcess("", None, process).close()
             complaints.seek(0)
             words = complaints.read().decode(errors="replace").strip()[-LAST_WORDS:]
-            last_line = words.splitlines()[-1] if words else _silent(code)
+            last_line = words.splitlines()[-1] if words else _silent(code, seconds)
             raise TransportError(f"the mock controller did not start: {last_line}") from error
 
 
@@ -106,17 +112,17 @@ def _available(output: IO[bytes]) -> bytes:
         return b""
 
 
-def _silent(code: int | None) -> str:
-    """Why a mock may have said nothing. `code`: its exit code; None where it was still starting."""
+def _silent(code: int | None, seconds: float) -> str:
+    """Why a mock may have said nothing in this time. `code`: its exit code; None where it was still starting."""
     if code is None:
-        return f"it was not ready after {START_TIMEOUT_S:g} s; see what keeps this computer's disk busy, and try again"
+        return f"it was not ready after {seconds:.0f} s; see what keeps this computer busy, and try again"
     if code < 0:
         return f"signal {-code} ended it; see whether this computer is out of memory, and try again"
     return f"it ended with exit code {code} and gave no reason"
 
 
 def _first_line(output: IO[bytes], process: int) -> bytes:
-    """The first line that a process prints; what there is when it ends or START_TIMEOUT_S have passed."""
+    """The first line that a process prints; what there is when it ends or its time has passed."""
     begun = time.monotonic()
     waiting = select.poll()
     waiting.register(output, select.POLLIN)
@@ -124,7 +130,7 @@ def _first_line(output: IO[bytes], process: int) -> bytes:
     while not line.endswith(b"\n"):
         counted = processor_time(process)
         patience = START_TIMEOUT_S + (0.0 if counted is None else counted.waited)
-        left = begun + patience - time.monotonic()
+        left = begun + min(patience, STARVED_TIMEOUT_S) - time.monotonic()
         if left <= 0:
             break
         if not waiting.poll(left * 1000):  # it may have waited for a processor meanwhile

@@ -10,12 +10,12 @@ import typer
 from daq.contracts import exit_codes
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json, printable
+from daq_cli.app.context import JsonOption, console, invocation, print_json, printable
+from daq_cli.app.database import service_database
 
 if TYPE_CHECKING:
     from daq.contracts.service.audit import AuditEntry
     from server.audit.chain import Head
-    from server.store.engine import Store
 
 app = typer.Typer(add_completion=False, help="Show who asked the service for what; check the log of it.")
 
@@ -40,7 +40,7 @@ def audit(
 
     search = AuditSearch(actor, robot, action, outcome=outcome, since=None if since is None else since.astimezone())
     found: list[AuditEntry] = []
-    log, cursor = AuditLog(_store(invocation(context))), None
+    log, cursor = AuditLog(service_database(invocation(context))), None
     while len(found) < number:
         page = log.page(search, cursor, min(500, number - len(found)))
         found += page.items
@@ -67,7 +67,7 @@ def verify(
     from server.audit.log import AuditLog
 
     known = None if head is None else _parse_head(head)
-    store = _store(invocation(context))
+    store = service_database(invocation(context))
     store.require_sound()  # a log can fit and yet be a view, or have lost the triggers that keep it
     last, misfit = AuditLog(store).first_misfit(known)
     if json:
@@ -97,12 +97,3 @@ def _parse_head(text: str) -> Head:
     if not (number.isascii() and number.isdecimal() and len(digest) == 64 and set(digest) <= set("0123456789abcdef")):
         raise SpecError(f"--head {shown(text)}: write NUMBER:DIGEST, as `daq audit verify` prints it")
     return Head(int(number), digest)
-
-
-def _store(call: Invocation) -> Store:
-    from server.store.address import address_of
-    from server.store.engine import Store
-
-    store = Store(address_of(call.configuration.server))
-    store.migrate()
-    return store

@@ -22,7 +22,16 @@ from daq_cli.commands.fit import (
 )
 from daq_cli.commands.simulate import NoRoundingOption
 from daq_cli.models.batch import LOCAL, Asked, run_at_service, run_here
-from daq_cli.models.model_input import MODEL_HELP, ComparisonOption, EffectFileOption, ExecutorOption, MostOption
+from daq_cli.models.model_input import (
+    MODEL_HELP,
+    CandidatesOption,
+    ComparisonOption,
+    DespiteDoubtsOption,
+    EffectFileOption,
+    ExaminedOption,
+    ExecutorOption,
+    MostOption,
+)
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -148,19 +157,11 @@ def diagnose(
     executor: ExecutorOption = LOCAL,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            help="Candidate effects, such as backlash,coulomb (default: every effect of the library).",
-            autocompletion=completion.effects,
-        ),
-    ] = None,
-    joints: Annotated[
-        str | None,
-        typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
-    ] = None,
+    effects: CandidatesOption = None,
+    joints: ExaminedOption = None,
     most: MostOption = None,
     method: ComparisonOption = None,
+    despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
     """Diagnose every trace by itself: a row with verdict, effects and errors for each."""
@@ -171,7 +172,7 @@ def diagnose(
     names = candidate_effects(effects, effect_file)
     chosen = None if joints is None else tuple(parse_joints(joints))
     compared = None if method is None else method.value
-    study = DiagnoseStudy(effects=names, joints=chosen, most_steps=most, method=compared)
+    study = DiagnoseStudy(effects=names, joints=chosen, most_steps=most, method=compared, despite_doubts=despite_doubts)
     _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
 
 

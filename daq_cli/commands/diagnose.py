@@ -10,15 +10,17 @@ import typer
 from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import NoController
-from daq_cli.app import completion
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.model_input import (
     MODEL_HELP,
+    CandidatesOption,
     Comparison,
     ComparisonOption,
+    DespiteDoubtsOption,
     EffectFileOption,
+    ExaminedOption,
     JudgedByOption,
     MostOption,
     OutOption,
@@ -66,17 +68,8 @@ def diagnose(
         str | None, typer.Option(help=f"The model to examine (default: the traces' machine). {MODEL_HELP}")
     ] = None,
     holdout: JudgedByOption = None,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            help="Candidate effects, such as backlash,coulomb (default: every effect of the library).",
-            autocompletion=completion.effects,
-        ),
-    ] = None,
-    joints: Annotated[
-        str | None,
-        typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
-    ] = None,
+    effects: CandidatesOption = None,
+    joints: ExaminedOption = None,
     load: Annotated[float | None, typer.Option(min=0.0, help="Load that the arm carried, in kg.")] = None,
     most: MostOption = None,
     method: ComparisonOption = None,

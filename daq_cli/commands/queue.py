@@ -91,9 +91,12 @@ def schedules(context: typer.Context, json: JsonOption = False) -> None:
     if json:
         print_json([one.model_dump(mode="json") for one in found])
         return
+    if not found:
+        print("no schedules: `daq run … --daily 02:00` makes one")
     for one in found:
         when = f"every {one.every:g} s" if one.every is not None else f"{one.cron} ({one.zone})"
         coming = "off or complete" if one.next is None else f"next on {one.next.astimezone():%Y-%m-%d at %H:%M %Z}"
+        coming = f"BROKEN: {one.problem}" if one.problem else coming
         print(f"{one.id}  {_name(one)}, by {one.created_by}: {when}; {one.submitted_runs} runs, {coming}{_review(one)}")
 
 

@@ -10,10 +10,10 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role
 from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
+from daq_cli.app.database import service_database
 
 if TYPE_CHECKING:
     from server.access.tokens import TokenStore
-    from server.store.engine import Store
 
 app = typer.Typer(
     add_completion=False,
@@ -75,7 +75,7 @@ def sessions(context: typer.Context, json: JsonOption = False) -> None:
     from server.access.sessions import SessionStore
     from server.clock import SystemClock
 
-    found = SessionStore(_store(invocation(context))).all(SystemClock().utc())
+    found = SessionStore(service_database(invocation(context))).all(SystemClock().utc())
     if json:
         print_json([{"name": one.name, "role": one.role, "expires": one.expires} for one in found])
         return
@@ -92,7 +92,7 @@ def sign_out(context: typer.Context, name: Annotated[str, typer.Argument(help="N
     from server.audit.command import computers_user
     from server.clock import SystemClock
 
-    count = SessionStore(_store(invocation(context))).end_all(name, SystemClock().utc(), computers_user())
+    count = SessionStore(service_database(invocation(context))).end_all(name, SystemClock().utc(), computers_user())
     if count == 0:
         raise SpecError(f"{shown(name)} has no session; `daq token sessions` lists those there are")
     print(f"{count} session{'s' * (count > 1)} of {name} ended")
@@ -106,13 +106,4 @@ def _require_name(name: str) -> None:
 def _tokens(call: Invocation) -> TokenStore:
     from server.access.tokens import TokenStore
 
-    return TokenStore(_store(call))
-
-
-def _store(call: Invocation) -> Store:
-    from server.store.address import address_of
-    from server.store.engine import Store
-
-    store = Store(address_of(call.configuration.server))
-    store.migrate()
-    return store
+    return TokenStore(service_database(call))

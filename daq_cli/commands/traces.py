@@ -30,9 +30,6 @@ TraceArgument = Annotated[
 ]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
-SHOWN_DIGITS = 8
-"""Digits of a trace's number in the list, so that it fits into 80 columns; they suffice to name the trace."""
-
 
 def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
     robot = robot_of(context)
@@ -71,17 +68,19 @@ def list_all(
     from rich.table import Table
     from rich.text import Text
 
+    from daq.traces.naming import ID_DIGITS
+
     table = Table(box=None, header_style="bold")
-    for title in ("number", "recorded (UTC)", "what", "moved", "samples", "s", "outcome"):
+    for title in ("number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome"):
         table.add_column(title, no_wrap=True)
     for one in summaries:
         moment = one.created.strftime("%Y-%m-%d %H:%M") if one.created else "?"
         ended = one.outcome or one.state
         table.add_row(
-            printable((one.trace_id or one.path.name)[:SHOWN_DIGITS]),
+            printable((one.trace_id or one.path.name)[:ID_DIGITS]),
             moment,
             printable(f"{one.name or one.kind or one.source or one.problem}"),
-            "–" if one.moved is None else joints_text(one.moved),
+            joints_text(one.joints if one.moved is None else one.moved),
             "?" if one.samples is None else str(one.samples),
             "?" if one.duration is None else f"{one.duration:.2f}",
             Text(ended, "green" if ended == "complete" else "bold red"),
@@ -122,8 +121,10 @@ def show(
         )
         return
     record = found.record
-    what = record.spec.trajectory.kind if record.spec else "import"
-    print(printable(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}"))
+    where = f"{record.source} record of {record.robot}"
+    if record.spec is not None:
+        where = f"{record.spec.trajectory.kind} on {record.robot} ({record.source})"
+    print(printable(f"{record.trace_id}: {where}, {_ended(record)}"))
     print(printable(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}"))
     print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing_text}")
     if record.operator or record.notes:

@@ -103,6 +103,26 @@ MostOption = Annotated[
     ),
 ]
 
+CandidatesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--effects",
+        help="Candidate effects, such as backlash,coulomb (default: every effect of the library).",
+        autocompletion=completion.effects,
+    ),
+]
+
+ExaminedOption = Annotated[
+    str | None,
+    typer.Option(
+        "--joints", help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints
+    ),
+]
+
+DespiteDoubtsOption = Annotated[
+    bool, typer.Option("--despite-doubts", help="Compute although the check of the records raises doubts.")
+]
+
 ExecutorOption = Annotated[
     str,
     typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
@@ -105,16 +105,8 @@ class ServiceJobs:
             traces=self._numbers(traces),
             held_out=self._numbers(held_out),
             model=self._number(begin, f"begin of {out.stem}"),
-            parameters=options.parameters,
-            held=options.held,
-            bounds=dict(options.bounds),
-            use_priors=options.use_priors,
-            method=options.method,
-            starts=options.starts,
-            seed=options.seed,
-            loop=options.loop,
-            consistent_inertias=options.consistent_inertias,
             name=model_name(out.name),
+            **_given(options),
         )
         found = self._done(request, report)
         assert isinstance(found, FitJobResult)
@@ -176,12 +168,9 @@ class ServiceJobs:
             traces=self._numbers(traces),
             held_out=self._numbers(held_out),
             model=self._number(begin, "doubted"),
-            effects=options.effects,
-            joints=options.joints,
-            most_steps=options.most_steps if "most_steps" in options.model_fields_set else None,
-            method=options.method,
             design=design,
             name=None if out is None else model_name(out.name),
+            **_given(options),
         )
         found = self._done(request, report)
         assert isinstance(found, DiagnosisJobResult)
@@ -240,6 +229,11 @@ class ServiceJobs:
             found: JobResult = TypeAdapter(JobResult).validate_python(robot.jobs.result(job.id))
         console().print(f"job {job.id} at {self.robot.call.server}")
         return found
+
+
+def _given(options: FitOptions | DiagnosisOptions) -> dict[str, Any]:
+    """The options that were given, as fields of a request: it refuses what it has no field for."""
+    return {name: getattr(options, name) for name in options.model_fields_set}
 
 
 def model_name(text: str) -> str:

@@ -82,9 +82,11 @@ def cron_of(daily: str | None, cron: str | None) -> str | None:
     """The cron expression of `--daily HH:MM` or `--cron`; None without either. Raises SpecError."""
     if daily is None:
         return cron
+    if cron is not None:
+        raise SpecError("--daily and --cron: give one of them")
     found = re.fullmatch(r"([01]?\d|2[0-3]):([0-5]\d)", daily, re.ASCII)
-    if found is None or cron is not None:
-        raise SpecError(f"--daily {daily!r}: write HH:MM, such as 02:00, without --cron")
+    if found is None:
+        raise SpecError(f"--daily {daily!r:.40}: is no time of a day; write 00:00 to 23:59")
     return f"{int(found[2])} {int(found[1])} * * *"
 
 

@@ -14,7 +14,7 @@ from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
-from model.record_check.check import as_used, check_records
+from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import RecordFinding, doubts_in
 
 
@@ -47,6 +47,7 @@ def diagnose(
     found = check_records(model, (*traces, *holdout))
     if doubts_in(found) and not options.despite_doubts:
         return _doubted(model, traces, holdout, found)
+    require_computable(found)
     answer = _computed(model, traces, holdout, options, progress, cancel, chooser)
     doubted = {"verdict": "check-the-record"} if doubts_in(found) else {}
     return with_sentences(answer.model_copy(update={"record": found, **doubted})) if found else answer

@@ -9,9 +9,12 @@ from __future__ import annotations
 import hmac
 import secrets
 from base64 import urlsafe_b64encode
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from server.clock import Clock
+from server.problems import ProblemError
 
 GOOD_FOR = 600
 """Time (s) in which a person must sign in at the provider."""
@@ -28,12 +31,10 @@ class Asked:
 
 @dataclass(frozen=True)
 class OnTheWay:
-    """Somebody who has come back from the provider. robot: what to show them, empty for the first page; until: when
-    they would have been too late (s, monotonic)."""
+    """Somebody who has come back from the provider. robot: what to show them, empty for the first page."""
 
     asked: Asked
     robot: str
-    until: int
 
 
 class SignIns:
@@ -42,28 +43,32 @@ class SignIns:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._key = secrets.token_bytes(32)
-        self._done: dict[str, int] = {}
-        """The states with which somebody has signed in, and until when they would be good."""
+        self._used: dict[str, int] = {}
+        """The states with which somebody has signed in, or is about to, and until when they would be good."""
 
     def begin(self, robot: str) -> tuple[Asked, str]:
         """Returns what to ask for a person, and the text of their browser's cookie."""
         cookie = f"{secrets.token_urlsafe(32)}.{int(self._clock.monotonic()) + GOOD_FOR}.{robot}"
         return self._asked(cookie), cookie
 
-    def back(self, state: str, cookie: str) -> OnTheWay | None:
-        """Returns what was asked with this `state`; None if nothing was, if it is too old, if somebody has signed in
-        with it, or if another browser brings the answer."""
-        asked = self._asked(cookie)
-        if not hmac.compare_digest(asked.state.encode(), state.encode("utf-8", "replace")) or state in self._done:
-            return None
-        _, until, robot = cookie.split(".")  # it is as it was written, or the states would differ
-        return OnTheWay(asked, robot, int(until)) if int(until) > self._clock.monotonic() else None
-
-    def done(self, way: OnTheWay) -> None:
-        """Accepts the answer of somebody who has signed in no second time."""
-        now = self._clock.monotonic()
-        self._done = {state: until for state, until in self._done.items() if until > now}
-        self._done[way.asked.state] = way.until
+    @contextmanager
+    def answer(self, state: str, cookie: str) -> Iterator[OnTheWay]:
+        """Takes the answer to what was asked with this `state`. It is used up unless the block raises, and nobody else
+        can take it meanwhile. Raises a 403 if nothing was asked, if it is too old, if it is used, or if another browser
+        brings it."""
+        asked, now = self._asked(cookie), self._clock.monotonic()
+        known = hmac.compare_digest(asked.state.encode(), state.encode("utf-8", "replace"))
+        _, until, robot = cookie.split(".") if known else ("", "0", "")  # as it was written, or the states would differ
+        if not known or int(until) <= now or state in self._used:
+            line = "this answer of the provider was used, is too old, or was asked for by another browser"
+            raise ProblemError(403, "sign-in-unknown", line, "begin anew")
+        self._used = {state: until for state, until in self._used.items() if until > now}
+        self._used[state] = int(until)
+        try:
+            yield OnTheWay(asked, robot)
+        except BaseException:
+            del self._used[state]
+            raise
 
     def _asked(self, cookie: str) -> Asked:
         return Asked(*(self._derived(f"{what} {cookie}") for what in ("state", "nonce", "verifier")))

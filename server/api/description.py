@@ -43,8 +43,8 @@ class Described:
 
     def __init__(self, app: FastAPI) -> None:
         self._app = app
-        self._begun = threading.Lock()
-        self._encoded: Future[bytes] = Future()
+        self._beginning = threading.Lock()
+        self._encoded: Future[bytes] | None = None
         self._later = threading.Timer(AFTER, self.begin)
         self._later.daemon = True
 
@@ -53,10 +53,14 @@ class Described:
         self._later.start()
 
     def begin(self) -> Future[bytes]:
-        """Begins unless it has been begun, and returns a future of the encoded description."""
-        if self._begun.acquire(blocking=False):
-            threading.Thread(target=self._encode, name="description", daemon=True).start()
-        return self._encoded
+        """Begins unless it has been begun, and returns a future of the encoded description. What has failed is begun
+        anew."""
+        with self._beginning:
+            encoded = self._encoded
+            if encoded is None or (encoded.done() and encoded.exception() is not None):
+                self._encoded = encoded = Future()
+                threading.Thread(target=self._encode, args=(encoded,), name="description", daemon=True).start()
+            return encoded
 
     async def get(self, _request: Request) -> Response:
         """Answers with the description."""
@@ -66,12 +70,12 @@ class Described:
         """Does not begin any more by itself."""
         self._later.cancel()
 
-    def _encode(self) -> None:
+    def _encode(self, encoded: Future[bytes]) -> None:
         try:
             text = json.dumps(self._app.openapi(), ensure_ascii=False, separators=(",", ":"))
-            self._encoded.set_result(text.encode())
+            encoded.set_result(text.encode())
         except Exception as error:  # noqa: BLE001 - whoever waits is told
-            self._encoded.set_exception(error)
+            encoded.set_exception(error)
 
 
 def serve(app: FastAPI, address: str) -> Described:

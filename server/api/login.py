@@ -65,17 +65,14 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     if provider is None:
         raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
     given = dict(request.query_params)
-    way = services.sign_ins.back(given.get("state", ""), request.cookies.get(sign_in_cookie(_address(services)), ""))
-    if way is None:
-        line = "this answer of the provider was used, is too old, or was asked for by another browser"
-        return _told(request, services, ProblemError(403, "sign-in-unknown", line, "begin anew"))
+    cookie = request.cookies.get(sign_in_cookie(_address(services)), "")
+    lasts = timedelta(hours=services.settings.server.oidc.hours)
     try:
-        person = await provider.answered(way.asked, given, services.clock.monotonic())
-        lasts = timedelta(hours=services.settings.server.oidc.hours)
-        secret, caller = await run_in_threadpool(services.sessions.begin, person, services.clock.utc(), lasts)
+        with services.sign_ins.answer(given.get("state", ""), cookie) as way:
+            person = await provider.answered(way.asked, given, services.clock.monotonic())
+            secret, caller = await run_in_threadpool(services.sessions.begin, person, services.clock.utc(), lasts)
     except ProblemError as problem:
         return _told(request, services, problem)
-    services.sign_ins.done(way)
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     services.audit.writer.note(_of_sign_in(request, caller, services))

@@ -188,6 +188,13 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "wait for its end, or stop it",
     ),
     _met(
+        "(put .*/(gains|gripper|process/outputs/.*)|post .*/reset)$",
+        409,
+        "order-late",
+        "this order took 6.1 s to come whole: after 5 s it is not carried out",
+        "send it again if it is still wanted",
+    ),
+    _met(
         "post .*/(teaching/.*|programs/.*/run|queue/resume)$",
         409,
         "arm-stopped",

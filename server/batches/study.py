@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.extras import missing_extras_named
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from model.discrepancy.options import DiagnosisOptions
     from model.fitting.options import FitOptions
     from model.machine_model.model import Model
+
+Chosen = TypeVar("Chosen", "FitOptions", "DiagnosisOptions")
 
 
 class Common(FrozenRecord):
@@ -127,8 +129,9 @@ def _model(common: Common, trace: Trace) -> Model:
 
 def _fitted(study: FitStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
     from model.fitting.fit import fit
+    from model.fitting.options import FitOptions
 
-    found = fit(with_effects(model, study.effects), [trace], fit_options(study))
+    found = fit(with_effects(model, study.effects), [trace], options_of(study, FitOptions))
     return of_fit(found), found.model_dump_json()
 
 
@@ -159,36 +162,18 @@ def _simulated(study: SimulateStudy, model: Model, trace: Trace) -> tuple[Column
 
 def _diagnosed(study: DiagnoseStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
     from model.discrepancy.explanation.headline import headline
+    from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
 
-    found = diagnose(model, [trace], [], diagnosis_options(study))
+    found = diagnose(model, [trace], [], options_of(study, DiagnosisOptions))
     return of_diagnosis(found, headline(found)), found.model_dump_json()
 
 
-def diagnosis_options(study: DiagnoseStudy) -> DiagnosisOptions:
-    """Returns the options of a diagnosis. A number of steps is set only where the study has one: the methods have
-    defaults of their own."""
-    from model.discrepancy.options import DiagnosisOptions
-
-    given: dict[str, Any] = {} if study.most_steps is None else {"most_steps": study.most_steps}
-    return DiagnosisOptions(effects=study.effects, joints=study.joints, method=study.method, **given)
-
-
-def fit_options(study: FitStudy) -> FitOptions:
-    """Returns the options of a fit."""
-    from model.fitting.options import FitOptions
-
-    return FitOptions(
-        parameters=study.parameters,
-        held=study.held,
-        bounds=study.bounds,
-        use_priors=study.use_priors,
-        method=study.method,
-        starts=study.starts,
-        seed=study.seed,
-        loop=study.loop,
-        consistent_inertias=study.consistent_inertias,
-    )
+def options_of(study: FitStudy | DiagnoseStudy, kind: type[Chosen]) -> Chosen:
+    """Returns the options of a study. What the study leaves open is left to the method, which has defaults of its
+    own."""
+    given = {name: getattr(study, name, None) for name in kind.model_fields}
+    return kind(**{name: value for name, value in given.items() if value is not None})
 
 
 def with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:

@@ -48,6 +48,16 @@ def first(plan: Plan) -> datetime | None:
     return moment
 
 
+def broken(plan: Plan) -> str:
+    """Returns why the times of a stored schedule cannot be computed now, such as a time zone that is no longer known;
+    empty where they can."""
+    try:
+        first(plan)
+    except ProblemError as error:
+        return error.detail
+    return ""
+
+
 def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> datetime | None:
     """Returns the time of the run after the one due at `last`, after `submitted` runs; None if that was the last run.
 

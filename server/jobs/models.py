@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection
 from pathlib import Path
 
+from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
 from model.effects.names import placed
@@ -36,7 +37,8 @@ class Models:
         self, made: ModelFile, name: str, by: str, job: str | None = None, robots: Collection[str] | None = None
     ) -> bool:
         """Adds a model; returns False if the robot has it already. A number stands for one text, so its file is written
-        once. `robots`: those whose traces it may name; None for any. Raises a 422 for a trace that none of them has."""
+        once. `robots`: those whose traces it may name; None for any. Raises a 422 for a trace that none of them has,
+        SpecError if another model has its number."""
         new = NewModel(
             id=made.identity,
             robot=self._robot,
@@ -51,7 +53,7 @@ class Models:
 
         def write() -> None:
             path = self.folder / new.file
-            if path.exists():
+            if _is_kept(path, made):
                 return
             self.folder.mkdir(parents=True, exist_ok=True)
             part = path.with_name(f"{new.file}.part")
@@ -93,6 +95,18 @@ class Models:
     def remove(self, identity: str) -> None:
         """Deletes a model's row and file. Raises a 404, 409."""
         self.store.remove(self._robot, identity, lambda file: (self.folder / file).unlink(missing_ok=True))
+
+
+def _is_kept(path: Path, made: ModelFile) -> bool:
+    """Whether a model is in its file. A file that is not there, or was damaged or changed, is to be written anew.
+    Raises SpecError for a file of another model of the same number."""
+    try:
+        there = file_of(load_model(path))
+    except (DaqError, OSError):
+        return False
+    if there.identity == made.identity and there.text != made.text:
+        raise SpecError(f"model {made.identity}: another model has this number; change any value of it")
+    return there.identity == made.identity
 
 
 def _effect(use: EffectUse) -> EffectInModel:

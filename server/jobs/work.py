@@ -23,7 +23,7 @@ from daq.contracts.service.jobs import (
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.executors.address import LOCAL
 from daq.traces.reader import read_trace
-from server.batches.study import diagnosis_options, fit_options, with_effects
+from server.batches.study import options_of, with_effects
 from server.jobs.headlines import of_comparison, of_fit, of_validation
 from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from model.comparison.compare import Comparison
     from model.machine_model.model import Model
     from model.reports.page import Report
+    from model.simulation.prepared import Options
     from server.batches.run import Standing
     from server.jobs.results import JobResult
 
@@ -110,18 +111,22 @@ class _Worker:
         from model.base_parameters.base_parameters import base_parameters
         from model.fitting.fit import fit
         from model.fitting.identifiability import undetermined_in_words
+        from model.fitting.options import FitOptions
         from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
+        from model.simulation.prepared import Options
         from server.jobs.overlays import overlays
         from server.jobs.results import FitData, FitJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
-        begin = with_effects(self._model(request.model), request.effects)
-        found = fit(
-            begin, traces, fit_options(request), lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox
-        )
+        begin, options = with_effects(self._model(request.model), request.effects), options_of(request, FitOptions)
+        found = fit(begin, traces, options, lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox)
         comparison = self._compared(
-            [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
+            [("before", begin), ("fitted", found.model)],
+            [*traces, *held],
+            request.held_out,
+            FIT_SHARE,
+            options=Options(loop=options.loop or "closed"),
         )
         self._keep_model(found.model)
         data = FitData(
@@ -203,6 +208,7 @@ class _Worker:
         from daq.contracts.machine import NoController
         from model.discrepancy.explanation.headline import headline
         from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
+        from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
         from server.jobs.diagnosis_data import diagnosis_data, where_given
@@ -215,7 +221,7 @@ class _Worker:
             begin,
             traces,
             held,
-            diagnosis_options(request),
+            options_of(request, DiagnosisOptions),
             lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text),
             self.mailbox,
             chooser=experiment_chooser(begin.machine, design=request.design),
@@ -270,11 +276,17 @@ class _Worker:
         held: Sequence[str] | None,
         begin: float,
         end: float = REPORT_SHARE,
+        options: Options | None = None,
     ) -> Comparison:
         from model.comparison.compare import compare
 
         return compare(
-            models, traces, held, progress=lambda f, text: self._tell(begin, end, f, text), cancel=self.mailbox
+            models,
+            traces,
+            held,
+            options=options,
+            progress=lambda f, text: self._tell(begin, end, f, text),
+            cancel=self.mailbox,
         )
 
     def _traces(self, numbers: Sequence[str]) -> list[Trace]:

@@ -65,6 +65,8 @@ def serve(robot: OwnedRobot) -> None:
                 last = None
             except HardwareFaultError as error:
                 _trip_once(robot, str(error))
+                with suppress(LinkError):  # the next turn meets it
+                    robot.number_stop()  # no sample comes, and the stop is released by its number
                 last = None
             except (LinkError, NoSampleError) as error:
                 _link_lost(robot, str(error))

@@ -12,18 +12,24 @@ from server.robot.robot import ANSWER_WITHIN, Robot
 
 
 def answer_of(robot: Robot, order: Callable[..., Any], arrived: float, **fields: object) -> Answer:
-    """Sends an order that arrived at this time (s, monotonic), and returns the owner's answer. Raises a 409 at once
-    during an experiment, a program or leading by hand, a 429 if too many orders wait, the problem in the answer, or
-    ReachError if none comes within ANSWER_WITHIN of its arrival."""
+    """Sends an order that arrived at this time (s, monotonic), and returns the owner's answer.
+
+    Raises a 409 at once during an experiment, a program or leading by hand, and where the order took ANSWER_WITHIN or
+    longer to come whole; a 429 if too many orders wait; the problem in the answer; ReachError if none comes within
+    ANSWER_WITHIN of its arrival.
+    """
     activity = "experiment" if robot.experiment is not None else robot.arm.activity if robot.arm else "none"
     if activity not in ("none", "jog"):
         raise conflict("arm-busy", f"the arm is busy: {activity}", "wait for its end, or stop it")
+    if (left := arrived + ANSWER_WITHIN - robot.clock.monotonic()) <= 0.0:
+        line = f"this order took {ANSWER_WITHIN - left:.1f} s to come whole"
+        line += f": after {ANSWER_WITHIN:g} s it is not carried out"
+        raise conflict("order-late", line, "send it again if it is still wanted")
     if not robot.room_for_orders.acquire(blocking=False):
         line = f"too many orders are waiting already: robot {robot.name} does not answer"
         raise ProblemError(429, "too-many", line, "ask less often", (), {"Retry-After": "1"})
     try:
-        left = arrived + ANSWER_WITHIN - robot.clock.monotonic()
-        answer = robot.ask(order, asked=arrived, **fields).result(max(0.0, left))
+        answer = robot.ask(order, asked=arrived, **fields).result(left)
     except TimeoutError:
         raise ReachError(f"the robot's process did not answer within {ANSWER_WITHIN:g} s") from None
     finally:

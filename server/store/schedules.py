@@ -12,7 +12,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Schedule, ScheduleRequest
 from server.experiments.review import Given, Review, digest_of
-from server.experiments.schedule import Plan, first, following, is_due, zone_here
+from server.experiments.schedule import Plan, broken, first, following, is_due, zone_here
 from server.problems import not_found
 from server.store.approvals import approval_of, approve, given_to, require_approvable, void
 from server.store.engine import Store
@@ -107,10 +107,10 @@ class ScheduleStore:
             session.delete(_row(session, robot, identity))
 
     def due(self, robot: str, now: datetime) -> list[str]:
-        """Returns the schedules that have a run due now."""
+        """Returns the schedules that have a run due now. One that is broken has none until it can be computed again."""
         with self._store.reading() as session:
-            rows = session.execute(select(ScheduleRow.id, ScheduleRow.next).filter_by(robot=robot, active=True))
-            return [identity for identity, moment in rows if is_due(moment, now)]
+            rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
+            return [row.id for row in rows if is_due(row.next, now) and not broken(_plan(row))]
 
     def leave_out_missed(self, robot: str, now: datetime) -> list[str]:
         """Leaves out all runs that were due up to now, without counting them. Returns the schedules concerned."""
@@ -140,8 +140,8 @@ class ScheduleStore:
 
 
 def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
-    """Moves a run that is due to the first after `now`; returns False if none is due."""
-    if row.next is None or not is_due(row.next, now):
+    """Moves a run that is due to the first after `now`; returns False if none is due, or the schedule is broken."""
+    if row.next is None or not is_due(row.next, now) or broken(_plan(row)):
         return False
     row.next = following(_plan(row), row.submitted_runs, row.next, now)
     return True
@@ -152,7 +152,7 @@ def _plan(row: ScheduleRow) -> Plan:
 
 
 def _schedule(row: ScheduleRow) -> Schedule:
-    spec = ExperimentSpec.model_validate(row.spec)
+    spec, problem = ExperimentSpec.model_validate(row.spec), broken(_plan(row))
     return Schedule(
         id=row.id,
         robot=row.robot,
@@ -165,7 +165,8 @@ def _schedule(row: ScheduleRow) -> Schedule:
         priority=row.priority,
         active=row.active,
         submitted_runs=row.submitted_runs,
-        next=row.next if row.active else None,
+        next=row.next if row.active and not problem else None,
+        problem=problem,
         created=row.created,
         created_by=row.created_by,
         content=digest_of(spec, None),

@@ -27,6 +27,8 @@ from tests.daq_cli.invoke import CommandLine
         ("run ramp --duration -1", ("duration", "greater than 0")),
         ("run ramp --settle -1", ("settle", "greater than or equal to 0")),
         ("run ramp --hold inf", ("hold", "finite")),
+        ("run ramp --daily 25:00", ("--daily '25:00'", "is no time of a day; write 00:00 to 23:59")),
+        ("run ramp --daily 02:00 --cron *", ("--daily and --cron: give one of them",)),
         ("run ramp --repeats 0", ("repeats", "greater than or equal to 1")),
         ("run ramp --gains 1=21/0/0", ("gains", "less than or equal to 20")),
         ("run ramp --gains 1=2/0", ("gains of joint 1", "write P/I/D")),

@@ -146,6 +146,9 @@ class Wire:
         """One request and its reply, each of which takes time."""
         return self.exchange(request)[0]
 
+    def exchange_timed(self, *requests: c.Request) -> tuple[tuple[Any, ...], tuple[float, ...]]:
+        return self.exchange(*requests), (0.0,) * len(requests)
+
     def exchange(self, *requests: c.Request) -> tuple[Any, ...]:
         """Requests that are written together reach the board together."""
         self.world.step()

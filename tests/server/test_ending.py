@@ -25,7 +25,7 @@ WITHIN = 5.0
 HOURS = {"trajectory": {"kind": "sine", "amplitude": 0.1, "period": 1.0, "cycles": 1000}, "joints": [1], "repeats": 10}
 BEGIN = """import re, threading, server.ending as e
 e.END_WITHIN, e.LAST_RESORT = {}, {}
-end = e.EndInTime(lambda: None, lambda: {})
+end = e.EndInTime(lambda: None, lambda: {}, lambda: print("the stop door is closed"))
 end.arm()
 {}"""
 WAIT, HOLD = "threading.Event().wait()", "re.match('(a+)+$', 'a' * 60 + 'b')"
@@ -46,7 +46,8 @@ def test_what_nobody_can_interrupt_is_ended_and_is_no_fault_if_all_else_was_in_o
     limits: tuple[float, float], in_order: bool, work: str, code: int
 ) -> None:
     command = [sys.executable, "-c", BEGIN.format(*limits, in_order, work)]
-    assert subprocess.run(command, check=False, capture_output=True, timeout=60).returncode == code
+    ended = subprocess.run(command, check=False, capture_output=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (code, b"the stop door is closed\n" * in_order)
 
 
 def test_the_service_ends_in_time_whatever_it_does(tmp_path: Path) -> None:

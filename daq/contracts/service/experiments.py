@@ -174,6 +174,9 @@ class Schedule(Wire):
     submitted_runs: int
     next: AwareDatetime | None
     """When the next run is due; None if there is none."""
+    problem: str = ""
+    """Why no run can be computed on the service's computer, such as a time zone that it no longer knows; empty if all
+    is well."""
     created: AwareDatetime
     created_by: str
     content: str = ""

@@ -84,6 +84,8 @@ class DiagnoseStudy(SpokenWire):
     """Most effects to add, one after another; None: 3 where the loop is simulated, 8 of torques."""
     method: Literal["output-error", "inverse-dynamics"] | None = None
     """How model and traces are compared; None: as machine and traces allow."""
+    despite_doubts: StrictBool = False
+    """Compute although the check of the records raises doubts; the verdict stays `check-the-record`."""
 
 
 Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]

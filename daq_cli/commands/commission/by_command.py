@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,16 +51,14 @@ def stop(bench: Bench) -> dict[str, Any]:
             bench.consent, what="it will be stopped where it stands, and released again", refused="it is stopped"
         )
         asked.require(bench.call.port, controller.identity)
-        begun = time.perf_counter()
         confirmation, number = controller.stop_numbered()
-        taken = 1e3 * (time.perf_counter() - begun)
         if not confirmation.acknowledged:
             raise NotCommissionedError(f"the stop was not confirmed: {confirmation.problem}. Use the emergency stop")
         if number is None:
             raise NotCommissionedError("the arm had been stopped already: look at it; `daq reset` ends that stop")
         controller.release(number)
     return {
-        "confirmed_ms": round(taken, 2),
+        "confirmed_ms": round(1e3 * (confirmation.seconds or 0.0), 2),
         "frozen": [confirmation.frozen[joint] for joint in sorted(confirmation.frozen)],
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -332,6 +333,20 @@ def test_a_release_takes_the_control_back_from_another_host() -> None:
 
     controller_that(answers).release(5)
     assert [request for request in asked if isinstance(request, Release)] == [Release(5), Release(5)]
+
+
+def test_a_numbered_stop_is_timed_from_its_sending_to_its_own_confirmation() -> None:
+    hello = HelloReply(2, Capability.SAMPLE, 20_000, 8, 3, 0, 7)
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        if isinstance(request, Hello):
+            return [(0.0, frame_of(sequence, replace(hello, nonce=request.nonce)))]
+        if isinstance(request, Stop):
+            return [(0.004, frame_of(sequence, Stopped(7, (500,) * 6)))]
+        return [(0.030, frame_of(sequence, Status(7, 0, 3, 0, 5)))]
+
+    confirmation, number = Controller(scripted_link(answer)[0]).stop_numbered()
+    assert (confirmation.seconds, number) == (pytest.approx(0.004), 5)
 
 
 @pytest.mark.parametrize("reason", [Refusal.OTHER_STOP, Refusal.FROZEN])

@@ -4,6 +4,7 @@ SQLite itself leaves the journals, and the library mcap writes the files of MCAP
 """
 
 import sqlite3
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from daq.contracts.errors import TraceError
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
 from daq.traces.bag_storage import JOINT_STATE
 from tests.daq.traces.test_ros_bag import NS, START, bag, imported, state
 
@@ -73,6 +75,18 @@ def test_rows_that_were_never_committed_are_taken_back(tmp_path: Path) -> None:
     journal = path.with_name("a.db3-journal")
     assert journal.stat().st_size
     assert len(imported(path)) == 50
+    most = DEFAULT_TRACE_LIMITS.model_copy(update={"file_bytes": path.stat().st_size + journal.stat().st_size - 1})
+    with pytest.raises(TraceError, match="has more than"):
+        imported(path, limits=most)
+    # The name of another file at the end, as of a change to several databases: SQLite would delete that file.
+    other, sound = path.with_name("other"), journal.read_bytes()
+    other.write_bytes(b"somebody's")
+    name = str(other).encode()
+    sizes = struct.pack(">II", len(name), sum(name))
+    journal.write_bytes(sound + (0x40000000 // 4096 + 1).to_bytes(4, "big") + name + sizes + sound[:8])
+    with pytest.raises(TraceError, match="cannot take it back"):
+        imported(path)
+    assert other.exists()
     journal.write_bytes(b"x" * journal.stat().st_size)
     with pytest.raises(TraceError, match=r"the damaged a\.db3-journal cannot take it back"):
         imported(path)

@@ -16,14 +16,15 @@ from daq.traces.reader import read_trace
 from tests.daq.traces.samples import CREATED, record, write
 
 number = st.floats(-1e6, 1e6)
-microseconds = st.integers(-(10**12), 10**12)
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_a_trace_comes_back_from_csv_to_the_bit(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     joints = tuple(sorted(data.draw(st.sets(st.integers(1, 6), min_size=1, max_size=3))))
-    time = np.array(sorted(data.draw(st.sets(microseconds, min_size=1, max_size=10)))) * 1e-6
+    period = data.draw(st.sampled_from([1, 1_000, 10_000, 86_400_000_000]))  # µs, to the longest that is allowed
+    ticks = st.integers(-(10**12) // period, 10**12 // period)
+    time = np.array(sorted(data.draw(st.sets(ticks, min_size=1, max_size=10)))) * period * 1e-6
     table = st.lists(
         st.lists(number, min_size=len(joints), max_size=len(joints)), min_size=len(time), max_size=len(time)
     ).map(np.array)
@@ -36,7 +37,7 @@ def test_a_trace_comes_back_from_csv_to_the_bit(tmp_path_factory: pytest.TempPat
         source="real",
         outcome="stopped",
     )
-    about = about.model_copy(update={"period": 1e-6})  # s, as far apart as the closest rows that are drawn
+    about = about.model_copy(update={"period": period * 1e-6})
     trace = Trace(about, joints, time, data.draw(table), **signals)
     back = import_csv(export_csv(trace, tmp_path_factory.mktemp("csv") / "rig.csv"))
     for field in dataclasses.fields(Trace):

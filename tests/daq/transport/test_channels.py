@@ -15,7 +15,7 @@ from contextlib import closing
 import pytest
 
 from daq.transport import ChannelError, ReconnectDelay, TransportError, open_endpoint
-from daq.transport.holders import other_holders, sharing_words
+from daq.transport.holders import _ours, other_holders, sharing_words
 
 
 @pytest.fixture
@@ -67,6 +67,12 @@ def test_another_program_that_reads_from_a_port_is_named(terminal: tuple[int, st
         other.wait()
     assert "ModemManager and brltty open new ports by themselves" in sharing_words(device)
     assert sharing_words("127.0.0.1:5000") == ""
+
+
+def test_relatives_of_a_process_are_no_strangers() -> None:
+    me = os.getpid()
+    parents = {1: 0, 10: 1, 11: 10, me: 11, me + 1: me, me + 2: me + 1, 12: 10, me + 3: 12}
+    assert _ours(parents) == {10, 11, me, me + 1, me + 2}
 
 
 def test_a_port_that_does_not_exist_is_named() -> None:

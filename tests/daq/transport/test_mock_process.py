@@ -11,7 +11,8 @@ from contextlib import closing
 
 import pytest
 
-from daq.transport import TransportError, open_endpoint
+from daq.contracts.processor import ProcessorTime
+from daq.transport import TransportError, mock_process, open_endpoint
 from daq.transport.mock_process import start_mock
 from daq.transport.url import MockPort
 from tests.control_port import told_by
@@ -56,6 +57,13 @@ def test_a_mock_that_ends_without_a_word_has_its_end_named(
     start = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda command, **given: start([command[0], "-c", process], **given))
     with pytest.raises(TransportError, match=f"did not start: .*{says}"):
+        start_mock(MockPort())
+
+
+def test_a_mock_that_gets_no_processor_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mock_process, "processor_time", lambda _process: ProcessorTime(0.0, 1e9))
+    monkeypatch.setattr(mock_process, "STARVED_TIMEOUT_S", 0.0)
+    with pytest.raises(TransportError, match=r"was not ready after .* s; see what keeps this computer busy"):
         start_mock(MockPort())
 
 

@@ -111,7 +111,7 @@ def test_the_simulation_does_not_depend_on_reports_and_fits() -> None:
     reached = dependencies("model.simulation.kernel")
     assert {"model.dynamics.recursive", "model.drives.amplifier", "model.layout"} <= set(reached)
     others = [m for m in reached if m.startswith(("model.reports", "model.fitting", "model.thesis", "daq."))]
-    assert {m.rpartition(".")[2] for m in others} <= {"contracts", "file_lock"}, "the lock of the cache alone"
+    assert set(others) == {"daq.contracts", "daq.contracts.file_lock"}, "the lock of the cache alone"
 
 
 def test_numba_caches_into_the_folder_of_these_sources() -> None:

@@ -15,6 +15,7 @@ from daq.traces.csv_table import import_csv
 from daq_cli.models.diagnosis_text import answer_text
 from model.discrepancy.explanation.headline import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.workflow import diagnose
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions
@@ -78,6 +79,10 @@ def test_a_doubted_record_is_the_verdict_on_terminal_report_and_in_json(tmp_path
     assert answer_text(found).startswith("CHECK THE RECORD")
     assert says in html(diagnosis_report(found))
     assert found.model_dump(mode="json")["record"][0]["kind"] == "columns-swapped"
+    assert trace.set_point is not None
+    apart = replace(trace, set_point=trace.set_point + 100.0)
+    with pytest.raises(TraceError, match="apart throughout"):  # nothing can be computed from it, whatever is asked
+        diagnose(base_model(machine), [apart], options=DiagnosisOptions(despite_doubts=True))
 
 
 def test_wraps_are_said_and_taken_out_where_no_controller_has_used_them() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -160,6 +162,19 @@ def test_somebody_signs_in_works_and_leaves(browser: Browser, provider: Provider
     assert left.startswith(f"{provider.url}/oauth2/end_session?client_id=ma2000&post_logout_redirect_uri=")
     assert httpx.get(left).status_code == 200
     assert kind_of(browser.me()) == (401, "token-needed")
+
+
+def test_of_two_uses_of_an_answer_at_once_one_is_refused(browser: Browser, provider: Provider) -> None:
+    back = provider.sign_in(browser.begin(), "anna-1")
+    provider.process.send_signal(signal.SIGSTOP)  # whichever comes first waits for the provider
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            uses = [pool.submit(browser.back, back) for _ in range(2)]
+            first = next(as_completed(uses)).result()
+            provider.process.send_signal(signal.SIGCONT)
+            assert (first, sorted(use.result() for use in uses)) == ("/?sign-in=sign-in-unknown", ["/", first])
+    finally:
+        provider.process.send_signal(signal.SIGCONT)
 
 
 def test_what_is_asked_has_a_challenge_a_state_and_a_nonce_and_each_is_new(browser: Browser) -> None:

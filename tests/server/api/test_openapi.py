@@ -121,6 +121,22 @@ def test_the_description_is_made_before_anybody_asks(monkeypatch: pytest.MonkeyP
     described.close()
 
 
+def test_a_description_that_failed_is_made_again() -> None:
+    app = bare_app(None)
+    answers = iter([MemoryError(), {}])
+
+    def once_without_memory() -> dict[str, Any]:
+        answer = next(answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    app.openapi = once_without_memory  # type: ignore[method-assign]
+    making = description.Described(app)
+    assert isinstance(making.begin().exception(60), MemoryError)
+    assert [making.begin().result(60) for _ in range(2)] == [b"{}", b"{}"]
+
+
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"
 """A 500 is described nowhere. 503 and 507 are: a robot that is not there is no fault of the program."""
 

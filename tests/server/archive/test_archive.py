@@ -226,7 +226,7 @@ def test_the_oldest_copies_go_when_all_take_too_much(store: ObjectStore, make: M
     bench.until(lambda: not bench.path(first).exists() and not bench.path(second).exists())
     with pytest.raises(ProblemError, match="is used by model 'rig b'"):
         bench.catalogue.remove(second)
-    models.remove(ROBOT, "a" * 12, lambda _: None)
+    models.remove(ROBOT, "a" * 12, lambda _file: None)
     bench.catalogue.remove(second)
 
 

@@ -12,19 +12,22 @@ from pyarrow import parquet
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import CancelledError
-from daq.contracts.service.jobs import DiagnoseStudy, SimulateStudy
+from daq.contracts.service.jobs import DiagnoseRequest, DiagnoseStudy, FitRequest, SimulateStudy
 from daq.executors import Workers
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from daq.traces.reader import read_trace
+from daq_cli.models.service_jobs import _given
 from model.discrepancy.inverse_dynamics.options import torque_options
+from model.discrepancy.options import DiagnosisOptions
+from model.fitting.options import FitOptions
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.batches.choice import chosen_traces
 from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened, take_over
 from server.batches.run import Chosen, Standing, run_batch
-from server.batches.study import Answer, Common, diagnosis_options
+from server.batches.study import Answer, Common, options_of
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.server.batches.traces import MACHINE, folder_of_traces, number
 
@@ -70,8 +73,18 @@ def test_the_table_has_what_a_simulation_of_each_trace_gives(tmp_path: Path, tra
 def test_a_number_of_steps_that_is_not_given_is_the_methods_own(
     study: DiagnoseStudy, simulated: int, balanced: int
 ) -> None:
-    options = diagnosis_options(DiagnoseStudy.model_validate_json(study.model_dump_json()))
+    options = options_of(DiagnoseStudy.model_validate_json(study.model_dump_json()), DiagnosisOptions)
     assert (options.most_steps, torque_options(options).most_steps) == (simulated, balanced)
+
+
+def test_a_job_has_every_option_that_was_given_and_refuses_what_it_cannot_have() -> None:
+    given = DiagnosisOptions(despite_doubts=True, most_steps=2)
+    request = DiagnoseRequest(traces=("a",), **_given(given))
+    assert options_of(DiagnoseRequest.model_validate_json(request.model_dump_json()), DiagnosisOptions) == given
+    fit = FitOptions(held=("joint1.*",), bounds={"load.mass": (0.0, None)}, loop="open", seed=3)
+    assert options_of(FitRequest(traces=("a",), **_given(fit)), FitOptions) == fit
+    with pytest.raises(SpecError, match="rounds"):
+        FitRequest(traces=("a",), **_given(FitOptions(rounds=2)))
 
 
 def test_parquet_and_csv_hold_the_same_and_the_answers_are_kept_whole(tmp_path: Path, traces: Path) -> None:

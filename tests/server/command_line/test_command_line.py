@@ -121,6 +121,7 @@ def test_a_paused_queue_is_told_and_nothing_is_left_lying_in_it(daq: Daq, servic
     assert service.robot.get("/queue").json()["queued"] == 0
     assert daq("queue", "resume").out.startswith("open: resumed by local")
     assert "open" in daq("queue", "show").out
+    assert daq("queue", "schedules").out.startswith("no schedules: ")
 
 
 def test_a_motion_beyond_the_limits_is_refused_as_at_ones_own_robot(daq: Daq) -> None:
@@ -165,7 +166,7 @@ def test_traces_are_listed_fetched_and_sent(daq: Daq, tmp_path: Path) -> None:
     assert daq(*RAMP, "--name", "for-the-list").code == 0
     newest = json.loads(daq("traces", "ls", "--json").out)[-1]
     assert (newest["name"], newest["state"]) == ("for-the-list", "finished")
-    assert newest["trace_id"][:8] in daq("traces", "ls").out
+    assert newest["trace_id"] in daq("traces", "ls").out
     (path,) = (tmp_path / "traces").iterdir()
     path.unlink()
     shown = daq("traces", "show", newest["trace_id"][:8])
@@ -176,7 +177,9 @@ def test_traces_are_listed_fetched_and_sent(daq: Daq, tmp_path: Path) -> None:
     (tmp_path / "rig.csv").write_text(table)
     assert daq("traces", "import", "rig.csv").code == 0
     sent = json.loads(daq("traces", "import", bag(tmp_path / "bag", [{}] * 5), "--drive-unit", "Nm", "--json").out)
-    assert "5 samples on joints 1, 2" in daq("traces", "show", sent["trace"]).out
+    said = daq("traces", "show", sent["trace"]).out
+    assert "imported record of " in said
+    assert "5 samples on joints 1, 2" in said
 
 
 def test_what_has_nothing_to_do_with_a_server_says_so(daq: Daq) -> None:

@@ -14,7 +14,7 @@ import pytest
 from sqlalchemy.event import listen
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.errors import ReachError
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import (
@@ -32,6 +32,7 @@ from daq.executors import Workers
 from daq.executors.program import OtherVersionError
 from daq.executors.workers import BlamedError
 from model.machine_model.model import base_model
+from model.machine_model.model_file import file_of
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
 from server.experiments.states import Event
@@ -614,3 +615,16 @@ def test_an_executor_that_is_not_reached_is_the_reason_of_a_job(bench: Bench) ->
     ended = bench.end_of(job)
     assert (ended.state, ended.failure, asked) == ("interrupted", "lost", ["local://"])
     assert ended.reason == "executor dask://host:8786: no scheduler answers"
+
+
+def test_a_model_is_not_taken_for_another_that_is_in_its_file(bench: Bench) -> None:
+    made = file_of(base_model(MACHINE))
+    path = bench.models.folder / f"{made.identity}.json"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(made.text, "utf-8")
+    with pytest.raises(SpecError, match="another model has this number"):
+        bench.models.keep(made.model_copy(update={"text": made.text.replace("1", "2", 1)}), "forged", "bert")
+    assert path.read_text("utf-8") == made.text
+    path.write_text("cut off", "utf-8")
+    assert bench.models.keep(made, "sound", "anna")
+    assert path.read_text("utf-8") == made.text

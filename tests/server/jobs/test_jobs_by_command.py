@@ -95,6 +95,8 @@ def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_
     newest = sound_service.robot.get("/jobs").json()["items"][0]
     assert (newest["request"]["kind"], newest["state"]) == ("diagnose", "done")
     assert (newest["request"]["effects"], newest["request"]["most_steps"]) == (["coulomb_friction"], 1)
+    daq("diagnose", "last", *few, "--despite-doubts")
+    assert sound_service.robot.get("/jobs").json()["items"][0]["request"]["despite_doubts"]
     daq("diagnose", "last", "--effects", "no_such_effect").complains(2, "no_such_effect")
     assert daq("diagnose", "last", "--joints", "1", "--effects", "coulomb_friction").code == 0
     newest = sound_service.robot.get("/jobs").json()["items"][0]

@@ -53,7 +53,10 @@ class WithADamagedDrive(SilentForAWhile):
         super().__init__()
         self.silence = iter(())
         self.damaged = iter(damaged)
-        self.greetings = self.stops = 0
+        self.greetings = self.stops = self.numbered = 0
+
+    def number_stop(self) -> None:
+        self.numbered += 1
 
     def next_snapshot(self, _after: int | None = None) -> SimpleNamespace:
         if next(self.damaged, False):
@@ -102,7 +105,7 @@ def served(
         read_gains=dict,
         activity="none",
         guardian=SimpleNamespace(cause=None, outdated=lambda _asked: False),
-        number_stop=lambda: None,
+        number_stop=getattr(controller, "number_stop", lambda: None),
         end_cause=lambda: None,
         speaker=SimpleNamespace(ended=answers.append),
         inbox=SimpleNamespace(take=take, closing=closing, done=lambda: None),
@@ -121,6 +124,7 @@ def test_a_damaged_drive_trips_once_and_the_robot_stays_connected() -> None:
     states, _ = served({}, controller=controller)
     assert states[:6] == ["idle", "fault", "fault", "fault", "fault", "fault"]
     assert (controller.stops, controller.greetings) == (1, 0)
+    assert controller.numbered >= 3, "else nobody could release the stop while the drive is damaged"
 
 
 def test_a_robot_that_answers_again_with_a_damaged_drive_is_connected_and_at_fault() -> None:

@@ -19,10 +19,11 @@ from server.owner import long_orders
 from server.owner.messages import WAITS_AT_MOST, Answer, ArmReport, MoveGripper, Reset
 from server.problems import ProblemError
 from server.robot.orders import answer_of
-from server.robot.robot import ORDERS_AT_ONCE, Robot, RobotPlace
+from server.robot.robot import ANSWER_WITHIN, ORDERS_AT_ONCE, Robot, RobotPlace
 from tests.server.clocks import HandClock
 
 MACHINE = load_machine("ma2000")
+NOW = HandClock().monotonic()
 
 
 @dataclass
@@ -53,7 +54,7 @@ def test_what_cannot_be_done_between_samples_is_refused_before_it_is_asked_for(a
     asked = Asked()
     asked.does(activity)
     with pytest.raises(ProblemError) as refused:
-        answer_of(asked.robot, MoveGripper, 0.0, closed=False)
+        answer_of(asked.robot, MoveGripper, NOW, closed=False)
     assert (refused.value.status, refused.value.kind) == (409, "arm-busy")
     assert activity in refused.value.detail
     assert asked.orders == []
@@ -63,14 +64,17 @@ def test_an_experiment_of_the_queue_counts_before_its_owner_reports_it() -> None
     asked = Asked()
     asked.robot.experiment = "77be01d3aa42"
     with pytest.raises(ProblemError, match="the arm is busy: experiment"):
-        answer_of(asked.robot, Reset, 0.0, stop=1, here=False)
+        answer_of(asked.robot, Reset, NOW, stop=1, here=False)
 
 
 def test_an_order_says_when_it_arrived_and_not_when_its_turn_came() -> None:
     asked = Asked()
     asked.does("jog")
-    assert answer_of(asked.robot, MoveGripper, -1.5, closed=False).data == {"gripper": "open"}
-    assert [order.asked for order in asked.orders] == [-1.5]
+    assert answer_of(asked.robot, MoveGripper, NOW - 1.5, closed=False).data == {"gripper": "open"}
+    assert [order.asked for order in asked.orders] == [NOW - 1.5]
+    with pytest.raises(ProblemError, match=r"took 5\.0 s to come whole: after 5 s it is not carried out") as late:
+        answer_of(asked.robot, MoveGripper, NOW - ANSWER_WITHIN, closed=False)
+    assert (late.value.status, late.value.kind, len(asked.orders)) == (409, "order-late", 1)
 
 
 def test_a_silent_robot_holds_up_no_more_than_so_many() -> None:
@@ -78,11 +82,11 @@ def test_a_silent_robot_holds_up_no_more_than_so_many() -> None:
     for _ in range(ORDERS_AT_ONCE):
         assert asked.robot.room_for_orders.acquire(blocking=False)
     with pytest.raises(ProblemError) as refused:
-        answer_of(asked.robot, MoveGripper, 0.0, closed=False)
+        answer_of(asked.robot, MoveGripper, NOW, closed=False)
     assert (refused.value.status, refused.value.kind, asked.orders) == (429, "too-many", [])
     asked.robot.room_for_orders.release()
-    answer_of(asked.robot, MoveGripper, 0.0, closed=False)
-    answer_of(asked.robot, MoveGripper, 0.0, closed=False)
+    answer_of(asked.robot, MoveGripper, NOW, closed=False)
+    answer_of(asked.robot, MoveGripper, NOW, closed=False)
 
 
 # ---- in the owner's process

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.service.experiments import ExperimentRequest
+from daq.contracts.service.experiments import ExperimentRequest, ScheduleRequest
 from server.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
@@ -211,6 +211,26 @@ def test_what_was_due_while_the_service_was_off_is_left_out(bench: Bench) -> Non
     assert bench.schedules.due("ma2000", bench.clock.utc()) == []
     found = bench.schedules.get("ma2000", schedule.id)
     assert (found.next, found.submitted_runs) == (schedule.starts + timedelta(hours=4), 0)
+
+
+def test_a_schedule_whose_time_zone_is_no_longer_known_is_shown_as_broken(bench: Bench) -> None:
+    request = ScheduleRequest(spec=SPEC, cron="0 2 * * *", zone="UTC")
+    made = bench.schedules.create("ma2000", request, bench.clock.utc(), "anna")
+
+    def move_to(zone: str) -> None:
+        with bench.store.writing() as session:
+            session.execute(text("UPDATE schedules SET zone = :zone"), {"zone": zone})
+
+    move_to("Europe/Nowhere")
+    bench.clock.turn(2 * 86400)
+    bench.queue = bench.begun_anew()
+    found = bench.schedules.get("ma2000", made.id)
+    line = "zone: is no time zone that this computer knows; write one such as Europe/London"
+    assert (found.problem, found.next, bench.schedules.due("ma2000", bench.clock.utc())) == (line, None, [])
+    bench.schedules.switch("ma2000", made.id, active=False, now=bench.clock.utc())
+    bench.schedules.switch("ma2000", made.id, active=True, now=bench.clock.utc())
+    move_to("UTC")
+    assert bench.schedules.due("ma2000", bench.clock.utc()) == [made.id]
 
 
 def test_switching_a_schedule_on_submits_nothing_that_was_due_while_it_was_off(bench: Bench) -> None:

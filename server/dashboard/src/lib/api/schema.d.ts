@@ -2337,6 +2337,11 @@ export interface components {
             most_steps?: number | null;
             /** Method */
             method?: ("output-error" | "inverse-dynamics") | null;
+            /**
+             * Despite Doubts
+             * @default false
+             */
+            despite_doubts?: boolean;
             /** Traces */
             traces: string[];
             /**
@@ -2375,6 +2380,11 @@ export interface components {
             most_steps?: number | null;
             /** Method */
             method?: ("output-error" | "inverse-dynamics") | null;
+            /**
+             * Despite Doubts
+             * @default false
+             */
+            despite_doubts?: boolean;
         };
         /**
          * DiagnosisData
@@ -5811,6 +5821,11 @@ export interface components {
             submitted_runs: number;
             /** Next */
             next: string | null;
+            /**
+             * Problem
+             * @default
+             */
+            problem?: string;
             /**
              * Created
              * Format: date-time
