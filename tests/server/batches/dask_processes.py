@@ -1,4 +1,4 @@
-"""A scheduler of Dask and its workers, as processes of this computer, for benchmarks and tests."""
+"""A scheduler of Dask and its workers, as processes of this computer, for tests."""
 
 from __future__ import annotations
 

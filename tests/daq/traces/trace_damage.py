@@ -1,7 +1,5 @@
 """Trace files damaged at random and in every length field, then read, verified, listed and salvaged.
 
-    python -m benchmarks trace_damage
-
 Nothing may end in another error than TraceError; every sample that is delivered is one of the original's, in its order;
 no file is called complete, or trustworthy, of which anything is missing or different; no unread byte of a part file is
 deleted.
@@ -9,13 +7,8 @@ deleted.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import random
-import resource
-import sys
-import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -25,7 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.damaged_traces import (
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import load_machine
+from daq.contracts.trace import Trace, TraceRecord
+from daq.traces.catalogue import list_traces
+from daq.traces.layout import ALL_SIGNALS
+from daq.traces.reader import read_trace
+from daq.traces.salvage import salvage_folder
+from daq.traces.verify import verify
+from tests.daq.traces.damaged_traces import (
     Choice,
     Damaged,
     Original,
@@ -35,15 +36,6 @@ from benchmarks.damaged_traces import (
     of_records,
     originals,
 )
-from benchmarks.figures import Figure, at_least, at_most, show
-from daq.contracts.errors import TraceError
-from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
-from daq.traces.catalogue import list_traces
-from daq.traces.layout import ALL_SIGNALS
-from daq.traces.reader import read_trace
-from daq.traces.salvage import salvage_folder
-from daq.traces.verify import verify
 
 CASES = 22_000
 CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
@@ -51,14 +43,12 @@ CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
 
 @dataclass
 class Tally:
-    """Counts; the first few of each fault are printed."""
+    """Counts; the first few of each fault are kept."""
 
     cases: int = 0
-    by_way: Counter[str] = field(default_factory=Counter)
     ends: Counter[str] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
     examples: list[str] = field(default_factory=list)
-    slowest: float = 0.0
 
     def fault(self, kind: str, damaged: Damaged, detail: str) -> None:
         """Counts a fault."""
@@ -129,11 +119,8 @@ class Campaign:
     def run(self, cases: Iterable[Damaged]) -> Tally:
         """One case after the other."""
         for damaged in cases:
-            begun = time.monotonic()
             self._case(damaged)
-            self.tally.slowest = max(self.tally.slowest, time.monotonic() - begun)
             self.tally.cases += 1
-            self.tally.by_way[damaged.way] += 1
         return self.tally
 
     def _case(self, damaged: Damaged) -> None:
@@ -196,27 +183,6 @@ def on_purpose(sound: list[Original], chosen: Choice) -> Iterator[Damaged]:
             yield from damages(original, chosen)
 
 
-def figures(tally: Tally) -> list[Figure]:
-    """What was found, beside what may be."""
-    ways = ", ".join(f"{count} {way}" for way, count in tally.by_way.items())
-    ends = ", ".join(f"{count} {end}" for end, count in sorted(tally.ends.items()))
-    kinds = (
-        "other exceptions",
-        "wrong samples",
-        "called complete",
-        "called trustworthy",
-        "part files lost or left",
-        "salvaged traces that are none",
-        "errors of several lines",
-    )
-    return [
-        at_least("damaged files", tally.cases, 20_000, "", ways),
-        *(at_most(kind, tally.faults[kind], 0, "") for kind in kinds),
-        at_most("slowest file, all done to it", tally.slowest, 5.0, "s", ends),
-        at_most("largest memory", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 500, "MB"),
-    ]
-
-
 def campaign(cases: int, seed: int, folder: Path, share: float = 1.0) -> Tally:
     """All damage on purpose, or a share of it at random, and damage at random up to `cases`."""
     rng = random.Random(seed)
@@ -224,19 +190,3 @@ def campaign(cases: int, seed: int, folder: Path, share: float = 1.0) -> Tally:
     running.run(on_purpose(running.originals, lambda: rng.random() < share))
     left = max(0, cases - running.tally.cases)
     return running.run(itertools.islice(at_random(running.originals, rng), left))
-
-
-def main() -> int:
-    """The exit code: 1 when a target was missed."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks trace_damage", description=__doc__)
-    parser.add_argument("--cases", type=int, default=CASES, help=f"damaged files (default {CASES})")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        tally = campaign(given.cases, given.seed, Path(folder))
-    print("\n".join(tally.examples))
-    return show("Damaged trace files", "python -m benchmarks trace_damage", figures(tally))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,19 +1,13 @@
 """Files of every kind that is read, damaged at random: what a reader does with them.
 
-    python -m benchmarks file_fuzz
-
 Nothing may end in another error than DaqError, in one line of bounded length; and what is read of a trace is the whole
 of what the file has, or its notes say what is missing. The files of traces themselves have `trace_damage`.
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import random
-import sys
-import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -27,8 +21,6 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from benchmarks.damaged_traces import AT_RANDOM
-from benchmarks.figures import Figure, at_least, at_most, show
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import load_settings
 from daq.contracts.documents import read_document
@@ -44,6 +36,7 @@ from daq.traces.ros_bag import BagChoice, import_bag
 from model.machine_model.model import base_model
 from model.machine_model.model_file import load_model, save_model
 from model.robot_files.urdf_reader import read_urdf
+from tests.daq.traces.damaged_traces import AT_RANDOM
 
 CASES = 60_000
 ROWS = 60
@@ -57,7 +50,7 @@ instructions = [
   {kind = "wait", duration = 2.0},
 ]
 """
-HOME = Path(__file__).parents[1]
+HOME = Path(__file__).parents[3]
 
 Read = Callable[[Path], Any]
 Damage = Callable[[random.Random, bytes], bytes]
@@ -76,13 +69,11 @@ class Kind:
 
 @dataclass
 class Tally:
-    """Counts; the first few of each fault are printed."""
+    """Counts; the first few of each fault are kept."""
 
-    cases: int = 0
     ends: Counter[str] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
     examples: list[str] = field(default_factory=list)
-    slowest: float = 0.0
 
     def fault(self, fault: str, kind: Kind, way: str, detail: str) -> None:
         """Counts a fault."""
@@ -235,12 +226,9 @@ class Campaign:
     def run(self, cases: Iterator[tuple[Kind, str, bytes]]) -> Tally:
         """Reads each file."""
         for kind, way, data in cases:
-            begun = time.monotonic()
             kind.damaged.write_bytes(data)
             self._case(kind, way, data)
             kind.damaged.write_bytes(kind.data)
-            self.tally.slowest = max(self.tally.slowest, time.monotonic() - begun)
-            self.tally.cases += 1
         return self.tally
 
     def _case(self, kind: Kind, way: str, data: bytes) -> None:
@@ -284,30 +272,3 @@ def campaign(cases: int, seed: int, folder: Path) -> Tally:
     """So many damaged files."""
     running = Campaign(folder)
     return running.run(itertools.islice(damaged(running.kinds, random.Random(seed)), cases))
-
-
-def figures(tally: Tally) -> list[Figure]:
-    """What was found, beside what may be."""
-    ends = ", ".join(f"{count} {end}" for end, count in sorted(tally.ends.items()))
-    faults = ("other exceptions", "errors of several or endless lines", "samples lost without a word", "wrong samples")
-    return [
-        at_least("damaged files", tally.cases, 50_000, "", ends),
-        *(at_most(fault, tally.faults[fault], 0, "") for fault in faults),
-        at_most("slowest file", tally.slowest, 5.0, "s"),
-    ]
-
-
-def main() -> int:
-    """The exit code: 1 when a target was missed."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks file_fuzz", description=__doc__)
-    parser.add_argument("--cases", type=int, default=CASES, help=f"damaged files (default {CASES})")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        tally = campaign(given.cases, given.seed, Path(folder))
-    print("\n".join(tally.examples))
-    return show("Damaged files of every kind", "python -m benchmarks file_fuzz", figures(tally))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
