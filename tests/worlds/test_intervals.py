@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from benchmarks.worlds_intervals import SIZES, covered
 from model.effects.library import library
+from trials.worlds_intervals import SIZES, covered
 
 
 def truth(name: str, law: int, case: str = "single", **sizes: float) -> dict[str, Any]:

@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from benchmarks.worlds import score
 from daq.contracts.machine import load_machine, parse_machine
 from daq.traces.csv_table import import_csv
 from model.dynamics import recursive
@@ -25,11 +24,12 @@ from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, known, tilted
 from tests.worlds.kinds import KINDS, REPORTED, REPORTING, TUNING
 from tests.worlds.lab import machine_text
 from tests.worlds.world import hidden_rig, make_world
+from trials.worlds import score
 
 OURS = Path(__file__).parent
 ALLOWED = {"numpy", "numba", "llvmlite", "scipy", "mujoco"}
 """Libraries that worlds may use; besides, Python's own and each other."""
-FORBIDDEN = {"model", "daq", "daq_cli", "server", "mock_controller", "firmware_protocol", "benchmarks"}
+FORBIDDEN = {"model", "daq", "daq_cli", "server", "mock_controller", "firmware_protocol", "benchmarks", "trials"}
 
 
 def imports(path: Path) -> set[str]:

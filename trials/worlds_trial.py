@@ -1,9 +1,9 @@
 """A registered trial in worlds that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
 
-    python -m benchmarks worlds_trial --hashes                                                      # for a registration
-    python -m benchmarks worlds_trial --registration docs/trial/worlds-15.toml --folder FOLDER --seconds 500
-    python -m benchmarks worlds_trial --folder FOLDER --sharpness --seconds 500
-    python -m benchmarks worlds_trial --table FILE.csv
+    python -m trials.worlds_trial --hashes                                                      # for a registration
+    python -m trials.worlds_trial --registration docs/trial/worlds-15.toml --folder FOLDER --seconds 500
+    python -m trials.worlds_trial --folder FOLDER --sharpness --seconds 500
+    python -m trials.worlds_trial --table FILE.csv
 
 The second is given again until there are enough arms: each goes on where the last one stopped. Two of them run side by
 side where `--only` gives each its kinds. Seeds are drawn from the
@@ -27,8 +27,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.worlds import QUESTIONS, TOLD_APART, diagnose, names_of, score
-from benchmarks.worlds_intervals import covered
 from daq.contracts.documents import parse_toml, read_text
 from daq_cli.trial.registered import (
     REGISTERED,
@@ -43,8 +41,10 @@ from model.trial.score import excess_removed_whole
 from tests.worlds.folder import write_world
 from tests.worlds.kinds import KINDS
 from tests.worlds.world import hidden_rig
+from trials.worlds import QUESTIONS, TOLD_APART, diagnose, names_of, score
+from trials.worlds_intervals import covered
 
-DECIDES = (*REGISTERED, "daq_cli", "tests/worlds", "benchmarks/worlds.py", "benchmarks/worlds_trial.py")
+DECIDES = (*REGISTERED, "daq_cli", "tests/worlds", "trials/worlds.py", "trials/worlds_trial.py")
 """Parts of the source tree that decide the outcome."""
 FIRST_DRAWN = 10**6
 """Smallest seed that a commit draws; smaller ones are for tuning and tests."""
@@ -320,7 +320,7 @@ def table(rows: Sequence[Row]) -> list[str]:
 def main() -> int:
     """The exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks worlds_trial", description=(__doc__ or "").partition("\n")[0]
+        prog="python -m trials.worlds_trial", description=(__doc__ or "").partition("\n")[0]
     )
     parser.add_argument("--registration", type=Path)
     parser.add_argument("--folder", type=Path, help="keeps the rigs and answers")

@@ -1,6 +1,6 @@
 """What `daq diagnose` answers in worlds that share no code with it: names, joints and false alarms by kind of world.
 
-    python -m benchmarks worlds --kinds tuning --seeds 0-4 [--case single] [--sharpness] [--folder FOLDER]
+    python -m trials.worlds --kinds tuning --seeds 0-4 [--case single] [--sharpness] [--folder FOLDER]
 
 Rigs are written by `python -m tests.worlds`; the diagnosis is the command, and sees their `lab` folders only. Answers
 stay in the folder, and a call that was interrupted goes on where it stopped. Kinds of REPORTING are for registered
@@ -177,7 +177,7 @@ def seeds_of(text: str) -> Iterable[int]:
 
 def main() -> int:
     """The exit code."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks worlds", description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m trials.worlds", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--kinds", default="tuning", help="tuning, reporting, or names: axis-pid,planar-pid")
     parser.add_argument("--seeds", type=seeds_of, default=range(5))
     parser.add_argument("--case", choices=CASES, help="instead of each seed's own")
