@@ -1,1 +1,1 @@
-"""Registered trials on independent test rigs, for developers: the rigs are in `tests/worlds`."""
+"""Trials of the diagnosis on independent test rigs, for developers; not in the wheel."""

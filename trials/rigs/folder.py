@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tests.worlds.lab import beside_text, machine_text, records_text
-from tests.worlds.rig import Rig
-from tests.worlds.sharpness import sharpness
-from tests.worlds.world import make_world
+from trials.rigs.lab import beside_text, machine_text, records_text
+from trials.rigs.rig import Rig
+from trials.rigs.sharpness import sharpness
+from trials.rigs.world import make_world
 
 
 def write_world(

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from tests.worlds.bodies import Bodies
-from tests.worlds.engine import Motion
-from tests.worlds.kinds import CURRENT
-from tests.worlds.parameters import BRISTLE, BY_CURRENT, JUMP, ONE_SIDED, PRESSING_WEIGHT, SWITCH, Records
-from tests.worlds.rig import Hidden, Rig
+from trials.rigs.bodies import Bodies
+from trials.rigs.engine import Motion
+from trials.rigs.kinds import CURRENT
+from trials.rigs.parameters import BRISTLE, BY_CURRENT, JUMP, ONE_SIDED, PRESSING_WEIGHT, SWITCH, Records
+from trials.rigs.rig import Hidden, Rig
 
 WEAKENED_MAGNET = "weakened_magnet"
 """K_T and K_b are of one magnet, and change together."""

@@ -1,9 +1,9 @@
-"""A registered trial in worlds that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
+"""A registered trial on test rigs that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
 
-    python -m trials.worlds_trial --hashes                                                      # for a registration
-    python -m trials.worlds_trial --registration docs/trial/worlds-15.toml --folder FOLDER --seconds 500
-    python -m trials.worlds_trial --folder FOLDER --sharpness --seconds 500
-    python -m trials.worlds_trial --table FILE.csv
+    python -m trials.registered --hashes                                                      # for a registration
+    python -m trials.registered --registration docs/trial/worlds-15.toml --folder FOLDER --seconds 500
+    python -m trials.registered --folder FOLDER --sharpness --seconds 500
+    python -m trials.registered --table FILE.csv
 
 The second is given again until there are enough arms: each goes on where the last one stopped. Two of them run side by
 side where `--only` gives each its kinds. Seeds are drawn from the
@@ -38,13 +38,13 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.trial.rates import rate
 from model.trial.registration import RegisteredCode
 from model.trial.score import excess_removed_whole
-from tests.worlds.folder import write_world
-from tests.worlds.kinds import KINDS
-from tests.worlds.world import hidden_rig
-from trials.worlds import QUESTIONS, TOLD_APART, diagnose, names_of, score
-from trials.worlds_intervals import covered
+from trials.intervals import covered
+from trials.judge import QUESTIONS, TOLD_APART, diagnose, names_of, score
+from trials.rigs.folder import write_world
+from trials.rigs.kinds import KINDS
+from trials.rigs.world import hidden_rig
 
-DECIDES = (*REGISTERED, "daq_cli", "tests/worlds", "trials/worlds.py", "trials/worlds_trial.py")
+DECIDES = (*REGISTERED, "daq_cli", "trials/rigs", "trials/judge.py", "trials/registered.py")
 """Parts of the source tree that decide the outcome."""
 FIRST_DRAWN = 10**6
 """Smallest seed that a commit draws; smaller ones are for tuning and tests."""
@@ -99,7 +99,7 @@ class Row:
     excess_removed: float | None
     seconds: float
     intervals: int = 0
-    """Intervals of the effect's sizes that can be compared (`worlds_intervals`), of a single effect that was named."""
+    """Intervals of the effect's sizes that can be compared (`intervals`), of a single effect that was named."""
     covering: int = 0
     """Those of them that cover the truth."""
 
@@ -208,7 +208,7 @@ def add_sharpness(folder: Path, seconds: float, only: Collection[str] = ()) -> N
 
     `only` are the kinds of this process, where another one works out the rest beside it.
     """
-    from tests.worlds.sharpness import detectability, sharpness
+    from trials.rigs.sharpness import detectability, sharpness
 
     end = monotonic() + seconds
     for kind in [kind for kind in KINDS if not only or kind in only]:
@@ -319,9 +319,7 @@ def table(rows: Sequence[Row]) -> list[str]:
 
 def main() -> int:
     """The exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m trials.worlds_trial", description=(__doc__ or "").partition("\n")[0]
-    )
+    parser = argparse.ArgumentParser(prog="python -m trials.registered", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--registration", type=Path)
     parser.add_argument("--folder", type=Path, help="keeps the rigs and answers")
     parser.add_argument("--seconds", type=float, default=500.0, help="no arm is begun after this time")
@@ -343,7 +341,7 @@ def main() -> int:
     if asked.folder is None or (asked.registration is None) == (not asked.sharpness):
         parser.error("--folder with --registration or --sharpness; or --table; or --hashes")
     if unknown := set(asked.only) - set(KINDS):
-        parser.error(f"--only {', '.join(sorted(unknown))}: no such kind; see `python -m tests.worlds --list`")
+        parser.error(f"--only {', '.join(sorted(unknown))}: no such kind; see `python -m trials.rigs --list`")
     if asked.sharpness:
         add_sharpness(asked.folder, asked.seconds, asked.only)
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tests.worlds.parameters import BOARD, BRISTLE, CASCADE, PID, SWITCH, TANH
+from trials.rigs.parameters import BOARD, BRISTLE, CASCADE, PID, SWITCH, TANH
 
 VOLTS, CURRENT = "volts", "current"
 

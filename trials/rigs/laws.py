@@ -7,7 +7,7 @@ from typing import Any
 
 from numba import njit
 
-from tests.worlds.parameters import (
+from trials.rigs.parameters import (
     BY_DIRECTION,
     CUBE,
     DRIVING_ONLY,

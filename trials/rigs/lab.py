@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from tests.worlds.drawing import generator
-from tests.worlds.engine import Motion
-from tests.worlds.kinds import CURRENT
-from tests.worlds.parameters import BOARD, CASCADE
-from tests.worlds.rig import Rig, Tolerance
+from trials.rigs.drawing import generator
+from trials.rigs.engine import Motion
+from trials.rigs.kinds import CURRENT
+from trials.rigs.parameters import BOARD, CASCADE
+from trials.rigs.rig import Rig, Tolerance
 
 SPEED_NOISE = 0.002
 """Noise of recorded speeds over the record's own speed."""

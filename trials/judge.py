@@ -1,8 +1,8 @@
-"""What `daq diagnose` answers in worlds that share no code with it: names, joints and false alarms by kind of world.
+"""What `daq diagnose` answers on test rigs that share no code with it: names, joints and false alarms by kind of rig.
 
-    python -m trials.worlds --kinds tuning --seeds 0-4 [--case single] [--sharpness] [--folder FOLDER]
+    python -m trials.judge --kinds tuning --seeds 0-4 [--case single] [--sharpness] [--folder FOLDER]
 
-Rigs are written by `python -m tests.worlds`; the diagnosis is the command, and sees their `lab` folders only. Answers
+Rigs are written by `python -m trials.rigs`; the diagnosis is the command, and sees their `lab` folders only. Answers
 stay in the folder, and a call that was interrupted goes on where it stopped. Kinds of REPORTING are for registered
 trials: they are refused without `--reporting`, since a kind that was looked at can no longer be used to report.
 """
@@ -21,9 +21,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from tests.worlds.folder import write_world
-from tests.worlds.kinds import KINDS, REPORTING, TUNING
-from tests.worlds.world import CASES, case_of
+from trials.rigs.folder import write_world
+from trials.rigs.kinds import KINDS, REPORTING, TUNING
+from trials.rigs.world import CASES, case_of
 
 Json = dict[str, Any]
 
@@ -177,7 +177,7 @@ def seeds_of(text: str) -> Iterable[int]:
 
 def main() -> int:
     """The exit code."""
-    parser = argparse.ArgumentParser(prog="python -m trials.worlds", description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m trials.judge", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--kinds", default="tuning", help="tuning, reporting, or names: axis-pid,planar-pid")
     parser.add_argument("--seeds", type=seeds_of, default=range(5))
     parser.add_argument("--case", choices=CASES, help="instead of each seed's own")
@@ -191,7 +191,7 @@ def main() -> int:
         parser.error(f"kinds {', '.join(unknown)}: there are {', '.join(KINDS)}")
     if not asked.reporting and any(kind in REPORTING for kind in chosen):
         parser.error("a kind for reports is not looked at while anything is tuned; say --reporting if this is a report")
-    folder = asked.folder or Path(tempfile.mkdtemp(prefix="worlds-"))
+    folder = asked.folder or Path(tempfile.mkdtemp(prefix="rigs-"))
     scores: dict[str, list[Score]] = {kind: [] for kind in chosen}
     for seed in asked.seeds:
         for kind in chosen:

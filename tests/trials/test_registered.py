@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-import trials.worlds_trial as trial
+import trials.registered as trial
 
 REGISTRATION = trial.WorldsRegistration(
     version=1, title="", kinds=("axis-pid", "planar-pid"), cases=("sound", "single"), longest=10.0, hashes={}

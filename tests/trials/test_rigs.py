@@ -12,24 +12,25 @@ import mujoco
 import numpy as np
 import pytest
 
+import trials.rigs
 from daq.contracts.machine import load_machine, parse_machine
 from daq.traces.csv_table import import_csv
 from model.dynamics import recursive
 from model.machine_model.model import base_model
 from model.simulation.chain_of_model import chain_of
-from tests.worlds.bodies import mjcf
-from tests.worlds.drawing import sound_rig
-from tests.worlds.folder import write_world
-from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, known, tilted
-from tests.worlds.kinds import KINDS, REPORTED, REPORTING, TUNING
-from tests.worlds.lab import machine_text
-from tests.worlds.world import hidden_rig, make_world
-from trials.worlds import score
+from trials.judge import score
+from trials.rigs.bodies import mjcf
+from trials.rigs.drawing import sound_rig
+from trials.rigs.folder import write_world
+from trials.rigs.hiding import OPEN, effects_of, hide, joints_of, known, tilted
+from trials.rigs.kinds import KINDS, REPORTED, REPORTING, TUNING
+from trials.rigs.lab import machine_text
+from trials.rigs.world import hidden_rig, make_world
 
-OURS = Path(__file__).parent
+OURS = Path(trials.rigs.__file__).parent
 ALLOWED = {"numpy", "numba", "llvmlite", "scipy", "mujoco"}
-"""Libraries that worlds may use; besides, Python's own and each other."""
-FORBIDDEN = {"model", "daq", "daq_cli", "server", "mock_controller", "firmware_protocol", "benchmarks", "trials"}
+"""Libraries that rigs may use; besides, Python's own and each other."""
+FORBIDDEN = {"model", "daq", "daq_cli", "server", "mock_controller", "firmware_protocol", "benchmarks", "tests"}
 
 
 def imports(path: Path) -> set[str]:
@@ -42,13 +43,14 @@ def imports(path: Path) -> set[str]:
     return found
 
 
-def test_worlds_import_nothing_of_the_product() -> None:
-    files = [path for path in OURS.glob("*.py") if not path.name.startswith("test_")]
+def test_rigs_import_nothing_of_the_product() -> None:
+    files = list(OURS.glob("*.py"))
     assert len(files) > 8
     for path in files:
         names = imports(path)
-        assert all(name.startswith("tests.worlds") for name in names if name.startswith("tests")), path
-        assert not {name.partition(".")[0] for name in names} & FORBIDDEN, path
+        used = {name.partition(".")[0] for name in names}
+        assert all(name.startswith("trials.rigs") for name in names if name.startswith("trials")), path
+        assert not used & FORBIDDEN, path
 
 
 @pytest.mark.parametrize("kind", ["planar-pid", "planar-torques", "arm-rounded", "six-volts"])

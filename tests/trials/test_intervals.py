@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from model.effects.library import library
-from trials.worlds_intervals import SIZES, covered
+from trials.intervals import SIZES, covered
 
 
 def truth(name: str, law: int, case: str = "single", **sizes: float) -> dict[str, Any]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tests.worlds.bodies import Bodies
-from tests.worlds.kinds import Kind
-from tests.worlds.parameters import Records
+from trials.rigs.bodies import Bodies
+from trials.rigs.kinds import Kind
+from trials.rigs.parameters import Records
 
 
 @dataclass(frozen=True)

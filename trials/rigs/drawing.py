@@ -11,12 +11,12 @@ import zlib
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
-from tests.worlds.bodies import Bodies, Link
-from tests.worlds.engine import step_within
-from tests.worlds.kinds import CURRENT, Kind
-from tests.worlds.loop import DAC_COUNTS
-from tests.worlds.parameters import BOARD, CASCADE, LOOP, Records, joints
-from tests.worlds.rig import Rig, Tolerance
+from trials.rigs.bodies import Bodies, Link
+from trials.rigs.engine import step_within
+from trials.rigs.kinds import CURRENT, Kind
+from trials.rigs.loop import DAC_COUNTS
+from trials.rigs.parameters import BOARD, CASCADE, LOOP, Records, joints
+from trials.rigs.rig import Rig, Tolerance
 
 GRAVITY = 9.81
 STEP = 1e-4

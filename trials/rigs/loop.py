@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tests.worlds.laws import compiled
-from tests.worlds.parameters import BOARD, CASCADE
+from trials.rigs.laws import compiled
+from trials.rigs.parameters import BOARD, CASCADE
 
 SUM, LAST_ERROR, INNER_SUM, LAST_READING, LAST_WANTED = range(5)
 MEMORY = 5

@@ -17,8 +17,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from tests.worlds.bodies import Bodies, mjcf
-from tests.worlds.laws import (
+from trials.rigs.bodies import Bodies, mjcf
+from trials.rigs.laws import (
     amplified,
     bristles,
     compiled,
@@ -28,8 +28,8 @@ from tests.worlds.laws import (
     transmitted_torque,
     viscous_torque,
 )
-from tests.worlds.loop import LAST_ERROR, LAST_READING, LAST_WANTED, MEMORY, control, rounded
-from tests.worlds.parameters import BOARD, BRISTLE, BY_CURRENT, PRESSING_WEIGHT, SWITCH, TANH, Records
+from trials.rigs.loop import LAST_ERROR, LAST_READING, LAST_WANTED, MEMORY, control, rounded
+from trials.rigs.parameters import BOARD, BRISTLE, BY_CURRENT, PRESSING_WEIGHT, SWITCH, TANH, Records
 
 Floats = NDArray[np.float64]
 
@@ -164,7 +164,7 @@ def _rub(push: Floats, answer: Floats, level: Floats, switched: Any, rub: Floats
 
 
 @compiled
-def _run(  # noqa: PLR0912
+def _run(  # noqa: PLR0912, PLR0915
     addresses: Any,
     views: Any,
     hinges: Any,

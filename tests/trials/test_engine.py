@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.worlds.bodies import Bodies, Link, mjcf
-from tests.worlds.drawing import sound_rig
-from tests.worlds.engine import Motion, _motor_torque, simulate, step_within
-from tests.worlds.kinds import KINDS
-from tests.worlds.parameters import BRISTLE, LOOP, PID, SWITCH, TANH, joints
+from trials.rigs.bodies import Bodies, Link, mjcf
+from trials.rigs.drawing import sound_rig
+from trials.rigs.engine import Motion, _motor_torque, simulate, step_within
+from trials.rigs.kinds import KINDS
+from trials.rigs.parameters import BRISTLE, LOOP, PID, SWITCH, TANH, joints
 
 HANGING = (9.81, 0.0, 0.0)
 LEVEL = (0.0, 0.0, -9.81)

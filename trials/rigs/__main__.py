@@ -1,7 +1,7 @@
 """Writes the folder of one rig: `lab/` for the diagnosis, `truth.json` for its judge.
 
-    python -m tests.worlds FOLDER --kind K --seed N [--case CASE] [--effect NAME] [--sharpness]
-    python -m tests.worlds --list
+    python -m trials.rigs FOLDER --kind K --seed N [--case CASE] [--effect NAME] [--sharpness]
+    python -m trials.rigs --list
 
 `lab/` holds machine.toml, training.csv and held_out.csv, each record with the TOML that says what columns cannot.
 """
@@ -12,15 +12,15 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.worlds.folder import write_world
-from tests.worlds.hiding import DRAWN
-from tests.worlds.kinds import KINDS, REPORTING
-from tests.worlds.world import CASES
+from trials.rigs.folder import write_world
+from trials.rigs.hiding import DRAWN
+from trials.rigs.kinds import KINDS, REPORTING
+from trials.rigs.world import CASES
 
 
 def main(arguments: list[str]) -> int:
     """The exit code."""
-    parser = argparse.ArgumentParser(prog="python -m tests.worlds", description="Writes the folder of one rig.")
+    parser = argparse.ArgumentParser(prog="python -m trials.rigs", description="Writes the folder of one rig.")
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--kind", choices=tuple(KINDS))
     parser.add_argument("--seed", type=int, default=0)

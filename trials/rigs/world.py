@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 from numpy.random import Generator
 
-from tests.worlds.drawing import generator, sound_rig
-from tests.worlds.engine import Floats, Motion, simulate
-from tests.worlds.hiding import OPEN, drawn, effects_of, hide, joints_of
-from tests.worlds.kinds import KINDS
-from tests.worlds.motions import set_points
-from tests.worlds.parameters import BOARD
-from tests.worlds.rig import Rig
+from trials.rigs.drawing import generator, sound_rig
+from trials.rigs.engine import Floats, Motion, simulate
+from trials.rigs.hiding import OPEN, drawn, effects_of, hide, joints_of
+from trials.rigs.kinds import KINDS
+from trials.rigs.motions import set_points
+from trials.rigs.parameters import BOARD
+from trials.rigs.rig import Rig
 
 CASES = ("sound", "single", "pair", "open")
 """What may be hidden: nothing, one effect of a library, two, or one that is in none."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from tests.worlds.drawing import sound_rig
-from tests.worlds.hiding import OTHER_NAMES, find_drawn_law, hide, known
-from tests.worlds.kinds import KINDS
-from tests.worlds.rig import Rig
-from tests.worlds.sharpness import detectability, sharpness
+from trials.rigs.drawing import sound_rig
+from trials.rigs.hiding import OTHER_NAMES, find_drawn_law, hide, known
+from trials.rigs.kinds import KINDS
+from trials.rigs.rig import Rig
+from trials.rigs.sharpness import detectability, sharpness
 
 
 @pytest.fixture(scope="module")

@@ -31,13 +31,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
-from tests.worlds.bodies import Bodies, Link
-from tests.worlds.drawing import generator
-from tests.worlds.engine import Floats, simulate, step_within
-from tests.worlds.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
-from tests.worlds.parameters import Records
-from tests.worlds.rig import Rig, Tolerance
-from tests.worlds.world import COLOURED_CORNER, TRAINING, wanted, without_settling
+from trials.rigs.bodies import Bodies, Link
+from trials.rigs.drawing import generator
+from trials.rigs.engine import Floats, simulate, step_within
+from trials.rigs.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
+from trials.rigs.parameters import Records
+from trials.rigs.rig import Rig, Tolerance
+from trials.rigs.world import COLOURED_CORNER, TRAINING, wanted, without_settling
 
 STEP = 2e-4
 """s, about, of the simulations here."""

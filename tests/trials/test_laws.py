@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.worlds import laws
-from tests.worlds import parameters as at
+from trials.rigs import laws
+from trials.rigs import parameters as at
 
 SPEEDS = np.linspace(-2.0, 2.0, 81)
 
