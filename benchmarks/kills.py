@@ -421,7 +421,8 @@ def main() -> int:
         Figure("traces held against what was told" if given.service else "samples compared", f"{findings.samples}"),
         Figure("everything had ended, or was back, after at most", f"{findings.slowest:.1f} s"),
     ]
-    return show("Ended at random moments", f"python -m benchmarks kills --seed {given.seed}", figures)
+    command = f"python -m benchmarks kills{' --service' * given.service} --seed {given.seed}"
+    return show("Ended at random moments", command, figures)
 
 
 if __name__ == "__main__":
