@@ -21,9 +21,7 @@ MAIN_JOB = (
     "line_rate",
     "stop_latency",
     "lock_step",
-    "undetected_damage",
     "trace_open",
-    "salvage",
     "long_run",
 )
 """What `main-job` runs, in this order."""

@@ -2,7 +2,6 @@
 
     python -m benchmarks feedforward --folder FOLDER              resumes where it was; one line of JSON an arm
     python -m benchmarks feedforward --first 101 --arms 8 …       seeds 101 to 108
-    python -m benchmarks feedforward --folder FOLDER --plot FILE  a picture of what the folder has
     python -m benchmarks feedforward --friction 2 …               hidden frictions of twice the size; another FOLDER
     python -m benchmarks feedforward --quick                      one arm
 
@@ -153,7 +152,7 @@ def _learned(trace: Trace, asked: ExperimentSpec) -> ExperimentSpec:
 
 
 def _judged(trace: Trace) -> dict[str, Any]:
-    """Errors of a trace in degrees: over all joints, by joint, and what was expected; the error itself, for a plot."""
+    """Errors of a trace in degrees: over all joints, by joint, and what was expected."""
     found = followed(trace, lambda spec: motion_of(spec, MACHINE))
     assert found is not None
     assert trace.record.spec is not None
@@ -244,7 +243,6 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--first", type=int, default=101, help="the first seed")
     parser.add_argument("--arms", type=int, default=6, help="number of arms")
     parser.add_argument("--folder", type=Path, help="where results are kept, and found again")
-    parser.add_argument("--plot", type=Path, help="a picture to write (.png, .svg)")
     parser.add_argument("--friction", type=float, default=1.0, help="factor of the hidden frictions' sizes")
     parser.add_argument("--quick", action="store_true", help="one arm")
     chosen = parser.parse_args(arguments)
@@ -253,10 +251,6 @@ def main(arguments: list[str]) -> int:
         folder = chosen.folder or Path(name)
         folder.mkdir(parents=True, exist_ok=True)
         entries = studied(seeds, folder, chosen.friction)
-    if chosen.plot is not None:
-        from benchmarks.feedforward_plot import plot
-
-        plot(entries, chosen.plot)
     command = f"python -m benchmarks feedforward --first {chosen.first} --arms {len(entries)}"
     if chosen.friction != 1.0:
         command += f" --friction {chosen.friction:g}"

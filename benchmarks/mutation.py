@@ -4,9 +4,7 @@
 
 Each path is a folder or a file. Each mutant (see `mutants`) is tried in a temporary copy of the tree. The tests are
 those of the folder of `tests` that mirrors the module's (`tests/daq/link` for `daq/link`; where there is none, the
-folder above), and of these the files that reach the module through imports. Most mutants are tried in a fork of a
-process that has imported everything, by the tests that call the changed function (see `forked_mutants`); what cannot be
-tried there, or lives on, is tried by all tests in a process of its own. The quickest file runs first, and the first
+folder above), and of these the files that reach the module through imports. The quickest file runs first, and the first
 failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
 browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than three times
 their time and 20 s (240 s for the model, which has to compile).
@@ -20,11 +18,6 @@ killed.
 --list        print the mutants and run nothing
 --kills       print each killed mutant too, with the test that failed; on a busy machine a test that waits for a
               process or a clock may have failed without noticing the fault
---line N      only those that begin at this line; for one file
---uncompiled  without a compiler, for the compiled code of the model: its functions run in Python, a hundred times
-              slower and with nothing to compile; tests that fail like this, or take too long, are left out
---quick       only in forks of one process (see `forked_mutants`), which leaves out what is decided at import, compiled
-              code and other processes; a survivor here may still be noticed by a test that starts a process
 """
 
 from __future__ import annotations
@@ -32,7 +25,7 @@ from __future__ import annotations
 import argparse
 import ast
 import os
-import pickle
+import re
 import shutil
 import signal
 import subprocess
@@ -40,20 +33,19 @@ import sys
 import tempfile
 import time
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
 from random import Random
-from types import MappingProxyType
 
 import grimp
 
-from benchmarks.forked_mutants import ORDERS, Findings, Orders
 from benchmarks.mutants import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[1]
@@ -73,9 +65,10 @@ GRACE_S = 20.0
 """Time that a mutant has beyond three times what the unchanged tests take; the start of pytest varies by seconds."""
 COMPILING_S = 240.0
 """The same for a mutant of the model, whose compiled functions have to be compiled anew."""
-UNCOMPILED = {"NUMBA_DISABLE_JIT": "1"}
-FORKS_LIMIT_S = 7200.0
-"""Time limit of the unchanged tests and of all mutants that are tried in forks."""
+BASELINE_LIMIT_S = 7200.0
+"""Time limit of the unchanged tests of a folder."""
+_DURATION = re.compile(r"(\d+\.\d+)s (?:call|setup|teardown) +(\S.*)")
+"""A line of `pytest --durations`."""
 _TIMES = count(1_000_000_000, 10)
 """Modification times, all different, since Python recognises current bytecode by its source's time and size."""
 
@@ -89,26 +82,19 @@ class Tests:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """Seconds that each unchanged test takes, by the name that selects it, the most that one may take, and those that
-    fail."""
+def chosen_tests(files: Iterable[str], seconds: Mapping[str, float], longest_s: float) -> Tests:
+    """The tests of some files, the quickest file first, without the tests that take too long.
 
-    seconds: dict[str, float]
-    longest_s: float
-    failing: tuple[str, ...] = ()
-
-    def tests(self, files: tuple[str, ...]) -> Tests:
-        """The tests of some files, the quickest file first, without the tests that take too long."""
-        times = dict.fromkeys(files, 0.0)
-        deselected = [test for test in self.failing if test.partition("::")[0] in times]
-        for test, seconds in self.seconds.items():
-            file = test.partition("::")[0]
-            if file in times and seconds > self.longest_s:
-                deselected.append(test)
-            elif file in times:
-                times[file] += seconds
-        return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+    seconds: time of each unchanged test, by the name that selects it.
+    """
+    times, deselected = dict.fromkeys(files, 0.0), []
+    for test, taken in seconds.items():
+        file = test.partition("::")[0]
+        if file in times and taken > longest_s:
+            deselected.append(test)
+        elif file in times:
+            times[file] += taken
+    return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
 
 
 @dataclass(frozen=True)
@@ -235,15 +221,13 @@ def copy_of_tree(target: Path) -> None:
         shutil.copytree(ROOT / page, target / page, dirs_exist_ok=True)
 
 
-def run_tests(
-    tree: Path, arguments: Iterable[str], limit_s: float, more: Mapping[str, str] = MappingProxyType({})
-) -> tuple[int | None, str]:
-    """pytest's exit code for the tests of a copy, and the first that failed; `more` goes into its environment.
+def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int | None, list[str]]:
+    """pytest's exit code for the tests of a copy, and the lines that it printed.
 
     The code is None when they took too long; everything they began was then ended.
     """
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", LEFT_OUT, *arguments]
-    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", **more}
+    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled")}
     with (
         tempfile.TemporaryFile("w+", errors="replace") as output,
         subprocess.Popen(
@@ -259,34 +243,29 @@ def run_tests(
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
         output.seek(0)
-        failed = [line.split(" - ")[0] for line in output if line.startswith(("FAILED ", "ERROR "))]
-        return code, failed[0].strip() if failed else ""
+        return code, output.read().splitlines()
 
 
-def tried_in_forks(
-    tree: Path, files: Iterable[str], mutants: list[Mutant], longest_s: float, uncompiled: bool = False
-) -> Findings:
-    """Measures the unchanged tests, and tries the mutants in forks of that process; see `forked_mutants`. Raises
-    MutationError when a test fails, unless nothing is compiled.
+def first_failure(lines: Iterable[str]) -> str:
+    """The first test that failed; "" where none did."""
+    return next((line.split(" - ")[0] for line in lines if line.startswith(("FAILED ", "ERROR "))), "")
+
+
+def measured(tree: Path, files: Iterable[str]) -> dict[str, float]:
+    """Time (s) of each unchanged test, by the name that selects it; tests of a few ms are left out.
+
+    Raises MutationError when a test fails.
     """
-    orders, answer = tree / "mutation-orders", tree / "mutation-findings"
-    orders.write_bytes(pickle.dumps(Orders(tuple(mutants), longest_s, answer, uncompiled)))
-    answer.unlink(missing_ok=True)
-    more = {
-        ORDERS: str(orders),
-        **(UNCOMPILED if uncompiled else {}),
-    }  # a fork changes no file: all may use what is compiled
-    code, failed = run_tests(tree, ["-p", Findings.__module__, *files], FORKS_LIMIT_S, more)
-    if code == 5:  # pytest: there was no test
-        return Findings()
-    findings: Findings | None = pickle.loads(answer.read_bytes()) if answer.exists() else None
-    if findings is None or findings.broken:
-        broken = findings.broken if findings else failed
-        raise MutationError(f"the tests fail without any fault (exit code {code}; {broken}): {' '.join(files)}")
-    return findings
+    code, lines = run_tests(tree, ["--durations=0", *files], BASELINE_LIMIT_S)
+    if code not in (0, 5):  # pytest's 5: there was no test
+        raise MutationError(f"the tests fail without any fault (exit code {code}; {first_failure(lines)})")
+    seconds: Counter[str] = Counter()
+    for found in filter(None, map(_DURATION.match, lines)):
+        seconds[found[2]] += float(found[1])  # type: ignore[assignment]
+    return dict(seconds)
 
 
-def outcome(tree: Path, mutant: Mutant, tests: Tests, uncompiled: bool = False) -> Outcome:
+def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
     """Runs the tests of a copy against one mutant, and puts the file back."""
     if not tests.files:
         return Outcome(mutant, "no tests")
@@ -295,12 +274,12 @@ def outcome(tree: Path, mutant: Mutant, tests: Tests, uncompiled: bool = False) 
     _write(file, mutant.applied(unchanged), next(_TIMES) * 10**9)
     try:
         arguments = [*tests.files, *(f"--deselect={name}" for name in tests.deselected)]
-        more = UNCOMPILED if uncompiled else {"NUMBA_CACHE_DIR": str(tree / ".compiled")}
-        grace = COMPILING_S if mutant.file.startswith("model/") and not uncompiled else GRACE_S
-        code, failed = run_tests(tree, arguments, 3.0 * tests.seconds + grace, more)
+        grace = COMPILING_S if mutant.file.startswith("model/") else GRACE_S
+        code, lines = run_tests(tree, arguments, 3.0 * tests.seconds + grace)
     finally:
         _write(file, unchanged, changed_at)
-    return Outcome(mutant, {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed"), failed)
+    ending = {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed")
+    return Outcome(mutant, ending, first_failure(lines))
 
 
 def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
@@ -308,13 +287,10 @@ def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
     os.utime(file, ns=(changed_at_ns, changed_at_ns))
 
 
-def run_all(
-    mutants: list[Mutant], processes: int, longest_s: float, kills: bool, quick: bool, uncompiled: bool = False
-) -> list[Outcome]:
+def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool) -> list[Outcome]:
     """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once.
 
-    With `kills` it prints each killed one as well, with the test that failed. With `quick` it tries nothing but in
-    forks, and returns only what could be tried there.
+    With `kills` it prints each killed one as well, with the test that failed.
     """
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         trees: SimpleQueue[Path] = SimpleQueue()
@@ -323,41 +299,21 @@ def run_all(
             copy_of_tree(tree)
             trees.put(tree)
 
-        @contextmanager
-        def a_tree() -> Iterator[Path]:
+        def attempt(mutant: Mutant) -> Outcome:
             tree = trees.get()
             try:
-                yield tree
+                ended = outcome(tree, mutant, chosen_tests(reaching(mutant.file), seconds, longest_s))
             finally:
                 trees.put(tree)
-
-        def attempt(mutant: Mutant) -> Outcome:
-            found = findings[mirrored_folder(mutant.file)]
-            if quick and mutant not in found.killed:
-                ended = Outcome(mutant, "survived")
-            elif mutant in found.killed:
-                failed = found.killed[mutant]
-                ended = Outcome(mutant, "killed" if failed else "timed out", failed)
-            else:
-                with a_tree() as tree:
-                    baseline = Baseline(found.seconds, longest_s, tuple(found.failing))
-                    ended = outcome(tree, mutant, baseline.tests(reaching(mutant.file)), uncompiled)
             if ended.lives or kills:
                 print(f"{ended.ending}: {mutant}{f'  ({ended.failed})' if ended.failed else ''}", flush=True)
             return ended
 
-        def try_in_forks(group: list[Mutant]) -> Findings:
-            with a_tree() as tree:
-                files = dict.fromkeys(file for mutant in group for file in reaching(mutant.file))
-                return tried_in_forks(tree, files, group, longest_s, uncompiled)
-
-        groups: dict[Path, list[Mutant]] = {}
-        for mutant in mutants:
-            groups.setdefault(mirrored_folder(mutant.file), []).append(mutant)
+        tree = trees.get()
+        seconds = measured(tree, dict.fromkeys(file for mutant in mutants for file in reaching(mutant.file)))
+        trees.put(tree)
         with ThreadPoolExecutor(processes) as pool:
-            findings = dict(zip(groups, pool.map(try_in_forks, groups.values()), strict=True))
-            tried = {mutant for each in findings.values() for mutant in (*each.killed, *each.survived)}
-            return list(pool.map(attempt, [m for m in mutants if m in tried or not quick]))
+            return list(pool.map(attempt, mutants))
 
 
 # ---- the command
@@ -370,11 +326,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=1, metavar="N")
     parser.add_argument("--longest", type=float, default=5.0, metavar="SECONDS")
-    parser.add_argument("--line", type=int, metavar="N")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--kills", action="store_true")
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--uncompiled", action="store_true")
     return parser.parse_args()
 
 
@@ -386,7 +339,7 @@ def main() -> int:
     left_out: dict[str, int] = {}
     try:
         for path in options.paths:
-            mutants = [m for m in mutants_below(path.rstrip("/")) if options.line in (None, m.line)]
+            mutants = mutants_below(path.rstrip("/"))
             fewer = options.sample is not None and options.sample < len(mutants)
             drawn = Random(options.seed).sample(mutants, options.sample) if fewer else mutants
             chosen[path] = [mutant for mutant in drawn if mutant.identity not in known]
@@ -397,12 +350,7 @@ def main() -> int:
             return 0
         begun = time.monotonic()
         every = [mutant for mutants in chosen.values() for mutant in mutants]
-        ended = {
-            each.mutant: each
-            for each in run_all(
-                every, options.processes, options.longest, options.kills, options.quick, options.uncompiled
-            )
-        }
+        ended = {each.mutant: each for each in run_all(every, options.processes, options.longest, options.kills)}
     except MutationError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -21,29 +21,9 @@ CONNECTIONS = 8
 SUBSCRIBED = ["samples", "robot", "queue", "jobs", "events"]
 
 
-@dataclass(frozen=True)
-class Answer:
-    """The moments of one GET (s, on the clock that all processes of a machine share), and what its service says of it:
-    `heard`, `begun`, `answered`, `waited`, `own` and `every` are those of `benchmarks.timed_service`."""
-
-    path: str
-    due: float
-    sent: float
-    heard: float
-    begun: float
-    answered: float
-    received: float
-    waited: float
-    own: float
-    every: float
-
-
 @dataclass
 class Seen:
     """Observations of the clients. Times in s."""
-
-    answers: list[Answer] = field(default_factory=list)
-    """The GETs whose answers say where their time went."""
 
     latencies: list[float] = field(default_factory=list)
     """Latency of every GET from the moment when it was due, so that waiting for a free connection counts."""
@@ -66,15 +46,14 @@ class _HttpLine:
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
 
-    async def get(self, host: str, path: str, sent: float) -> tuple[int, list[float]]:
-        """The status of the answer, and the times that it tells, when all of it has come."""
-        self.writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\nX-Sent: {sent:.6f}\r\n\r\n".encode())
+    async def get(self, host: str, path: str) -> int:
+        """The status of the answer, when all of it has come."""
+        self.writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
         head = (await self.reader.readuntil(b"\r\n\r\n")).decode("latin-1").lower()
         length = head.partition("content-length:")[2].partition("\r\n")[0]
         if length.strip():
             await self.reader.readexactly(int(length))
-        told = head.partition("x-times:")[2].partition("\r\n")[0]
-        return int(head.split(" ", 2)[1]), [float(one) for one in told.split()]
+        return int(head.split(" ", 2)[1])
 
 
 async def _get_steadily(host: str, paths: Sequence[str], rate: float, seen: Seen, over: asyncio.Event) -> None:
@@ -85,12 +64,8 @@ async def _get_steadily(host: str, paths: Sequence[str], rate: float, seen: Seen
 
     async def get(path: str, due: float) -> None:
         line = await free.get()
-        sent = time.monotonic()
-        status, told = await line.get(host, path, sent)
-        received = time.monotonic()
-        seen.latencies.append(received - due)
-        if told:
-            seen.answers.append(Answer(path, due, sent, *told[:3], received, *told[3:]))
+        status = await line.get(host, path)
+        seen.latencies.append(time.monotonic() - due)
         seen.refused += status != 200
         free.put_nowait(line)
 
@@ -139,7 +114,6 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
             over.set()
         else:
             seen.latencies.clear()
-            seen.answers.clear()
             seen.own_lateness.clear()
 
     async with asyncio.TaskGroup() as clients:
@@ -230,7 +204,6 @@ def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: st
         else replace(
             watching.seen,
             latencies=asked.latencies,
-            answers=asked.answers,
             own_lateness=asked.own_lateness,
             refused=asked.refused,
         )

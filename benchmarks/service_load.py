@@ -6,10 +6,6 @@ The mock behind a pseudo-terminal at 115200 baud, the service, its worker proces
 machine's cores. First an experiment is recorded while nobody watches, then another one under the whole load; the
 second's jitter, less the first's, is what the load adds. Then experiments are stopped by REST at random moments, under
 the same load; the moments of a stop are the mock's own record, on the clock that all processes of a machine share.
-An application of FastAPI that does nothing is asked meanwhile, in a process of its own: the floor of a plain GET under
-this load; and at last once more with nothing beside it. With --where the answers of the service say where their time
-went, which is printed for the slowest hundredth. With --busy 2 two programs that have nothing to do with the service
-compute without pause meanwhile.
 """
 
 from __future__ import annotations
@@ -20,7 +16,6 @@ import http.client
 import json
 import math
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -30,12 +25,10 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from benchmarks.figures import Figure, at_most, quantile, show
-from benchmarks.lasting_fit import LastingFit
 from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
 from benchmarks.service_clients import Seen, clients
 from benchmarks.service_process import (
-    COMMAND,
     ROBOT,
     RunningService,
     child,
@@ -45,7 +38,6 @@ from benchmarks.service_process import (
     started_service,
     sway,
 )
-from benchmarks.slow_answers import where_it_went
 from benchmarks.stop_latency import record_of_stop
 from daq.contracts.service.system import stop_port_after
 from daq.traces.reader import read_trace
@@ -61,19 +53,9 @@ USED_TARGET_MS = 55.0
 GET_TARGET_MS = 25.0
 OTHERS = "other programs"
 OWN_DOOR, STOP_DOOR = "through the service", "through the stop listener"
-FLOOR_RATE = 20.0
-"""GETs a second of the empty application beside the service: few, since they are part of the load."""
-TIMED = (sys.executable, "-m", "benchmarks.timed_service")
-COMPUTING = "import os; parent = os.getppid()\nwhile os.getppid() == parent: sum(range(100_000))"
-EMPTY_APP = """
-import sys, uvicorn
-from fastapi import FastAPI
-app = FastAPI()
-@app.get("/")
-def nothing() -> dict[str, str]:
-    return {"status": "ok"}
-uvicorn.run(app, host="127.0.0.1", port=0, log_level="info", access_log=False)
-"""
+FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
+FITS = 20
+"""Number of fits that are queued: more than are computed meanwhile."""
 
 
 @dataclass
@@ -95,10 +77,6 @@ class Measured:
     busy: dict[str, float] = field(default_factory=dict)
     """Share of one core that each process took while the second experiment was recorded."""
     seen: Seen = field(default_factory=Seen)
-    floor: Seen = field(default_factory=Seen)
-    """The empty application under the same load."""
-    alone: Seen = field(default_factory=Seen)
-    """The empty application with nothing beside it."""
 
 
 def jitter(path: Path) -> tuple[list[float], int]:
@@ -164,9 +142,7 @@ def stop(line: http.client.HTTPConnection) -> tuple[float, bool]:
     return at, bool(json.loads(line.getresponse().read())["confirmed"])
 
 
-def stop_again_and_again(
-    service: RunningService, control: MockControl, fit: LastingFit, times: int, found: Measured
-) -> None:
+def stop_again_and_again(service: RunningService, control: MockControl, times: int, found: Measured) -> None:
     """Stops experiments while they are recorded, at moments that have nothing to do with the control period.
 
     Through the service's own door, on a connection that is open already, and through the stop listener's beside it,
@@ -195,7 +171,7 @@ def stop_again_and_again(
         found.frozen[door].append(frozen - at)
         found.used[door].append(used - at)
         found.unconfirmed += not confirmed
-        found.fitting += fit.runs()
+        found.fitting += fitting(service)
         service.ended("experiments", experiment)
         ready_again(service)
     for line in doors.values():
@@ -203,53 +179,37 @@ def stop_again_and_again(
 
 
 @contextlib.contextmanager
-def empty_app() -> Iterator[str]:
-    """The address of a FastAPI application that does nothing."""
-    with subprocess.Popen([sys.executable, "-c", EMPTY_APP], stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        try:
-            url = next(line.split(" ")[-5] for line in process.stderr if "running on" in line)
-            yield url
-        finally:
-            process.terminate()
+def fits(service: RunningService, trace: str) -> Iterator[None]:
+    """Keeps fits of a trace running within the block."""
+    queued = [service.ask("POST", "/jobs", json=FIT | {"traces": [trace]})["id"] for _ in range(FITS)]
+    while not fitting(service):
+        time.sleep(0.1)
+    yield
+    for number in reversed(queued):  # one that waits first, or it would begin
+        service.robot.post(f"/jobs/{number}/cancel")  # a 409 says that it has ended
 
 
-@contextlib.contextmanager
-def computing(count: int) -> Iterator[None]:
-    """So many programs that compute without pause, each in a session of its own, as another person's would."""
-    with contextlib.ExitStack() as programs:
-        for _ in range(count):
-            programs.callback(subprocess.Popen([sys.executable, "-c", COMPUTING], start_new_session=True).kill)
-        yield
+def fitting(service: RunningService) -> bool:
+    """Whether a fit is running."""
+    return bool(service.ask("GET", "/jobs", params={"state": "running"})["items"])
 
 
-def measure(seconds: float, stops: int, busy: int = 0, command: Sequence[str] = COMMAND) -> Measured:
-    """Everything, in one go, of a service that `command` starts, beside `busy` programs that compute."""
+def measure(seconds: float, stops: int) -> Measured:
+    """Everything, in one go."""
     found = Measured()
     with (
         tempfile.TemporaryDirectory() as name,
         started_mock("--pty", "--baud", str(BAUD)) as mock,
         MockControl(mock.control) as control,
-        started_service(Path(name), f"{mock.url}?baud={BAUD}", command=command) as service,
+        started_service(Path(name), f"{mock.url}?baud={BAUD}") as service,
     ):
         service.ask("POST", "/connect")
         found.idle, _ = record(service, seconds, found)
         short = service.ended("experiments", service.submit(ramp(duration=1.0)))["trace"]
-        service.ended(
-            "jobs",
-            service.ask("POST", "/jobs", json={"kind": "compare", "traces": [short], "models": ["machine"]})["id"],
-        )
-        with (
-            empty_app() as empty,
-            clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load,
-            clients(empty, 0, ("/",), FLOOR_RATE) as floor,
-            LastingFit(service, short) as fit,
-            computing(busy),
-        ):
-            while not fit.runs():
-                time.sleep(0.1)
+        job = {"kind": "compare", "traces": [short], "models": ["machine"]}
+        service.ended("jobs", service.ask("POST", "/jobs", json=job)["id"])
+        with clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load, fits(service, short):
             load.begin_anew()
-            floor.begin_anew()
             processes = {
                 "service": [service.process.pid],
                 "owner of the port": [child(service.process.pid, b"server.owner")],
@@ -262,14 +222,9 @@ def measure(seconds: float, stops: int, busy: int = 0, command: Sequence[str] = 
             found.loaded, lost = record(service, seconds, found)
             found.busy = spent.shares()
             found.lost = (lost, len(found.loaded))
-            stop_again_and_again(service, control, fit, stops, found)
-        found.seen, found.floor = load.seen, floor.seen
-        if fit.problem:
-            found.endings.append(f"the fits ended: {fit.problem}")
+            stop_again_and_again(service, control, stops, found)
+        found.seen = load.seen
         service.ask("POST", "/disconnect")
-    with empty_app() as url, clients(url, 0, ("/",), RATE) as alone:
-        time.sleep(min(seconds, 10.0))
-    found.alone = alone.seen
     return found
 
 
@@ -278,10 +233,7 @@ def figures_of(found: Measured) -> list[Figure]:
     idle, loaded = (1e3 * quantile(times, 0.99) for times in (found.idle, found.loaded))
     lost, count = found.lost
     seen = found.seen
-    gets, floor, alone, late = (
-        [1e3 * one for one in times]
-        for times in (seen.latencies, found.floor.latencies, found.alone.latencies, seen.own_lateness)
-    )
+    gets, late = ([1e3 * one for one in times] for times in (seen.latencies, seen.own_lateness))
 
     def spread(times: list[float]) -> str:
         return f"p50 {quantile(times, 0.5):.1f}, max {max(times):.1f} ms"
@@ -312,12 +264,6 @@ def figures_of(found: Measured) -> list[Figure]:
             f"a fit ran beside {found.fitting} of {sum(map(len, found.used.values()))}",
         ),
         at_most("plain GET, p99", quantile(gets, 0.99), GET_TARGET_MS, "ms", f"{spread(gets)}, {len(gets)} requests"),
-        Figure(
-            "an empty FastAPI application, under the same load, p99",
-            f"{quantile(floor, 0.99):.3g} ms",
-            beside=f"{spread(floor)}, {len(floor)} requests",
-        ),
-        Figure("an empty FastAPI application, alone, p99", f"{quantile(alone, 0.99):.3g} ms", beside=spread(alone)),
         Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),
         Figure("processor time, of one core", f"{100 * sum(found.busy.values()):.0f} %", beside=busy),
         Figure("until all watchers had the last 60 s", f"{seen.joining:.2f} s", beside="all of them join at once"),
@@ -336,15 +282,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks service_load", description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="length of each of the two recordings")
     parser.add_argument("--stops", type=int, default=60)
-    parser.add_argument("--busy", type=int, default=0, help="programs that compute beside all of it")
-    parser.add_argument("--where", action="store_true", help="where the time of the slowest hundredth went")
     parser.add_argument("--quick", action="store_true", help="10 s and 10 stops")
     given = parser.parse_args()
     seconds, stops = (10.0, 10) if given.quick else (given.seconds, given.stops)
-    found = measure(seconds, stops, given.busy, TIMED if given.where else COMMAND)
-    if given.where:
-        print(where_it_went(found.seen.answers))
-    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit, {given.busy} programs; 50 Hz at {BAUD} baud"
+    found = measure(seconds, stops)
+    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit; 50 Hz at {BAUD} baud"
     return show(title, "python -m benchmarks service_load", figures_of(found))
 
 

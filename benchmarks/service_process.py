@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from typing import Any
 import httpx
 
 from benchmarks.own_environment import environment_of
-from tests.server.postgresql import programs, running_postgresql
 
 ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0
@@ -24,7 +23,6 @@ END_WITHIN = 15.0
 LONGEST_START = 90.0
 """Time (s) within which a queued experiment is being recorded, with its move to the start."""
 ENDS = ("done", "failed", "cancelled", "interrupted")
-DATABASES = ("sqlite", "postgresql")
 COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
 
 
@@ -81,53 +79,28 @@ class RunningService:
 
 
 @contextlib.contextmanager
-def database_of(kind: str, folder: Path) -> Iterator[str]:
-    """The address of a new database for a service whose files lie in `folder`: "sqlite", or "postgresql" on a server
-    that ends with the block. Raises RuntimeError where PostgreSQL is not installed."""
-    if kind == "sqlite":
-        yield f"sqlite:///{folder / 'service' / 'service.sqlite'}"
-        return
-    found = programs()
-    if found is None:
-        raise RuntimeError("PostgreSQL is not installed: on Debian and Ubuntu, apt install postgresql")
-    with running_postgresql(found) as server:
-        yield server.database()
-
-
-def serving(folder: Path, port: str, *options: str, command: Sequence[str] = COMMAND) -> subprocess.Popen[bytes]:
-    """The process of `daq serve`, which may not answer yet; it keeps everything in `folder`, its log too. `command` is
-    the program `daq`."""
-    with (folder / "service.log").open("ab") as log:
-        return subprocess.Popen(
-            [*command, "--port", port, "serve", "--port", "0", *options],
-            cwd=folder,
-            env=environment_of(folder),
-            stdout=subprocess.PIPE,
-            stderr=log,
-        )
-
-
-@contextlib.contextmanager
-def started_service(
-    folder: Path, port: str, *options: str, command: Sequence[str] = COMMAND
-) -> Iterator[RunningService]:
-    """A service that answers, ended with the block."""
-    process = serving(folder, port, *options, command=command)
-    assert process.stdout is not None
-    try:
-        url = process.stdout.readline().decode().strip()
-        if not url:
-            raise RuntimeError(f"the service did not start: {(folder / 'service.log').read_text('utf-8')[-500:]}")
-        with httpx.Client(base_url=f"{url}/api/v1/robots/{ROBOT}", timeout=ANSWER_WITHIN) as robot:
-            yield RunningService(process, url, folder, robot)
-    finally:
-        process.terminate()
+def started_service(folder: Path, port: str) -> Iterator[RunningService]:
+    """`daq serve`, once it answers, ended with the block; it keeps everything in `folder`, its log too."""
+    command = [*COMMAND, "--port", port, "serve", "--port", "0"]
+    with (
+        (folder / "service.log").open("ab") as log,
+        subprocess.Popen(
+            command, cwd=folder, env=environment_of(folder), stdout=subprocess.PIPE, stderr=log
+        ) as process,
+    ):
+        assert process.stdout is not None
         try:
-            process.wait(END_WITHIN)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        process.stdout.close()
+            url = process.stdout.readline().decode().strip()
+            if not url:
+                raise RuntimeError(f"the service did not start: {(folder / 'service.log').read_text('utf-8')[-500:]}")
+            with httpx.Client(base_url=f"{url}/api/v1/robots/{ROBOT}", timeout=ANSWER_WITHIN) as robot:
+                yield RunningService(process, url, folder, robot)
+        finally:
+            process.terminate()
+            try:
+                process.wait(END_WITHIN)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
 def ramp(amplitude: float = 0.1, duration: float = 0.5) -> dict[str, Any]:

@@ -75,14 +75,6 @@ def bulk_read(areas: Mapping[int, tuple[int, int]]) -> Packet:
     return Packet(BROADCAST, Instruction.BULK_READ, parameters)
 
 
-def bulk_write(values: Mapping[int, tuple[int, bytes]]) -> Packet:
-    """Writes to addresses of each device's own."""
-    parameters = b"".join(
-        struct.pack("<BHH", device, address, len(data)) + data for device, (address, data) in values.items()
-    )
-    return Packet(BROADCAST, Instruction.BULK_WRITE, parameters)
-
-
 def status(device: int, data: bytes = b"", error: int = 0, *, alert: bool = False) -> Packet:
     """A device's answer."""
     return Packet(device, STATUS, bytes((error | (ALERT if alert else 0),)) + data)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from model.dynamics.compilation import inlined
 from model.dynamics.dual import sin_cos
 
-SOURCE_HASH = "c33b6878c87088ab"
+SOURCE_HASH = "d86126eb7f0ec59a"
 TEXT_HASH = "797dba5308c6034e"
 
 

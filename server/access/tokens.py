@@ -122,10 +122,6 @@ class KnownTokens:
         """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
         return self._remembered(digest_of(token))
 
-    def was_known(self, token: str) -> bool:
-        """Whether the token was valid when the database was last read, however long ago."""
-        return self.last_known(token) is not None
-
     def last_known(self, token: str) -> Caller | None:
         """Returns a token's caller as the database had it when it was last read, however long ago."""
         return self._known.callers.get(digest_of(token))

@@ -83,26 +83,23 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
 
 
 _NOT_APPROVED = "approved_content = NULL, approved_by = NULL, approved_as_owner = NULL, approved = NULL"
-_REVIEWED = ("experiments", "schedules")
-_FORGOTTEN = {
-    "sessions": "DELETE FROM sessions",
-    "experiments": f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
-    "schedules": f"UPDATE schedules SET {_NOT_APPROVED}",
-    "outbox": "UPDATE outbox SET state = 'given-up', ended = :now, problem = 'a backup was restored' "
-    "WHERE state = 'waiting'",
-}
-"""What a restore ends, by table."""
+_FORGOTTEN = (
+    "DELETE FROM sessions",
+    f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
+    f"UPDATE schedules SET {_NOT_APPROVED}",
+    "UPDATE outbox SET state = 'given-up', ended = :now, problem = 'a backup was restored' WHERE state = 'waiting'",
+)
+"""What a restore ends."""
 
 
 def forget_what_may_have_ended(database: Path, now: datetime) -> None:
     """Ends what may have been ended after the backup was made: sessions, approvals of what has not begun, and
-    notifications that wait. Tables and columns that an older version did not have are left out. Raises BackupError."""
+    notifications that wait. Raises BackupError."""
     words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
-            for table, line in _FORGOTTEN.items():
-                if _has_table(connection, table) and (table not in _REVIEWED or _has_approvals(connection, table)):
-                    connection.execute(line, words)
+            for line in _FORGOTTEN:
+                connection.execute(line, words)
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: its sessions cannot be ended: {error}") from error
 
@@ -146,8 +143,7 @@ def head_of_audit(database: Path) -> str:
 
 
 def add_to_audit(database: Path, note: AuditNote) -> None:
-    """Adds a row to a database's audit log; one of an older version, which has none, stays as it is. Raises
-    BackupError."""
+    """Adds a row to a database's audit log; one without tables stays as it is. Raises BackupError."""
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
             return
@@ -165,12 +161,8 @@ def _has_table(connection: sqlite3.Connection, name: str) -> bool:
     return bool(found.fetchone()[0])
 
 
-def _has_approvals(connection: sqlite3.Connection, table: str) -> bool:
-    return any(row[1] == "approved_content" for row in connection.execute(f"PRAGMA table_info({table})"))
-
-
 def require_known(revision: str | None) -> None:
-    """Raises BackupError for tables of a newer version than this program's."""
+    """Raises BackupError for tables that no migration of this program makes."""
     known = {script.revision for script in ScriptDirectory.from_config(migrations()).walk_revisions()}
     if revision is not None and revision not in known:
-        raise BackupError(f"the backup's tables are of a newer version ({revision}): install that version first")
+        raise BackupError(f"the backup's tables are of another version ({revision}): install that version first")

@@ -58,8 +58,6 @@ class Store:
         if parsed.get_backend_name() == "sqlite":
             event.listen(self.engine, "connect", _safe_and_shared)
             event.listen(self.engine, "begin", _begin)
-        elif parsed.get_backend_name() == "postgresql":
-            event.listen(self.engine, "connect", _planned_anew)
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
@@ -171,20 +169,6 @@ def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
         f"mmap_size={MAPPED}",
     ):
         connection.execute(f"PRAGMA {pragma}")
-
-
-def _planned_anew(connection: Any, _record: Any) -> None:
-    """Sets up a connection to PostgreSQL for short statements, each planned for its own values.
-
-    A plan for any text, which it makes once a driver has prepared a statement, reads the whole index of trigrams for a
-    text that this index says nothing about. Compiling a plan takes 0.4 s, more than any statement here; and looking for
-    the best order of eight joins takes 30 ms (`terms_asked`), where the order that is written takes 0.8 ms and serves.
-    """
-    with connection.cursor() as cursor:
-        cursor.execute("SET plan_cache_mode = force_custom_plan")
-        cursor.execute("SET jit = off")
-        cursor.execute("SET join_collapse_limit = 1")
-    connection.commit()
 
 
 def _begin(connection: Any) -> None:

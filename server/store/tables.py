@@ -1,4 +1,4 @@
-"""The tables. A change here needs a migration (docs/service.md); a test compares the two."""
+"""The tables, as the first migration makes them. After a release, a change here needs a migration of its own."""
 
 from __future__ import annotations
 
@@ -145,14 +145,10 @@ class QueueRow(Table):
 
 
 class TraceRow(Table):
-    """One trace of the folder. `searched` holds the text for searches, in lower case.
-
-    The index has the order of the list. SQLite's has all columns that a search needs too, so the table is read for
-    matches only; PostgreSQL's cannot hold long notes. Beside it stands an index of trigrams for rare texts: on SQLite
-    the table `trace_words`, which triggers keep up to date. Migration 0006 makes what differs between the two.
-    """
+    """One trace of the folder. The index has the order of the list."""
 
     __tablename__ = "traces"
+    __table_args__ = (Index("traces_listed", "robot", "created", "id"),)
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     robot: Mapped[str] = mapped_column(String(32))
@@ -170,6 +166,7 @@ class TraceRow(Table):
     experiment: Mapped[str | None] = mapped_column(String(12), index=True)
     notes: Mapped[str] = mapped_column(Text, default="")
     searched: Mapped[str] = mapped_column(Text, default="")
+    """What a search looks at, in lower case."""
     missing: Mapped[bool] = mapped_column(default=False)
     """Whether the folder does not have the file."""
 
@@ -178,23 +175,9 @@ class TraceTagRow(Table):
     """One tag of a trace."""
 
     __tablename__ = "trace_tags"
-    __table_args__ = (Index("trace_tags_listed", "tag", "created", "trace"),)
 
     trace: Mapped[str] = mapped_column(ForeignKey("traces.id", ondelete="CASCADE"), primary_key=True)
     tag: Mapped[str] = mapped_column(String(40), primary_key=True)
-    created: Mapped[datetime] = mapped_column(server_default="1970-01-01 00:00:00")
-    """When its trace was recorded: traces with a tag are read in the order of the list."""
-
-
-class TraceStretchRow(Table):
-    """One character, or pair of neighbouring characters, that texts of a stretch of the list have (stretches.py)."""
-
-    __tablename__ = "trace_stretches"
-    __table_args__ = {"sqlite_with_rowid": False}
-
-    robot: Mapped[str] = mapped_column(String(32), primary_key=True)
-    term: Mapped[str] = mapped_column(String(2), primary_key=True)
-    stretch: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
 
 
 class JobRow(Submitted, Table):

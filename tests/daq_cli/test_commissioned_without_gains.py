@@ -9,7 +9,6 @@ from typing import cast
 
 import pytest
 
-from benchmarks.secret_maps import BoardArm, BoardPage
 from daq.commissioning.memory.commands import CommandProof
 from daq.commissioning.memory.findings import Findings
 from daq.commissioning.memory.map_text import memory_map_text
@@ -29,6 +28,7 @@ from firmware_protocol.memory_map import MemoryMap, default_memory_map
 from mock_controller.device import build_device
 from mock_controller.hidden.memory import draw_memory
 from mock_controller.options import Options
+from tests.daq.commissioning.memory.secret_maps import BoardArm, BoardPage
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.test_commission import Hand
 

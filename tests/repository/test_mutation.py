@@ -1,10 +1,7 @@
 """The mutation tool makes the faults it promises, and its list of equivalent mutants names faults that exist."""
 
-from types import FunctionType
-
-from benchmarks.forked_mutants import change_of
 from benchmarks.mutants import Mutant, mutants_of
-from benchmarks.mutation import ROOT, Baseline, equivalents, mirrored_folder, reaching
+from benchmarks.mutation import ROOT, chosen_tests, equivalents, mirrored_folder, reaching
 
 SOURCE = b'''"""Text 1."""
 LIMIT: float = 2.0
@@ -66,53 +63,10 @@ def test_tools_beside_the_sources_of_the_bridge_are_tried_by_the_tests_of_the_br
     assert mirrored_folder("mock_controller/board/board.py").is_relative_to(ROOT / "tests" / "mock")
 
 
-PARTS = b"""
-LIMIT = 2
-
-def outer(x, step=1):
-    def inner(y):
-        return y + 3
-    return [inner(each) for each in x]
-
-class Box:
-    size: int = 4
-    @property
-    def half(self):
-        return self.size / 5
-"""
-
-
-def test_tests_that_fail_without_any_fault_or_take_too_long_are_left_out_and_the_quickest_file_comes_first() -> None:
-    baseline = Baseline({"a.py::x": 2.0, "a.py::y": 9.0, "b.py::x": 1.0, "c.py::x": 0.1}, 5.0, ("b.py::y", "c.py::y"))
-    chosen = baseline.tests(("a.py", "b.py"))
-    assert (chosen.files, chosen.deselected, chosen.seconds) == (("b.py", "a.py"), ("b.py::y", "a.py::y"), 3.0)
-
-
-def test_only_the_code_of_functions_can_be_changed_in_a_process_that_has_imported_them() -> None:
-    """What a number belongs to, of which the mutant makes another: a function's own code or that of one inside it."""
-    changes = {
-        mutant.was: change_of(PARTS, mutant, "parts.py")
-        for mutant in mutants_of(PARTS, "parts.py")
-        if mutant.was.isdigit()
-    }
-    assert {was: None if change is None else change[0] for was, change in changes.items()} == {
-        "2": None,  # decided at import
-        "1": None,
-        "3": "outer",
-        "4": None,
-        "5": "Box.half",
-    }
-
-
-def test_the_changed_code_does_what_the_mutant_does() -> None:
-    (mutant,) = [each for each in mutants_of(PARTS, "parts.py") if each.was == "3"]
-    change = change_of(PARTS, mutant, "parts.py")
-    assert change is not None
-    space: dict[str, FunctionType] = {}
-    exec(compile(PARTS, "parts.py", "exec"), space)
-    before = space["outer"]([1, 2])
-    space["outer"].__code__ = change[1]
-    assert (before, space["outer"]([1, 2])) == ([4, 5], [5, 6])
+def test_tests_that_take_too_long_are_left_out_and_the_quickest_file_comes_first() -> None:
+    seconds = {"a.py::x": 2.0, "a.py::y": 9.0, "b.py::x": 1.0, "c.py::x": 0.1}
+    chosen = chosen_tests(("a.py", "b.py"), seconds, longest_s=5.0)
+    assert (chosen.files, chosen.deselected, chosen.seconds) == (("b.py", "a.py"), ("a.py::y",), 3.0)
 
 
 def test_every_equivalent_mutant_exists() -> None:

@@ -16,9 +16,9 @@ import httpx
 import pytest
 from websockets.sync.client import connect
 
-from benchmarks.hostile_files import bomb, sound_trace
 from benchmarks.service_process import child
 from server.ending import FORCED
+from tests.server.hostile_files import bomb, sound_trace
 from tests.server.service import running_service
 
 WITHIN = 5.0

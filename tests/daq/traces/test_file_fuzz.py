@@ -1,10 +1,10 @@
-"""Every reader of files takes damaged ones in one line, or says what is missing of them (`benchmarks.file_fuzz`)."""
+"""Every reader of files takes damaged ones in one line, or says what is missing of them (`file_fuzz`)."""
 
 from pathlib import Path
 
 import pytest
 
-from benchmarks.file_fuzz import CASES, campaign
+from tests.daq.traces.file_fuzz import CASES, campaign
 
 
 @pytest.mark.parametrize("cases", [700, pytest.param(CASES, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])

@@ -12,9 +12,6 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 
-from benchmarks.damaged_traces import Original, originals, recompressed, records
-from benchmarks.trace_damage import campaign
-from benchmarks.trace_damage import record as sound_record
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import layout, set_points_taken
@@ -24,8 +21,11 @@ from daq.traces.inflate import inflate
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
 from daq.traces.verify import verify
+from tests.daq.traces.damaged_traces import Original, originals, recompressed, records
 from tests.daq.traces.samples import write
 from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
+from tests.daq.traces.trace_damage import CASES, campaign
+from tests.daq.traces.trace_damage import record as sound_record
 
 HEAD = 9
 SIZE_IN_CHUNK = HEAD + 16
@@ -325,9 +325,13 @@ def test_a_part_file_is_never_complete_even_when_only_its_name_was_missing(
     assert read_trace(path).record.outcome is None
 
 
-def test_an_excerpt_of_the_damage_campaign_finds_no_fault(tmp_path: Path) -> None:
-    """Two hundred damaged files of `python -m benchmarks trace_damage`, always the same."""
-    tally = campaign(200, 11, tmp_path, share=0.005)
+@pytest.mark.parametrize(
+    ("cases", "seed", "share"),
+    [(200, 11, 0.005), pytest.param(CASES, 1, 1.0, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])],
+)
+def test_damaged_traces_give_one_line_or_their_own_samples(tmp_path: Path, cases: int, seed: int, share: float) -> None:
+    """Damage at random; length fields at their boundaries; records left out, doubled, emptied, swapped."""
+    tally = campaign(cases, seed, tmp_path, share=share)
     assert (tally.examples, sum(tally.faults.values())) == ([], 0)
     assert tally.ends["salvaged"] > 10
     assert tally.ends["put aside"] > 5

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from mcap.opcode import Opcode
 
-from benchmarks.damaged_traces import HEAD, originals, records
-from benchmarks.trace_damage import record as sound_record
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces.reader import read_trace
 from daq.traces.scan import scan
+from tests.daq.traces.damaged_traces import HEAD, originals, records
+from tests.daq.traces.trace_damage import record as sound_record
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from daq.trajectories.presets import preset
 from tests.model.discrepancy import outside_arm
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.recording import recorded
-from tests.worlds.folder import write_world
+from trials.rigs.folder import write_world
 
 ROOT = Path(__file__).parents[3]
 Made = Callable[[Path], tuple[Machine, Trace]]

@@ -7,13 +7,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from alembic import command
-from sqlalchemy import text
 
 from server.clock import SystemClock
-from server.problems import ProblemError
-from server.store.engine import Store, migrations
-from server.store.experiments import ExperimentStore
 from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at
 from tests.server.inside import service_inside
 from tests.server.polling import until
@@ -99,45 +94,6 @@ def test_a_user_of_this_computer_owns_the_arm_unless_it_names_its_owners(
     robot: httpx.Client, people: dict[str, Person]
 ) -> None:
     assert robot.post(f"/experiments/{people['anna'].submit()}/cancel").status_code == 200
-
-
-def test_a_database_of_before_keeps_roles_and_its_experiments_get_their_owners(tmp_path: Path) -> None:
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    config = migrations()
-    with store.engine.connect() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, "0008")
-        new = "INSERT INTO tokens (id, name, role, digest, created) VALUES"
-        connection.execute(
-            text(f"{new} ('1', 'anna', 'operator', 'x', '2026-01-01'), ('2', 'vera', 'viewer', 'y', '2026-01-01')")
-        )
-        connection.execute(
-            text(
-                "INSERT INTO schedules (id, robot, spec, every, starts, priority, active, submitted_runs, created, "
-                "created_by) VALUES ('s', 'ma2000', '{}', 60, '2026-01-01', 0, 0, 1, '2026-01-01', 'bert')"
-            )
-        )
-        columns = "id, robot, state, submitted, submitted_by, reason, spec, priority, trace, schedule"
-        begun = f"INSERT INTO experiments ({columns})"
-        connection.execute(
-            text(
-                f"{begun} VALUES ('a', 'ma2000', 'queued', '2026-01-01', 'anna', '', '{{}}', 0, 'a', NULL), "
-                "('b', 'ma2000', 'done', '2026-01-01', 'schedule s', '', '{}', 0, 'b', 's'), "
-                "('c', 'ma2000', 'done', '2026-01-01', 'schedule t', '', '{}', 0, 'c', 't')"
-            )
-        )
-        connection.commit()
-    store.migrate()
-    with store.reading() as session:
-        assert dict(session.execute(text("SELECT name, role FROM tokens")).all()) == {  # type: ignore[arg-type]
-            "anna": "operator",
-            "vera": "viewer",
-        }
-    experiments = ExperimentStore(store)
-    assert [experiments.get("ma2000", one).owner for one in "abc"] == ["anna", "bert", "schedule t"]
-    with pytest.raises(ProblemError):
-        experiments.get("ma2000", "d")
-    store.close()
 
 
 def test_a_fleet_s_experiment_belongs_to_whoever_submits_it(people: dict[str, Person]) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.dask_processes import cluster
+from tests.server.batches.dask_processes import cluster
 from tests.server.batches.traces import folder_of_traces, number
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]

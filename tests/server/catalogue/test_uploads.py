@@ -16,7 +16,6 @@ from typing import Any
 import httpx
 import pytest
 
-from benchmarks.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
 from daq.contracts.machine import load_machine
 from model.machine_model.model import Model, base_model
 from server.bounded.messages import Limits, ReadModel, ReadUpload
@@ -24,6 +23,7 @@ from server.bounded.process import LONGEST_LINE, answer_order
 from server.bounded.workers import ExhaustedError, Workers
 from server.problems import ProblemError
 from tests.daq.traces.test_formats import FORMAT_1
+from tests.server.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
 from tests.server.service import Service
 
 MCAP, CSV = {"Content-Type": "application/octet-stream"}, {"Content-Type": "text/csv"}

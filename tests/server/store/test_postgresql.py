@@ -6,16 +6,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from alembic import command
-from sqlalchemy import insert, text
+from sqlalchemy import text
 
 from server.clock import SystemClock
 from server.stopping.tokens import reader_of
 from server.store.address import open_engine
-from server.store.engine import Store, StoreError, migrations
+from server.store.engine import Store, StoreError
 from server.store.lock import InUseError, ServerLock, sole_use
-from server.store.tables import TraceRow
-from server.store.traces import TraceSearch, TraceStore
+from server.store.traces import TraceStore
 from tests.server.inside import service_inside
 from tests.server.postgresql import PostgresServer
 from tests.server.store.rows import new_trace
@@ -64,44 +62,6 @@ def test_the_lock_is_taken_again_after_the_server_was_away_unless_another_servic
         assert not lock.look()
     lock.close()
     engine.dispose()
-
-
-def test_an_older_database_is_brought_up_to_date_and_searched(postgresql: PostgresServer) -> None:
-    store = Store(postgresql.database(template="made1"))
-    config = migrations()
-    with store.engine.connect() as connection:
-        config.attributes["connection"] = connection
-        command.downgrade(config, "0005")
-        connection.commit()
-    _insert_as_older_versions_did(store, "brass bush")
-    store.migrate()
-    store.require_sound()
-    traces = TraceStore(store)
-    for text_ in ("ass bu", "ss", "h"):
-        assert [one.id for one in traces.found("ma2000", TraceSearch(text=text_), None, 10).items] == [f"{1:012x}"]
-    store.close()
-
-
-def _insert_as_older_versions_did(store: Store, notes: str) -> None:
-    row = {
-        **new_trace(1, notes=notes).__dict__,
-        "joints": [1, 2, 3],
-        "missing": False,
-        "searched": f"{1:012x}\n{notes}",
-    }
-    with store.writing() as session:
-        session.execute(insert(TraceRow), [row])
-
-
-def test_a_lost_extension_costs_speed_and_finds_the_same(postgresql: PostgresServer) -> None:
-    store = Store(postgresql.database(template="made1"))
-    with store.writing() as session:
-        session.execute(text("DROP EXTENSION pg_trgm CASCADE"))
-    store.migrate()
-    traces = TraceStore(store)
-    traces.insert(new_trace(1, notes="brass bush"))
-    assert [one.id for one in traces.page("ma2000", TraceSearch(text="ass bu"), None, 10).items] == [f"{1:012x}"]
-    store.close()
 
 
 def test_the_stop_listener_reads_its_tokens_there(postgresql: PostgresServer) -> None:

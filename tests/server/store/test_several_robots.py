@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from alembic import command
-from sqlalchemy import text
-
-from server.store.engine import Store, migrations
+from server.store.engine import Store
 from server.store.models import ModelStore, NewModel
 from server.store.traces import TraceStore
 from tests.server.store.rows import NOW, new_trace
@@ -37,17 +34,3 @@ def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Stor
     traces.mark_missing("left", {"1.mcap", "2.mcap"}, missing=True)
     assert traces.get("left", f"{1:012x}").missing
     assert not traces.get("right", f"{2:012x}").missing
-
-
-def test_models_survive_the_migration_and_its_undoing(sqlite_store: Store) -> None:
-    config = migrations()
-    ModelStore(sqlite_store).insert(new_model("left"), lambda: None)
-    ModelStore(sqlite_store).insert(new_model("right"), lambda: None)
-    with sqlite_store.engine.connect() as connection:
-        config.attributes["connection"] = connection
-        command.downgrade(config, "0006")
-        connection.commit()
-        assert connection.execute(text("SELECT robot, name FROM models")).all() == [("left", "of left")]
-        command.upgrade(config, "0008")
-        connection.commit()
-    assert ModelStore(sqlite_store).get("left", "m1").created == NOW

@@ -1,4 +1,4 @@
-"""The database: tables and migrations agree, catalogue and cursors do what they say."""
+"""The database: catalogue and cursors do what they say."""
 
 from __future__ import annotations
 
@@ -9,11 +9,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from alembic import command
-from alembic.autogenerate import compare_metadata
-from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import event, inspect, select, text, update
+from sqlalchemy import event, select, text, update
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
@@ -33,7 +30,7 @@ from server.store.experiments import ExperimentStore
 from server.store.lock import sqlite_file
 from server.store.pages import Cursor
 from server.store.remembered import Remembered
-from server.store.tables import ArchivedRow, Table, TraceTagRow
+from server.store.tables import ArchivedRow, TraceTagRow
 from server.store.traces import TraceSearch, TraceStore
 from tests.server.store.rows import new_trace
 
@@ -62,30 +59,7 @@ def test_a_folders_name_is_no_syntax_of_an_address(tmp_path: Path, name: str) ->
     assert head_of_audit(folder / "service.sqlite") == "nothing"
 
 
-def test_tables_are_those_of_the_migrations(store: Store) -> None:
-    with store.engine.connect() as connection:
-        options = {"include_name": _is_of_an_object}
-        assert compare_metadata(MigrationContext.configure(connection, opts=options), Table.metadata) == []
-
-
-def _is_of_an_object(name: str | None, kind: str, _parents: object) -> bool:
-    """Tables and indexes of the search differ between the databases: they stand in the migration alone."""
-    return name not in {"traces_found", "traces_words", "traces_by_kind", "traces_by_outcome"} and not (
-        kind == "table" and str(name).startswith(("trace_numbers", "trace_words"))
-    )
-
-
-def test_migrations_lead_back_too(store: Store) -> None:
-    config = migrations()
-    with store.engine.connect() as connection:
-        config.attributes["connection"] = connection
-        command.downgrade(config, "base")
-        connection.commit()
-        left = set(inspect(connection).get_table_names())
-    assert left <= {"alembic_version", "sqlite_sequence"}
-
-
-def test_a_database_of_a_newer_version_is_refused(store: Store) -> None:
+def test_a_database_of_another_version_is_refused(store: Store) -> None:
     with store.writing() as session:
         session.execute(text("UPDATE alembic_version SET version_num='9999'"))
     with pytest.raises(StoreError, match="cannot be brought up to date"):
@@ -348,8 +322,7 @@ def test_the_search_follows_every_change_of_a_text(store: Store) -> None:
     assert (found("brass"), found("ring")) == ([], [])
 
 
-def test_texts_of_many_traces_are_found_in_the_order_of_the_list(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.store.traces.FEW", 3)
+def test_texts_are_found_in_the_order_of_the_list_page_by_page(store: Store) -> None:
     traces = TraceStore(store)
     for number in range(8):
         traces.insert(new_trace(number, notes="rare" if number in {2, 5} else "often"))

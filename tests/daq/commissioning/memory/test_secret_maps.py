@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.secret_maps import LEAST_FOUND, TARGET, Score, search
 from firmware_protocol.memory_map import JOINTS
 from mock_controller.hidden.memory import Documented
+from tests.daq.commissioning.memory.secret_maps import LEAST_FOUND, TARGET, Score, search
 
 
 def require(score: Score) -> None:

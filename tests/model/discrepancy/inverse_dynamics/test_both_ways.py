@@ -19,7 +19,7 @@ from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine
 from tests.model.discrepancy.steps import answer_of, step
-from tests.worlds.folder import write_world
+from trials.rigs.folder import write_world
 
 MODEL = base_model(slide_machine())
 LITTLE, PLENTY = 0.3 * both_ways.PLAIN, 3.0 * both_ways.PLAIN

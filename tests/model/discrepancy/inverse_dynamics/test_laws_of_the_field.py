@@ -10,7 +10,7 @@ from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
-from tests.worlds.folder import write_world
+from trials.rigs.folder import write_world
 
 
 @pytest.mark.timeout(300)

@@ -28,7 +28,7 @@ from model.discrepancy.inverse_dynamics.search import Fitted
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
-from tests.worlds.folder import write_world
+from trials.rigs.folder import write_world
 
 SAMPLE = 0.002
 """s between the samples of `slide_trace`."""

@@ -21,7 +21,7 @@ from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.steps import step
-from tests.worlds.folder import write_world
+from trials.rigs.folder import write_world
 
 
 def of_world(folder: Path, kind: str, seed: int, case: str | None = None) -> Diagnosis:

@@ -1,0 +1,324 @@
+"""Files of every kind that is read, damaged at random: what a reader does with them.
+
+Nothing may end in another error than DaqError, in one line of bounded length; and what is read of a trace is the whole
+of what the file has, or its notes say what is missing. The files of traces themselves have `trace_damage`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import random
+<<<<<<< HEAD:benchmarks/file_fuzz.py
+import sys
+import time
+=======
+>>>>>>> line-d:tests/daq/traces/file_fuzz.py
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+<<<<<<< HEAD:benchmarks/file_fuzz.py
+from benchmarks.damaged_traces import AT_RANDOM
+from benchmarks.figures import Figure, at_least, at_most, show_campaign
+=======
+>>>>>>> line-d:tests/daq/traces/file_fuzz.py
+from daq.config.robot_files import load_memory_map
+from daq.config.settings import load_settings
+from daq.contracts.documents import read_document
+from daq.contracts.errors import DaqError
+from daq.contracts.experiment import ExperimentSpec, parse_spec
+from daq.contracts.machine import Machine, load_machine
+from daq.contracts.trace import Trace
+from daq.contracts.trace_limits import TraceLimits
+from daq.teaching.program import load_program
+from daq.traces.bag_storage import JOINT_STATE
+from daq.traces.csv_table import import_csv
+from daq.traces.ros_bag import BagChoice, import_bag
+from model.machine_model.model import base_model
+from model.machine_model.model_file import load_model, save_model
+from model.robot_files.urdf_reader import read_urdf
+from tests.daq.traces.damaged_traces import AT_RANDOM
+
+CASES = 60_000
+ROWS = 60
+LONGEST_LINE = 1000
+"""Most characters of an error, its file's path among them."""
+LIMITS = TraceLimits(file_bytes=1 << 24, chunk_bytes=1 << 22, total_bytes=1 << 24)
+"""No file here has a hundredth of it, so that a length that is a lie is refused and not allocated."""
+PROGRAM = b"""name = "a"
+instructions = [
+  {kind = "absolute", angles = {1 = 2.5, 2 = 2.1}, speed = 0.3},
+  {kind = "wait", duration = 2.0},
+]
+"""
+HOME = Path(__file__).parents[3]
+
+Read = Callable[[Path], Any]
+Damage = Callable[[random.Random, bytes], bytes]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file: what is opened, the file of it that is damaged and its sound content, and the reader."""
+
+    name: str
+    opened: Path
+    damaged: Path
+    read: Read
+    data: bytes
+
+
+@dataclass
+class Tally:
+    """Counts; the first few of each fault are kept."""
+
+    ends: Counter[str] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
+    examples: list[str] = field(default_factory=list)
+<<<<<<< HEAD:benchmarks/file_fuzz.py
+    slowest: float = 0.0
+    """s that this process computed for one file: what it waited on a busy computer says nothing of a reader."""
+    slowest_file: str = ""
+=======
+>>>>>>> line-d:tests/daq/traces/file_fuzz.py
+
+    def fault(self, fault: str, kind: Kind, way: str, detail: str) -> None:
+        """Counts a fault."""
+        self.faults[fault] += 1
+        if self.faults[fault] <= 5:
+            self.examples.append(f"{fault}: {kind.name}, {way}: {detail[:300]}")
+
+
+# ---- damage of texts, beside that of disks
+
+
+def _inserted(piece: Callable[[random.Random], bytes]) -> Damage:
+    def damage(rng: random.Random, data: bytes) -> bytes:
+        at = rng.randrange(len(data) + 1)
+        return data[:at] + piece(rng) + data[at:]
+
+    return damage
+
+
+def _number(rng: random.Random, data: bytes) -> bytes:
+    """A digit becomes a number beyond measure."""
+    digits = [at for at, byte in enumerate(data) if 48 <= byte <= 57]
+    if not digits:
+        return data + b"9"
+    at = rng.choice(digits)
+    number = rng.choice((b"1e308", b"-1e999", b"9" * 5000, b"nan", b"0x1", b"1_0", b"-0", b"inf", b"2147483648"))
+    return data[:at] + number + data[at + 1 :]
+
+
+def _encoded(rng: random.Random, data: bytes) -> bytes:
+    """The same text in another encoding, or with a byte-order mark."""
+    text = data.decode("utf-8", "replace")
+    encoding = rng.choice(("utf-8-sig", "utf-16", "utf-16-be", "utf-32", "latin-1", "cp037"))
+    return text.encode(encoding, "replace")
+
+
+DAMAGES: dict[str, Damage] = {
+    **AT_RANDOM,
+    "NULs put in": _inserted(lambda rng: bytes(rng.choice((1, 3, 100_000)))),
+    "characters put in": _inserted(lambda rng: rng.choice((b"[", b"{", b'"', b"<", b"\n", b",", b"=", b"]" * 5000))),
+    "nested deeply": _inserted(lambda rng: rng.choice((b"[", b'{"a":', b"<a>")) * rng.choice((100, 20_000))),
+    "numbers beyond measure": _number,
+    "other encodings": _encoded,
+}
+
+
+# ---- files
+
+
+def _bag(folder: Path, kind: str) -> Path:
+    """A bag of joint states of two joints that move, written by its own library."""
+    store: Any = get_typestore(Stores.ROS1_NOETIC if kind == "ROS 1" else Stores.ROS2_JAZZY)
+    types = store.types
+    messages = []
+    for number in range(ROWS):
+        moment = 1_700_000_000 * 10**9 + number * 10**7
+        stamp = types["builtin_interfaces/msg/Time"](sec=moment // 10**9, nanosec=moment % 10**9)
+        own = {"seq": number} if kind == "ROS 1" else {}
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **own)
+        values = {name: np.array([0.1 * number, -0.2 * number]) for name in ("position", "velocity", "effort")}
+        message = types[JOINT_STATE](header=header, name=["pan", "lift"], **values)
+        write = store.serialize_ros1 if kind == "ROS 1" else store.serialize_cdr
+        messages.append((moment, bytes(write(message, JOINT_STATE))))
+    if kind == "ROS 1":
+        with Writer1(folder / "a.bag") as old:
+            connection = old.add_connection("/joint_states", JOINT_STATE, typestore=store)
+            for moment, data in messages:
+                old.write(connection, moment, data)
+        return folder / "a.bag"
+    if kind == "MCAP":
+        with (folder / "a.mcap").open("wb") as stream:
+            writer = Writer(stream, chunk_size=2000, enable_data_crcs=True)
+            writer.start("ros2", "fuzz")
+            channel = writer.register_channel(
+                "/joint_states", "cdr", writer.register_schema(JOINT_STATE, "ros2msg", b"")
+            )
+            for moment, data in messages:
+                writer.add_message(channel, moment, data, moment)
+            writer.finish()  # type: ignore[no-untyped-call]
+        return folder / "a.mcap"
+    with Writer2(folder / "a", version=9, storage_plugin=StoragePlugin.SQLITE3) as new:
+        connection2 = new.add_connection("/joint_states", JOINT_STATE, typestore=store)
+        for moment, data in messages:
+            new.write(connection2, moment, data)
+    return folder / "a"
+
+
+def _read_bag(path: Path) -> Trace:
+    return import_bag(path, LIMITS, BagChoice(drive_unit="N·m"))
+
+
+def _texts(folder: Path) -> dict[str, tuple[bytes, Read]]:
+    """Content and reader of each kind of text."""
+    rows = b"".join(b"%.2f,0.5,%.6f,%.3f\n" % (0.01 * k, 0.01 * k, k - 30) for k in range(ROWS))
+    settings = b'[robot]\nport = "mock://"\n[server]\nport = 8300\nnames = ["a"]\n[traces.limits]\njoints = 6\n'
+    model = save_model(base_model(load_machine("ma2000")), folder / "model.json")
+
+    def machine(path: Path) -> Machine:
+        return load_machine(str(path))
+
+    def spec(path: Path) -> ExperimentSpec:
+        return parse_spec(read_document(path, str(path)), str(path))
+
+    return {
+        "rig.csv": (b"time,set_point_1,position_1,drive_1\n" + rows, lambda path: import_csv(path, LIMITS)),
+        "machine.toml": ((HOME / "daq/contracts/machines/ma2000.toml").read_bytes(), machine),
+        "pendulum.toml": ((HOME / "examples/double_pendulum.toml").read_bytes(), machine),
+        "daq.toml": (settings, load_settings),
+        "program.toml": (PROGRAM, load_program),
+        "map.toml": ((HOME / "firmware_protocol/memory_map.toml").read_bytes(), load_memory_map),
+        "spec.json": (ExperimentSpec().model_dump_json(indent=1).encode(), spec),
+        "spec.toml": (b'joints = [1, 2]\n[trajectory]\nkind = "ramp"\n', spec),
+        "arm.urdf": ((HOME / "examples/reach_arm.urdf").read_bytes(), read_urdf),
+        "model.json": (model.read_bytes(), load_model),
+    }
+
+
+def kinds(folder: Path) -> list[Kind]:
+    """A sound file of every kind, each in a folder of its own."""
+    found = []
+    for name, (data, read) in _texts(folder).items():
+        own = folder / name.replace(".", " ")
+        own.mkdir()
+        (own / name).write_bytes(data)
+        found.append(Kind(name, own / name, own / name, read, data))
+    for name, kind, inside in (
+        ("bag of ROS 1", "ROS 1", ""),
+        ("bag of MCAP", "MCAP", ""),
+        ("bag of SQLite", "SQLite", "a.db3"),
+        ("metadata of a bag", "SQLite", "metadata.yaml"),
+    ):
+        (folder / name).mkdir()
+        bag = _bag(folder / name, kind)
+        changed = bag / inside if inside else bag
+        found.append(Kind(name, bag, changed, _read_bag, changed.read_bytes()))
+    return found
+
+
+# ---- what comes of it
+
+
+class Campaign:
+    """Damaged files, one after the other."""
+
+    def __init__(self, folder: Path) -> None:
+        self.kinds = kinds(folder)
+        self.tally = Tally()
+        self._sound = {kind.name: kind.read(kind.opened) for kind in self.kinds}
+
+    def run(self, cases: Iterator[tuple[Kind, str, bytes]]) -> Tally:
+        """Reads each file."""
+        for kind, way, data in cases:
+<<<<<<< HEAD:benchmarks/file_fuzz.py
+            begun = time.process_time()
+            kind.damaged.write_bytes(data)
+            self._case(kind, way, data)
+            kind.damaged.write_bytes(kind.data)
+            took = time.process_time() - begun
+            if took > self.tally.slowest:
+                self.tally.slowest, self.tally.slowest_file = took, f"{kind.name}, {way}"
+            self.tally.cases += 1
+=======
+            kind.damaged.write_bytes(data)
+            self._case(kind, way, data)
+            kind.damaged.write_bytes(kind.data)
+>>>>>>> line-d:tests/daq/traces/file_fuzz.py
+        return self.tally
+
+    def _case(self, kind: Kind, way: str, data: bytes) -> None:
+        try:
+            found = kind.read(kind.opened)
+        except DaqError as error:
+            line = str(error)
+            if "\n" in line or len(line) > LONGEST_LINE:
+                self.tally.fault("errors of several or endless lines", kind, way, line)
+            self.tally.ends["refused"] += 1
+        except Exception as error:  # noqa: BLE001  # that is what is counted
+            self.tally.fault("other exceptions", kind, way, repr(error))
+        else:
+            self.tally.ends["read"] += 1
+            if isinstance(found, Trace):
+                self._judge(kind, way, data, found)
+
+    def _judge(self, kind: Kind, way: str, data: bytes, found: Trace) -> None:
+        """A CSV has no checksums: it is held against its own rows. A bag is held against what was written."""
+        if kind.name == "rig.csv":
+            lines = [line for line in data.removeprefix(b"\xef\xbb\xbf").replace(b"\r", b"\n").split(b"\n") if line]
+            expected = len(lines) - 1
+        else:
+            expected = ROWS
+        said = "INCOMPLETE" in found.record.notes or "left out" in found.record.notes
+        if len(found) < expected and not said:
+            self.tally.fault("samples lost without a word", kind, way, f"{len(found)} of {expected}")
+        if kind.name == "bag of MCAP" and not set(found.position[:, 0]) <= set(self._sound[kind.name].position[:, 0]):
+            self.tally.fault("wrong samples", kind, way, found.record.notes)
+
+
+def damaged(chosen: list[Kind], rng: random.Random) -> Iterator[tuple[Kind, str, bytes]]:
+    """An endless sequence: each kind and each way in turn."""
+    while True:
+        for kind in chosen:
+            for way, damage in DAMAGES.items():
+                yield kind, way, damage(rng, kind.data)
+
+
+def campaign(cases: int, seed: int, folder: Path) -> Tally:
+    """So many damaged files."""
+    running = Campaign(folder)
+    return running.run(itertools.islice(damaged(running.kinds, random.Random(seed)), cases))
+<<<<<<< HEAD:benchmarks/file_fuzz.py
+
+
+def figures(tally: Tally) -> list[Figure]:
+    """What was found, beside what may be."""
+    ends = ", ".join(f"{count} {end}" for end, count in sorted(tally.ends.items()))
+    faults = ("other exceptions", "errors of several or endless lines", "samples lost without a word", "wrong samples")
+    return [
+        at_least("damaged files", tally.cases, 50_000, "", ends),
+        *(at_most(fault, tally.faults[fault], 0, "") for fault in faults),
+        at_most("slowest file", tally.slowest, 5.0, "s", tally.slowest_file),
+    ]
+
+
+def main() -> int:
+    """The exit code: 1 when a target was missed."""
+    return show_campaign("file_fuzz", "Damaged files of every kind", CASES, campaign, figures, __doc__)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
+=======
+>>>>>>> line-d:tests/daq/traces/file_fuzz.py

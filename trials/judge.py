@@ -1,0 +1,209 @@
+"""What `daq diagnose` answers on test rigs that share no code with it: names, joints and false alarms by kind of rig.
+
+    python -m trials.judge --kinds tuning --seeds 0-4 [--case single] [--sharpness] [--folder FOLDER]
+
+Rigs are written by `python -m trials.rigs`; the diagnosis is the command, and sees their `lab` folders only. Answers
+stay in the folder, and a call that was interrupted goes on where it stopped. Kinds of REPORTING are for registered
+trials: they are refused without `--reporting`, since a kind that was looked at can no longer be used to report.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from trials.rigs.folder import write_world
+from trials.rigs.kinds import KINDS, REPORTING, TUNING
+from trials.rigs.world import CASES, case_of
+
+Json = dict[str, Any]
+
+LONGEST = 900.0
+"""s that a diagnosis may take; one that takes longer gives no answer."""
+HONEST = ("unknown-effect", "suspected", "ambiguous")
+"""Verdicts that are right of an effect outside the library, if no step gives it one name."""
+TOLD_APART = 5.0
+"""Least d′ at which a rival, or the sound arm, is told apart."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """What an answer is worth; None where the question is not asked."""
+
+    strict: bool | None = None
+    answered: bool | None = None
+    sharp: bool | None = None
+    joints: bool | None = None
+    both: bool | None = None
+    honest: bool | None = None
+    alarm: bool | None = None
+
+
+QUESTIONS = {
+    "strict": "strict name",
+    "answered": "in the answer",
+    "sharp": "as sharp as allowed",
+    "joints": "joint right",
+    "both": "pair: both, no other",
+    "honest": "not in the library: honest",
+    "alarm": "false alarm",
+}
+"""Fields of a score, in words."""
+
+
+def names_of(answer: Json) -> list[set[str]]:
+    """By adopted step, the names that it gives: one, or those of its group."""
+    adopted = [step for step in answer["steps"] if step["adopted"]]
+    return [{step["effect"], *(member["effect"] for member in step["group"])} for step in adopted]
+
+
+def score(truth: Json, answer: Json | None) -> Score:
+    """An answer (None: there is none) held against the truth."""
+    case = truth["case"]
+    steps = names_of(answer) if answer else []
+    verdict = answer["verdict"] if answer else "failed"
+    if case == "sound":
+        return Score(alarm=verdict != "nothing-significant")
+    if case == "open":
+        named = any(len(names) == 1 for names in steps) and verdict != "suspected"
+        return Score(honest=verdict in HONEST and not named)
+    known = [{_known_as(hidden)} for hidden in truth["hidden"]]
+    parts = [right | set(hidden.get("beside", ())) for right, hidden in zip(known, truth["hidden"], strict=True)]
+    if case == "pair":
+        single = [names for names in steps if len(names) == 1]
+        found = [any(names & right for names in single) for right in known]
+        no_other = all(any(names & part for part in parts) for names in steps)
+        return Score(both=verdict == "named" and all(found) and no_other)
+    right, part, joint = known[0], parts[0], truth["hidden"][0]["joint"]
+    strict = verdict == "named" and all(len(names) == 1 and names <= part for names in steps)
+    strict = strict and any(names == right for names in steps)
+    answered = any(names & right for names in steps)
+    places = [step["joints"] for step in (answer or {}).get("steps", []) if step["adopted"] and step["effect"] in right]
+    wanted = [] if joint is None else [joint]
+    return Score(strict, answered, _as_sharp(truth, steps, strict, answered), _same(places, wanted))
+
+
+def _known_as(hidden: Json) -> str:
+    """What the library calls a hidden effect; folders of earlier versions have the name by which it was drawn alone."""
+    return str(hidden.get("known_as") or hidden["name"])
+
+
+def _same(places: Sequence[list[int]], wanted: list[int]) -> bool | None:
+    return all(place == wanted for place in places) if places else None
+
+
+def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) -> bool | None:
+    """The name where it can be told from every other, a group of what it cannot be told from else; None where the names
+    that were given were not compared, or the effect itself cannot be told from a sound arm."""
+    rivals = truth.get("sharpness")
+    if not rivals or any(rival["name"] == "none" and rival["d_prime"] < TOLD_APART for rival in rivals):
+        return None
+    compared = {rival["name"] for rival in rivals} | {_known_as(truth["hidden"][0])}
+    if not strict and not all(names <= compared for names in steps):
+        return None
+    untold = {rival["name"] for rival in rivals if rival["d_prime"] < TOLD_APART}
+    right = {_known_as(truth["hidden"][0])}
+    if not untold - right:
+        return strict
+    return strict or (answered and all(names <= untold | right for names in steps))
+
+
+def diagnose(lab: Path, longest: float = LONGEST) -> Json | None:
+    """The answer of the command in a rig's folder, from its own records alone; None when it fails or is too late."""
+    command = [str(Path(sys.executable).parent / "daq"), "diagnose", "training.csv", "--holdout", "held_out.csv"]
+    environment = {name: value for name, value in os.environ.items() if not name.upper().startswith("DAQ_")}
+    try:
+        run = subprocess.run(
+            [*command, "--model", "machine.toml", "--json"],
+            cwd=lab,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=longest,
+        )
+    except subprocess.TimeoutExpired:
+        print(f"{lab}: no answer within {longest:.0f} s", file=sys.stderr)
+        return None
+    if run.returncode:
+        print(f"{lab}: exit code {run.returncode}: {run.stderr.strip()[-300:]}", file=sys.stderr)
+        return None
+    answer: Json = json.loads(run.stdout)
+    return answer
+
+
+def judged(folder: Path, kind: str, seed: int, case: str | None, *, sharp: bool) -> tuple[Json, Json | None, float]:
+    """Truth, answer and seconds of one rig; made where they are not there yet."""
+    place = folder / f"{kind}-{seed}-{case or case_of(seed)}"
+    kept = place / "answer.json"
+    if not kept.exists():
+        write_world(place, kind, seed, case, sharp=sharp)
+        begun = monotonic()
+        answer = diagnose(place / "lab")
+        kept.write_text(json.dumps({"answer": answer, "seconds": monotonic() - begun}), "utf-8")
+    found = json.loads(kept.read_text("utf-8"))
+    return json.loads((place / "truth.json").read_text("utf-8")), found["answer"], found["seconds"]
+
+
+def table(scores: dict[str, list[Score]]) -> list[str]:
+    """Rates by kind, right ones of those that were asked."""
+    lines = [f"{'kind':<18}" + "".join(f"{words:>28}" for words in QUESTIONS.values())]
+    everything = [one for some in scores.values() for one in some]
+    for kind, some in [*scores.items(), ("all", everything)]:
+        cells = []
+        for question in QUESTIONS:
+            asked = [getattr(one, question) for one in some if getattr(one, question) is not None]
+            cells.append(f"{sum(asked)} of {len(asked)}" if asked else "-")
+        lines.append(f"{kind:<18}" + "".join(f"{cell:>28}" for cell in cells))
+    return lines
+
+
+def seeds_of(text: str) -> Iterable[int]:
+    """0-4, or 3,7."""
+    if "-" in text:
+        first, last = text.split("-")
+        return range(int(first), int(last) + 1)
+    return [int(part) for part in text.split(",")]
+
+
+def main() -> int:
+    """The exit code."""
+    parser = argparse.ArgumentParser(prog="python -m trials.judge", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--kinds", default="tuning", help="tuning, reporting, or names: axis-pid,planar-pid")
+    parser.add_argument("--seeds", type=seeds_of, default=range(5))
+    parser.add_argument("--case", choices=CASES, help="instead of each seed's own")
+    parser.add_argument("--folder", type=Path, help="keep rigs and answers here")
+    parser.add_argument("--sharpness", action="store_true", help="also which laws the records can tell apart")
+    parser.add_argument("--reporting", action="store_true", help="kinds for reports may be looked at")
+    asked = parser.parse_args()
+    chosen = {"tuning": list(TUNING), "reporting": list(REPORTING)}.get(asked.kinds) or asked.kinds.split(",")
+    unknown = [kind for kind in chosen if kind not in KINDS]
+    if unknown:
+        parser.error(f"kinds {', '.join(unknown)}: there are {', '.join(KINDS)}")
+    if not asked.reporting and any(kind in REPORTING for kind in chosen):
+        parser.error("a kind for reports is not looked at while anything is tuned; say --reporting if this is a report")
+    folder = asked.folder or Path(tempfile.mkdtemp(prefix="rigs-"))
+    scores: dict[str, list[Score]] = {kind: [] for kind in chosen}
+    for seed in asked.seeds:
+        for kind in chosen:
+            truth, answer, seconds = judged(folder, kind, seed, asked.case, sharp=asked.sharpness)
+            scores[kind].append(score(truth, answer))
+            hidden = ", ".join(f"{_known_as(one)} {one['joint'] or ''}" for one in truth["hidden"]) or truth["case"]
+            said = answer["verdict"] if answer else "failed"
+            names = "; ".join(" | ".join(sorted(names)) for names in names_of(answer or {"steps": []}))
+            print(f"{kind} {seed}: {hidden} -> {said}: {names} ({seconds:.0f} s)", flush=True)
+    print("\n" + "\n".join(table(scores)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

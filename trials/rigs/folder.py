@@ -1,0 +1,48 @@
+"""The folder of a world on the disk."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from trials.rigs.lab import beside_text, machine_text, records_text
+from trials.rigs.rig import Rig
+from trials.rigs.sharpness import sharpness
+from trials.rigs.world import make_world
+
+
+def write_world(
+    folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None, *, sharp: bool = False
+) -> list[Path]:
+    """Writes one rig's folder; the paths. The truth lies beside `lab`, never in it."""
+    world = make_world(kind, seed, case, effect)
+    lab = folder / "lab"
+    lab.mkdir(parents=True, exist_ok=True)
+    texts = {lab / "machine.toml": machine_text(world.rig)}
+    for name, motion in world.records.items():
+        texts[lab / f"{name}.csv"] = records_text(world.rig, motion, name)
+        texts[lab / f"{name}.toml"] = beside_text(world.rig)
+    truth = truth_of(world.rig, world.case)
+    if sharp and world.case in ("single", "sound"):
+        truth["sharpness"] = [asdict(rival) for rival in sharpness(world.rig)]
+    texts[folder / "truth.json"] = json.dumps(truth, indent=1, ensure_ascii=False) + "\n"
+    for path, text in texts.items():
+        path.write_text(text, "utf-8")
+    return list(texts)
+
+
+def truth_of(rig: Rig, case: str) -> dict[str, Any]:
+    """The hidden truth: the effects, and every number of the rig."""
+    names = rig.joints.dtype.names or ()
+    return {
+        "kind": rig.kind_name,
+        "seed": rig.seed,
+        "case": case,
+        "hidden": [asdict(hidden) for hidden in rig.hidden],
+        "bodies": asdict(rig.bodies),
+        "joints": [{name: float(p[name]) for name in names} for p in rig.joints],
+        "loop": {name: float(rig.loop[name][0]) for name in rig.loop.dtype.names or ()},
+        "stated_wrongly": [asdict(tolerance) for tolerance in rig.tolerances],
+    }
