@@ -113,8 +113,12 @@ def _parse(path: str, data: bytes) -> Any:
 
         return loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)  # type: ignore[arg-type]
     lines = [line for line in data.decode("utf-8-sig").splitlines() if not line.lstrip('"').startswith("#")]
-    table = np.genfromtxt(lines[1:], delimiter=",")
-    return {name: table[:, index] for index, name in enumerate(lines[0].split(","))}
+    comma = max(",;\t", key=lines[0].count)
+    head = lines[0].split(comma)
+    if re.fullmatch(r"[-+.\d]+", head[0]):  # no line of names: columns have their numbers
+        head, lines = [str(index) for index in range(len(head))], ["", *lines]
+    table = np.genfromtxt(lines[1:], delimiter=comma)
+    return {name: table[:, index] for index, name in enumerate(head)}
 
 
 def _sum(item: str | list[Any], tables: Sequence[Any]) -> Floats:
