@@ -53,6 +53,8 @@ def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
     repository = find_repository(folder, rig.repository)
     paths = [f"{rig.folder}/{path}".lstrip("/") for path in record.files]
     tables = [_parse(path, content(repository, rig.commit, path)) for path in paths]
+    for part in record.part.split(".") if record.part else ():
+        tables = [table[int(part) if part.isdigit() else part] for table in tables]
     time = _sum(rig.columns["time"][0], tables)
     kept = (time >= record.start) & (time < record.end)
     columns = {"time": time[kept]}
@@ -139,7 +141,7 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
     found = tables[int(number)] if colon and number.isdigit() else tables[0]
     name = name if colon and number.isdigit() else key
     if name == "#":
-        return np.arange(len(next(iter(found.values()))), dtype=np.float64)
+        return np.arange(max(map(len, found.values())), dtype=np.float64)
     if isinstance(found, Mapping) and name in found:
         return np.asarray(found[name], dtype=np.float64).ravel()
     way = re.fullmatch(r"(.*?)(?:\[(\d+)\])?", name)
