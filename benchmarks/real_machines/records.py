@@ -117,9 +117,9 @@ def _parse(path: str, data: bytes) -> Any:
     lines = [line for line in data.decode("utf-8-sig").splitlines() if not line.lstrip('"').startswith("#")]
     comma = max(",;\t", key=lines[0].count)
     head = lines[0].split(comma)
-    if re.fullmatch(r"[-+.\d]+", head[0]):  # no line of names: columns have their numbers
+    if re.fullmatch(r"[-+.e\d]+", head[0]):  # no line of names: columns have their numbers
         head, lines = [str(index) for index in range(len(head))], ["", *lines]
-    table = np.genfromtxt(lines[1:], delimiter=comma)
+    table = np.genfromtxt(lines[1:], delimiter=comma, ndmin=2)
     return {name: table[:, index] for index, name in enumerate(head)}
 
 
@@ -144,7 +144,7 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
         return np.arange(max(map(len, found.values())), dtype=np.float64)
     if isinstance(found, Mapping) and name in found:
         return np.asarray(found[name], dtype=np.float64).ravel()
-    way = re.fullmatch(r"(.*?)(?:\[(\d+)\])?", name)
+    way = re.fullmatch(r"(.*?)(?:\[(\d+)(?:::(\d+))?\])?", name)
     assert way is not None
     for part in way[1].split("."):
         if isinstance(found, list):
@@ -154,4 +154,6 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
     values = np.asarray(found, dtype=np.float64)
     if way[2] is None:
         return values.ravel()
+    if way[3] is not None:
+        return values[int(way[2]) :: int(way[3])]
     return values[:, int(way[2])] if values.shape[0] > values.shape[1] else values[int(way[2])]
