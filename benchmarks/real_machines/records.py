@@ -114,6 +114,10 @@ def _parse(path: str, data: bytes) -> Any:
         from scipy.io import loadmat
 
         return loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)  # type: ignore[arg-type]
+    if kind == "parquet":
+        import pyarrow.parquet
+
+        return pyarrow.parquet.read_table(io.BytesIO(data)).to_pydict()
     lines = [line for line in data.decode("utf-8-sig").splitlines() if not line.lstrip('"').startswith("#")]
     comma = max(",;\t", key=lines[0].count)
     head = lines[0].split(comma)
@@ -146,7 +150,7 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
         return np.asarray(found[name], dtype=np.float64).ravel()
     way = re.fullmatch(r"(.*?)(?:\[(\d+)(?:::(\d+))?\])?", name)
     assert way is not None
-    for part in way[1].split("."):
+    for part in [way[1]] if isinstance(found, Mapping) and way[1] in found else way[1].split("."):
         if isinstance(found, list):
             found = [entry[part] for entry in found]
         else:
