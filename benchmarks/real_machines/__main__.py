@@ -174,7 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--data", type=Path)
     parser.add_argument("--rigs", type=Path, default=HERE / "rigs.toml", help="another list of rigs")
     parser.add_argument("--only", action="append", metavar="NAME")
-    parser.add_argument("--least-squares", action="store_true", help="print what least squares leaves, and nothing else")
+    parser.add_argument("--least-squares", action="store_true", help="print what least squares leaves, alone")
     parser.add_argument("--as-they-are", action="store_true", help="without the alterations")
     parser.add_argument("--longest", type=float, default=LONGEST, help="CPU seconds a diagnosis may take")
     parser.add_argument("--keep", type=Path, help="folder for the answers' JSON and the rows")

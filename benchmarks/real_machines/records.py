@@ -55,13 +55,14 @@ def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
     tables = [_parse(path, content(repository, rig.commit, path)) for path in paths]
     for part in record.part.split(".") if record.part else ():
         tables = [table[int(part) if part.isdigit() else part] for table in tables]
-    time = _sum(rig.columns["time"][0], tables)
-    kept = (time >= record.start) & (time < record.end)
-    columns = {"time": time[kept]}
+    columns = {"time": _sum(rig.columns["time"][0], tables)}
     for signal, items in rig.columns.items():
         if signal != "time":
-            columns |= {f"{signal}_{j}": _sum(item, tables)[kept] for j, item in enumerate(items, start=1)}
-    return columns
+            columns |= {f"{signal}_{j}": _sum(item, tables) for j, item in enumerate(items, start=1)}
+    kept = (columns["time"] >= record.start) & (columns["time"] < record.end)
+    for values in columns.values():  # rows without a reading
+        kept &= np.isfinite(values)
+    return {name: values[kept] for name, values in columns.items()}
 
 
 def write_record(columns: Columns, path: Path, drive_unit: str) -> Path:
