@@ -122,7 +122,7 @@ def _parse(path: str, data: bytes) -> Any:
     lines = [line for line in data.decode("utf-8-sig").splitlines() if not line.lstrip('"').startswith("#")]
     comma = max(",;\t", key=lines[0].count)
     head = lines[0].split(comma)
-    if re.fullmatch(r"[-+.e\d]+", head[0]):  # no line of names: columns have their numbers
+    if re.fullmatch(r"[-+]?[.\d][-+.e\d]*", head[0]):  # no line of names: columns have their numbers
         head, lines = [str(index) for index in range(len(head))], ["", *lines]
     table = np.genfromtxt(lines[1:], delimiter=comma, ndmin=2)
     return {name: table[:, index] for index, name in enumerate(head)}
@@ -146,7 +146,8 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
     found = tables[int(number)] if colon and number.isdigit() else tables[0]
     name = name if colon and number.isdigit() else key
     if name == "#":
-        return np.arange(max(map(len, found.values())), dtype=np.float64)
+        rows = max(len(each) for each in found.values() if not isinstance(each, str))
+        return np.arange(rows, dtype=np.float64)
     if isinstance(found, Mapping) and name in found:
         return np.asarray(found[name], dtype=np.float64).ravel()
     way = re.fullmatch(r"(.*?)(?:\[(\d+)(?:::(\d+))?\])?", name)
