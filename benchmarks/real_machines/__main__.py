@@ -3,6 +3,8 @@
 python -m benchmarks real_machines --data FOLDER                 every rig as it is, and with its honest alteration
 python -m benchmarks real_machines --data FOLDER --only emps     one of them (may be repeated)
 python -m benchmarks real_machines --list                        which repositories FOLDER has to hold
+python -m benchmarks real_machines --data FOLDER --rigs benchmarks/real_machines/reporting.toml   the reporting set
+python -m benchmarks real_machines --data FOLDER --least-squares  least squares alone, without any diagnosis
 
 FOLDER holds checkouts or bare copies of the public repositories, as `name`, `owner/name` or `owner+name`. Nothing of
 them is part of this repository. Exit code 1 where a question has no right answer or least squares leaves less.
@@ -103,6 +105,18 @@ def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, ke
     return [_row(title, question, run, right, linear) for question in questions]
 
 
+def least_squares(rig: Rig, data: Path) -> str:
+    """One line: what a linear fit leaves of the torque on fitted and on held-out records."""
+    records = [read_columns(rig, record, data) for record in (*rig.fitted, *rig.held_out)]
+    seconds = sum(float(columns["time"][-1] - columns["time"][0]) for columns in records)
+    said = f"{rig.name:<16} {rig.joints} joints, {len(records)} records, {seconds:.0f} s"
+    if "drive_1" not in records[0]:
+        return f"{said}: no torque is recorded"
+    first = len(rig.fitted)
+    found = reference(rig.machine, records[:first], records[first:], CUTOFF, offset=rig.offset)
+    return f"{said}: {found.fitted:.1%} of the fitted, {found.held_out:.1%} of the held-out torque left"
+
+
 def _row(title: str, question: Question, run: Run, right: set[str], linear: float | None) -> Row:
     if run.answer is None:
         return Row(title, question.what, question.known, run.reason, "none", "", None, linear, run.seconds)
@@ -160,6 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--data", type=Path)
     parser.add_argument("--rigs", type=Path, default=HERE / "rigs.toml", help="another list of rigs")
     parser.add_argument("--only", action="append", metavar="NAME")
+    parser.add_argument("--least-squares", action="store_true", help="print what least squares leaves, alone")
     parser.add_argument("--as-they-are", action="store_true", help="without the alterations")
     parser.add_argument("--longest", type=float, default=LONGEST, help="CPU seconds a diagnosis may take")
     parser.add_argument("--keep", type=Path, help="folder for the answers' JSON and the rows")
@@ -173,6 +188,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for rig in chosen:
             print(f"{rig.name:<16} github.com/{rig.repository} at {rig.commit[:8]}  {rig.title}  ({rig.licence})")
         return 0 if options.list else parser.error("--data is needed")
+    if options.least_squares:
+        for rig in chosen:
+            print(least_squares(rig, options.data), flush=True)
+        return 0
     found: list[Row] = []
     for rig in chosen:
         for alteration in (None,) if options.as_they_are else (None, rig.alteration):

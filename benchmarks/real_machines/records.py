@@ -53,13 +53,16 @@ def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
     repository = find_repository(folder, rig.repository)
     paths = [f"{rig.folder}/{path}".lstrip("/") for path in record.files]
     tables = [_parse(path, content(repository, rig.commit, path)) for path in paths]
-    time = _sum(rig.columns["time"][0], tables)
-    kept = (time >= record.start) & (time < record.end)
-    columns = {"time": time[kept]}
+    for part in record.part.split(".") if record.part else ():
+        tables = [table[int(part) if part.isdigit() else part] for table in tables]
+    columns = {"time": _sum(rig.columns["time"][0], tables)}
     for signal, items in rig.columns.items():
         if signal != "time":
-            columns |= {f"{signal}_{j}": _sum(item, tables)[kept] for j, item in enumerate(items, start=1)}
-    return columns
+            columns |= {f"{signal}_{j}": _sum(item, tables) for j, item in enumerate(items, start=1)}
+    kept = (columns["time"] >= record.start) & (columns["time"] < record.end)
+    for values in columns.values():  # rows without a reading
+        kept &= np.isfinite(values)
+    return {name: values[kept] for name, values in columns.items()}
 
 
 def write_record(columns: Columns, path: Path, drive_unit: str) -> Path:
@@ -112,9 +115,17 @@ def _parse(path: str, data: bytes) -> Any:
         from scipy.io import loadmat
 
         return loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)  # type: ignore[arg-type]
+    if kind == "parquet":
+        import pyarrow.parquet
+
+        return pyarrow.parquet.read_table(io.BytesIO(data)).to_pydict()
     lines = [line for line in data.decode("utf-8-sig").splitlines() if not line.lstrip('"').startswith("#")]
-    table = np.genfromtxt(lines[1:], delimiter=",")
-    return {name: table[:, index] for index, name in enumerate(lines[0].split(","))}
+    comma = max(",;\t", key=lines[0].count)
+    head = lines[0].split(comma)
+    if re.fullmatch(r"[-+]?[.\d][-+.e\d]*", head[0]):  # no line of names: columns have their numbers
+        head, lines = [str(index) for index in range(len(head))], ["", *lines]
+    table = np.genfromtxt(lines[1:], delimiter=comma, ndmin=2)
+    return {name: table[:, index] for index, name in enumerate(head)}
 
 
 def _sum(item: str | list[Any], tables: Sequence[Any]) -> Floats:
@@ -135,12 +146,13 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
     found = tables[int(number)] if colon and number.isdigit() else tables[0]
     name = name if colon and number.isdigit() else key
     if name == "#":
-        return np.arange(len(next(iter(found.values()))), dtype=np.float64)
+        rows = max(len(each) for each in found.values() if not isinstance(each, str))
+        return np.arange(rows, dtype=np.float64)
     if isinstance(found, Mapping) and name in found:
         return np.asarray(found[name], dtype=np.float64).ravel()
-    way = re.fullmatch(r"(.*?)(?:\[(\d+)\])?", name)
+    way = re.fullmatch(r"(.*?)(?:\[(\d+)(?:::(\d+))?\])?", name)
     assert way is not None
-    for part in way[1].split("."):
+    for part in [way[1]] if isinstance(found, Mapping) and way[1] in found else way[1].split("."):
         if isinstance(found, list):
             found = [entry[part] for entry in found]
         else:
@@ -148,4 +160,6 @@ def _column(key: str, tables: Sequence[Any]) -> Floats:
     values = np.asarray(found, dtype=np.float64)
     if way[2] is None:
         return values.ravel()
+    if way[3] is not None:
+        return values[int(way[2]) :: int(way[3])]
     return values[:, int(way[2])] if values.shape[0] > values.shape[1] else values[int(way[2])]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +38,13 @@ class Question:
 
 @dataclass(frozen=True)
 class Record:
-    """Files of one record, below the rig's folder, and the part of it, in s of its own clock."""
+    """Files of one record, below the rig's folder, and the stretch of it, in s of its own clock. part: of a JSON file
+    with many records, the way to this one, such as `data.3`."""
 
     files: tuple[str, ...]
     start: float
     end: float
+    part: str = ""
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,8 @@ def _numbered(item: Any, index: int) -> Any:
 
 def _records(entries: Sequence[Mapping[str, Any]]) -> tuple[Record, ...]:
     return tuple(
-        Record(tuple(each["files"]), each.get("from", float("-inf")), each.get("to", float("inf"))) for each in entries
+        Record(tuple(each["files"]), each.get("from", -inf), each.get("to", inf), each.get("part", ""))
+        for each in entries
     )
 
 

@@ -24,11 +24,11 @@ from benchmarks.real_machines.records import (
     write_record,
 )
 from benchmarks.real_machines.reference import reference
-from benchmarks.real_machines.rigs import Number, Question, Record, Torque, load_rigs
+from benchmarks.real_machines.rigs import HERE, Number, Question, Record, Torque, load_rigs
 from daq.contracts.machine import load_machine
 from ma2000 import read_trace
 
-RIGS = {rig.name: rig for rig in load_rigs()}
+RIGS = {rig.name: rig for rig in (*load_rigs(), *load_rigs(HERE / "reporting.toml"))}
 
 
 @pytest.mark.parametrize("rig", RIGS.values(), ids=lambda rig: rig.name)
@@ -112,6 +112,24 @@ def test_a_record_is_renamed_and_imported_by_the_product(pendulum: Any, tmp_path
         pendulum.machine, [columns], [read_columns(pendulum, pendulum.held_out[0], tmp_path)], 12.0, offset=True
     )
     assert linear.held_out < 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "key", "part"),
+    [
+        ("semicolons.csv", "time;x\n0;1\n1;2\n2;3\n", "x", ""),
+        ("no_names.txt", "0.0\t1.0\n1e0\t2.0\n2.0\t3.0\n", "1", ""),
+        ("flat.txt", "9\n1\n8\n2\n7\n3\n", "0[1::2]", ""),
+        ("many.json", '{"data": [{}, {"kind": "chirp", "x": [1, 2, 3]}]}', "x", "data.1"),
+    ],
+)
+def test_columns_of_other_tables(pendulum: Any, tmp_path: Path, name: str, text: str, key: str, part: str) -> None:
+    (tmp_path / "bam" / "data" / name).write_text(text)
+    time = [[0.5, key], [-0.5]] if name == "flat.txt" else [[0.5, "#"]]
+    rig = replace(pendulum, columns={"time": (time,), "position": (key,)})
+    columns = read_columns(rig, Record((name,), 0.0, 9.0, part), tmp_path)
+    assert np.array_equal(columns["position_1"], [1.0, 2.0, 3.0])
+    assert np.array_equal(columns["time"], [0.0, 0.5, 1.0])
 
 
 def test_a_torque_that_is_added_is_one_that_the_drive_gives(pendulum: Any, tmp_path: Path) -> None:
