@@ -26,7 +26,13 @@ def page() -> str:
     sizes = {size.effect: size for size in (*SHARED_SIZES, *LATER_SIZES, *OPEN_SIZES)}
     rows: dict[bool, list[str]] = {True: [], False: []}
     for name, kind in known_modifications().items():
-        cells = (f"`{name}`", plain(kind.line), "; ".join(_parameters(kind)), _sizes(sizes.get(name)), plain(kind.source))
+        cells = (
+            f"`{name}`",
+            plain(kind.line),
+            "; ".join(_parameters(kind)),
+            _sizes(sizes.get(name)),
+            plain(kind.source),
+        )
         rows[kind.shared].append(f"| {' | '.join(cells)} |")
     return "\n".join([BEGIN, SHARED, HEAD, *rows[True], "", OPEN, HEAD, *rows[False], ""])
 

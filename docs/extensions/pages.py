@@ -14,10 +14,11 @@ from sphinx.application import Sphinx
 
 from daq.config.documents import BROUGHT, brought
 
-from . import command_line, configuration, mock_effects, public_api, rest
+from . import command_line, configuration, machine_file, mock_effects, public_api, rest
 
 ROOT = Path(__file__).parents[2]
 GENERATED: dict[str, Callable[[], str]] = {
+    "machine-file": machine_file.page,
     "reference/options": command_line.page,
     "reference/configuration": configuration.page,
     "reference/mock-effects": mock_effects.page,
