@@ -14,8 +14,9 @@ from .command_line import plain
 OPERATIONS = """# REST
 
 Made from the service's own description of its API, which a running service gives at `/api/v1/openapi.json`; its page at
-`/api/docs` also tries what only reads. [Service](../service.md) explains tokens, control, idempotency and
-[what an error looks like](../service.md#problems). [Problems](#problems) lists every kind. [Schemas](rest-schemas.md) has every field.
+`/api/docs` also tries what only reads. [Service](../service.md) explains tokens, control, idempotency and the
+[form of an error](../service.md#problems). [Problems](#problems) lists every kind. [Schemas](rest-schemas.md) has every
+field.
 """
 SCHEMAS = """# REST: schemas
 
