@@ -1,4 +1,4 @@
-"""The tables. A change here needs a migration (docs/service.md); a test compares the two."""
+"""The tables. A change here needs a migration (docs/architecture.md); a test compares the two."""
 
 from __future__ import annotations
 
