@@ -14,12 +14,14 @@ from sphinx.application import Sphinx
 
 from daq.config.documents import BROUGHT, brought
 
-from . import command_line, configuration, public_api, rest
+from . import command_line, configuration, machine_file, mock_effects, public_api, rest
 
 ROOT = Path(__file__).parents[2]
 GENERATED: dict[str, Callable[[], str]] = {
+    "machine-file": machine_file.page,
     "reference/options": command_line.page,
     "reference/configuration": configuration.page,
+    "reference/mock-effects": mock_effects.page,
     "reference/rest": rest.operations_page,
     "reference/rest-schemas": rest.schemas_page,
     "reference/python-api": public_api.page,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
+from server.api.problem_examples import PROBLEM_EXAMPLES
 from server.app import bare_app
 
 from .command_line import plain
@@ -13,8 +14,9 @@ from .command_line import plain
 OPERATIONS = """# REST
 
 Made from the service's own description of its API, which a running service gives at `/api/v1/openapi.json`; its page at
-`/api/docs` also tries what only reads. [Service](../service.md) explains tokens, control, idempotency and
-[what can go wrong](../service.md#problems). [Schemas](rest-schemas.md) has every field.
+`/api/docs` also tries what only reads. [Service](../service.md) explains tokens, control, idempotency and the
+[form of an error](../service.md#problems). [Problems](#problems) lists every kind. [Schemas](rest-schemas.md) has every
+field.
 """
 SCHEMAS = """# REST: schemas
 
@@ -34,7 +36,14 @@ def operations_page() -> str:
         for method, operation in methods.items():
             (tag,) = operation.get("tags", ["others"])
             parts.setdefault(tag, []).append("\n".join(_operation(path, method, operation)))
-    return "\n".join([OPERATIONS, *(f"## {tag}\n\n" + "\n".join(parts[tag]) for tag in parts)])
+    return "\n".join([OPERATIONS, *(f"## {tag}\n\n" + "\n".join(parts[tag]) for tag in parts), *_problems()])
+
+
+def _problems() -> Iterator[str]:
+    """Every kind of problem, as the service words it in an example."""
+    yield "## Problems\n\n| kind | status | for example | advice |\n|---|---|---|---|"
+    for one in (example.problem for example in PROBLEM_EXAMPLES):
+        yield f"| `{one.kind}` | {one.status} | {plain(one.detail)} | {plain(one.advice)} |"
 
 
 def _operation(path: str, method: str, operation: dict[str, Any]) -> Iterator[str]:

@@ -23,8 +23,7 @@ NEARLY_WHOLE = 1e-3
 NO_ACCIDENT = 20
 """Number of different set points of one joint that are not all whole counts by accident."""
 LONGEST_STEP = 1e-3
-"""Longest step of integration, s: readings are right to some 0.005 counts, contacts apart (docs/modelling.md has each
-effect)."""
+"""Longest step of integration, s: readings are right to some 0.005 counts, contacts apart (docs/modelling.md)."""
 
 
 @dataclass(frozen=True)

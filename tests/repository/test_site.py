@@ -71,6 +71,15 @@ def test_every_key_of_the_configuration_has_a_meaning() -> None:
     assert page.count("\n: ") > 35
 
 
+def test_the_page_of_the_mocks_effects_has_their_bounds_and_sizes() -> None:
+    from docs.extensions import mock_effects
+
+    (row,) = (
+        line for line in mock_effects.page().splitlines() if line.startswith("| `direction_dependent_friction` |")
+    )
+    assert "`torque` -50 to 50 N·m, **0** | ± 0.12–3 / 0.6–12 / 0.15–3 |" in row
+
+
 def test_what_is_inside_a_page_becomes_files_beside_it(tmp_path: Path) -> None:
     from docs.extensions import policy
 

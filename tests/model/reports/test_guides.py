@@ -12,7 +12,7 @@ import typer.main
 from daq.contracts.effects import effect_names
 from daq.contracts.machine import load_machine, parse_machine
 from daq_cli.app.lazy import SUBCOMMANDS
-from tests.repository.machine_page import PARTS
+from docs.extensions.machine_file import PARTS
 
 ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "docs" / name for name in ("modelling.md", "own-machine.md")]

@@ -19,7 +19,7 @@ from tests.server.polling import reset
 from tests.server.service import Service
 
 JSON = ("application/json", "application/problem+json")
-GUIDE = Path(__file__).parents[3].joinpath("docs", "service.md").read_text("utf-8")
+SERVER = Path(__file__).parents[3] / "server"
 OF_SIGN_IN = {
     "name-taken",
     "no-name",
@@ -81,8 +81,10 @@ def test_every_kind_of_problem_has_an_example_at_an_address_that_knows_it(descri
         if part.isdecimal() and int(part) >= 400
         for name in content["examples"]
     }
-    kinds = set(re.findall(r'<a id="([a-z-]+)"></a>', GUIDE))
-    assert {example.problem.kind for example in PROBLEM_EXAMPLES} == kinds
+    kinds = {example.problem.kind for example in PROBLEM_EXAMPLES}
+    made = re.compile(r'(?:ProblemError\(\s*(?:\d+|error\.status_code),|conflict\()\s*"([a-z-]+)"')
+    text = "\n".join(path.read_text("utf-8") for path in SERVER.rglob("*.py"))
+    assert set(made.findall(text)) | set(re.findall(r'40[45]: "([a-z-]+)"', text)) | {"http"} == kinds
     assert kinds - NO_ADDRESS <= met | {"Health"}
 
 

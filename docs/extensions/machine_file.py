@@ -1,10 +1,9 @@
-"""Writes docs/machine-file.md from the schema of a machine file: `python -m tests.repository.machine_page`."""
+"""The page of all fields of a machine file, from its schema."""
 
 from __future__ import annotations
 
 import ast
 import inspect
-import textwrap
 import types
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -13,9 +12,7 @@ from pydantic.fields import FieldInfo
 
 from daq.contracts import machine
 from daq.contracts.quantity import Quantity
-from tests.repository.tracked import ROOT
 
-PAGE = ROOT / "docs" / "machine-file.md"
 PARTS: tuple[type[BaseModel], ...] = (
     machine.Machine,
     machine.Joint,
@@ -34,21 +31,19 @@ PARTS: tuple[type[BaseModel], ...] = (
 )
 BEGIN = f"""# The machine file, field by field
 
-Made from the schema (`daq/contracts/machine.py`) by `python -m tests.repository.machine_page`; a test holds the two
-together. [own-machine.md](own-machine.md) shows how to write and use such a file.
+Made from the schema, `daq/contracts/machine.py`. [Your own machine](own-machine.md) shows how to write such a file.
 
-A **number** is a table: `value`, `unit` (as in the column below), `source`, and, where they are known, `assumed = true`
-(a guess), `low` and `high` (physical bounds) and `deviation`, the standard deviation that may be expected between the
-file and the machine. A number with a deviation is a tolerance parameter: fits and diagnoses may move it, at a price.
-{textwrap.fill(f"Deviations can be stated of {machine.DEVIATIONS_ARE_USED_OF}.", 118)}
-Stated of any other number of a modelled joint or of the controller they are an error: no method would use them.
+A **number** is a table: `value`, `unit` (as in the column below) and `source`. It may have `assumed = true` (a guess),
+`low` and `high` (physical bounds) and `deviation`, the standard deviation expected between the file and the machine.
+A number with a deviation is a tolerance: fits and diagnoses may move it, at a price.
+Deviations can be stated of {machine.DEVIATIONS_ARE_USED_OF}.
+For any other number of a modelled joint or of the controller they are an error: no method would use them.
 
-A torque constant, resistance, gain or gear ratio sets the scale of all torques, which motion alone does not show. Their
-deviations are used by a diagnosis, which names such a number where it is far off; a fit moves them only when they are
-named.
+A torque constant, resistance, gain or gear ratio sets the scale of all torques, which motion alone does not show. A
+diagnosis names such a number if it is far off; a fit moves it only if you name it.
 
-Nothing limits the number of joints but time: a step of the simulation takes time in proportion to its square, a probe
-of every effect on every joint to its cube. CSV columns are numbered up to 99; the MA2000's board has six.
+Only time limits the number of joints: a step of the simulation grows with its square, a probe of every effect on every
+joint with its cube. CSV columns are numbered up to 99; the MA2000's board has six.
 """
 
 
@@ -112,7 +107,3 @@ def _told() -> dict[tuple[str, str], str]:
                 if named and said:
                     found[part.name, field.target.id] = " ".join(str(text.value.value).split())
     return found
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
