@@ -26,12 +26,12 @@ from daq_cli.models.model_input import (
     MODEL_HELP,
     CandidatesOption,
     ComparisonOption,
-    DespiteDoubtsOption,
     EffectFileOption,
     ExaminedOption,
     ExecutorOption,
     MostOption,
 )
+from daq_cli.models.record_doubts import DespiteDoubtsOption
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:

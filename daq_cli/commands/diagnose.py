@@ -18,7 +18,6 @@ from daq_cli.models.model_input import (
     CandidatesOption,
     Comparison,
     ComparisonOption,
-    DespiteDoubtsOption,
     EffectFileOption,
     ExaminedOption,
     JudgedByOption,

@@ -119,10 +119,6 @@ ExaminedOption = Annotated[
     ),
 ]
 
-DespiteDoubtsOption = Annotated[
-    bool, typer.Option("--despite-doubts", help="Compute although the check of the records raises doubts.")
-]
-
 ExecutorOption = Annotated[
     str,
     typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),

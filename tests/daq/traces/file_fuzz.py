@@ -8,11 +8,6 @@ from __future__ import annotations
 
 import itertools
 import random
-<<<<<<< HEAD:benchmarks/file_fuzz.py
-import sys
-import time
-=======
->>>>>>> line-d:tests/daq/traces/file_fuzz.py
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -26,11 +21,6 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-<<<<<<< HEAD:benchmarks/file_fuzz.py
-from benchmarks.damaged_traces import AT_RANDOM
-from benchmarks.figures import Figure, at_least, at_most, show_campaign
-=======
->>>>>>> line-d:tests/daq/traces/file_fuzz.py
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import load_settings
 from daq.contracts.documents import read_document
@@ -84,12 +74,6 @@ class Tally:
     ends: Counter[str] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
     examples: list[str] = field(default_factory=list)
-<<<<<<< HEAD:benchmarks/file_fuzz.py
-    slowest: float = 0.0
-    """s that this process computed for one file: what it waited on a busy computer says nothing of a reader."""
-    slowest_file: str = ""
-=======
->>>>>>> line-d:tests/daq/traces/file_fuzz.py
 
     def fault(self, fault: str, kind: Kind, way: str, detail: str) -> None:
         """Counts a fault."""
@@ -242,20 +226,9 @@ class Campaign:
     def run(self, cases: Iterator[tuple[Kind, str, bytes]]) -> Tally:
         """Reads each file."""
         for kind, way, data in cases:
-<<<<<<< HEAD:benchmarks/file_fuzz.py
-            begun = time.process_time()
             kind.damaged.write_bytes(data)
             self._case(kind, way, data)
             kind.damaged.write_bytes(kind.data)
-            took = time.process_time() - begun
-            if took > self.tally.slowest:
-                self.tally.slowest, self.tally.slowest_file = took, f"{kind.name}, {way}"
-            self.tally.cases += 1
-=======
-            kind.damaged.write_bytes(data)
-            self._case(kind, way, data)
-            kind.damaged.write_bytes(kind.data)
->>>>>>> line-d:tests/daq/traces/file_fuzz.py
         return self.tally
 
     def _case(self, kind: Kind, way: str, data: bytes) -> None:
@@ -299,26 +272,3 @@ def campaign(cases: int, seed: int, folder: Path) -> Tally:
     """So many damaged files."""
     running = Campaign(folder)
     return running.run(itertools.islice(damaged(running.kinds, random.Random(seed)), cases))
-<<<<<<< HEAD:benchmarks/file_fuzz.py
-
-
-def figures(tally: Tally) -> list[Figure]:
-    """What was found, beside what may be."""
-    ends = ", ".join(f"{count} {end}" for end, count in sorted(tally.ends.items()))
-    faults = ("other exceptions", "errors of several or endless lines", "samples lost without a word", "wrong samples")
-    return [
-        at_least("damaged files", tally.cases, 50_000, "", ends),
-        *(at_most(fault, tally.faults[fault], 0, "") for fault in faults),
-        at_most("slowest file", tally.slowest, 5.0, "s", tally.slowest_file),
-    ]
-
-
-def main() -> int:
-    """The exit code: 1 when a target was missed."""
-    return show_campaign("file_fuzz", "Damaged files of every kind", CASES, campaign, figures, __doc__)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
-=======
->>>>>>> line-d:tests/daq/traces/file_fuzz.py

@@ -9,12 +9,6 @@ from __future__ import annotations
 
 import itertools
 import random
-<<<<<<< HEAD:benchmarks/trace_damage.py
-import resource
-import sys
-import time
-=======
->>>>>>> line-d:tests/daq/traces/trace_damage.py
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -42,18 +36,6 @@ from tests.daq.traces.damaged_traces import (
     of_records,
     originals,
 )
-<<<<<<< HEAD:benchmarks/trace_damage.py
-from benchmarks.figures import Figure, at_least, at_most, show_campaign
-from daq.contracts.errors import TraceError
-from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
-from daq.traces.catalogue import list_traces
-from daq.traces.layout import ALL_SIGNALS
-from daq.traces.reader import read_trace
-from daq.traces.salvage import salvage_folder
-from daq.traces.verify import verify
-=======
->>>>>>> line-d:tests/daq/traces/trace_damage.py
 
 CASES = 22_000
 CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
@@ -208,15 +190,3 @@ def campaign(cases: int, seed: int, folder: Path, share: float = 1.0) -> Tally:
     running.run(on_purpose(running.originals, lambda: rng.random() < share))
     left = max(0, cases - running.tally.cases)
     return running.run(itertools.islice(at_random(running.originals, rng), left))
-<<<<<<< HEAD:benchmarks/trace_damage.py
-
-
-def main() -> int:
-    """The exit code: 1 when a target was missed."""
-    return show_campaign("trace_damage", "Damaged trace files", CASES, campaign, figures, __doc__)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
-=======
->>>>>>> line-d:tests/daq/traces/trace_damage.py
