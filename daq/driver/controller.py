@@ -264,11 +264,11 @@ class Controller:
                 raise
             return {}
 
-    def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
+    def set_gains(self, joint: int, p: int, i: int, d: int, before_stop: int | None = None) -> None:
         """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20,
-        RequestRefusedError where the memory map has no gains."""
+        RequestRefusedError where the memory map has no gains, StopCameFirstError as `Link.request` does."""
         _require_mapped("SetGains", self.memory_map.has_gains)
-        self.link.request(SetGains(joint, p, i, d), GainsSet)
+        self.link.request(SetGains(joint, p, i, d), GainsSet, before_stop)
         read = self.gains()[joint]
         if read != (p, i, d):
             raise GainsNotTakenError(f"joint {joint}: gains {(p, i, d)} written, {read} read back")
@@ -284,15 +284,15 @@ class Controller:
         _require_mapped("ReadProcess", self.memory_map.has_process)
         return self.link.request(ReadProcess(), Process)
 
-    def write_outputs(self, mask: int, values: int) -> None:
-        """Process outputs in `mask` take the bits of `values`."""
+    def write_outputs(self, mask: int, values: int, before_stop: int | None = None) -> None:
+        """Process outputs in `mask` take the bits of `values`. Raises StopCameFirstError as `Link.request` does."""
         _require_mapped("WriteOutputs", self.memory_map.has_process)
-        self.link.request(WriteOutputs(mask, values), OutputsWritten)
+        self.link.request(WriteOutputs(mask, values), OutputsWritten, before_stop)
 
-    def set_gripper(self, *, closed: bool) -> None:
-        """Closes or opens the gripper."""
+    def set_gripper(self, *, closed: bool, before_stop: int | None = None) -> None:
+        """Closes or opens the gripper. Raises StopCameFirstError as `Link.request` does."""
         _require_mapped("SetGripper", self.memory_map.has_process)
-        self.link.request(SetGripper(int(closed)), GripperSet)
+        self.link.request(SetGripper(int(closed)), GripperSet, before_stop)
 
     def status(self) -> ControllerStatus:
         """Board and link now."""

@@ -1,7 +1,7 @@
 """Transactions with a controller: numbered, repeated until answered, matched, counted."""
 
 from daq.link.counters import LinkCounters, RoundTrips
-from daq.link.errors import LinkError, LinkLostError, LinkTimeoutError, RequestRefusedError
+from daq.link.errors import LinkError, LinkLostError, LinkTimeoutError, RequestRefusedError, StopCameFirstError
 from daq.link.link import Link, LinkState, expect
 
 __all__ = [
@@ -13,5 +13,6 @@ __all__ = [
     "LinkTimeoutError",
     "RequestRefusedError",
     "RoundTrips",
+    "StopCameFirstError",
     "expect",
 ]

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from daq.link.counters import Tally
-from daq.link.errors import LinkLostError
+from daq.link.errors import LinkLostError, StopCameFirstError
 from daq.link.pending import PendingReplies, Transaction
 from daq.link.timing import LinkTiming, copies_of
 from daq.transport import ByteChannel, ChannelError
-from firmware_protocol.commands import MoveAndSample, Request, Sample
+from firmware_protocol.commands import MoveAndSample, Request, Sample, Stop
 from firmware_protocol.dialect import LinkDialect
 
 
@@ -43,6 +43,8 @@ class Connection:
         self._write_lock = threading.Lock()
         self._dialect_lock = threading.Lock()
         self._failure: str | None = None
+        self.stops = 0
+        """Stops that were written so far, by whichever thread."""
 
     @property
     def damaged(self) -> int:
@@ -64,10 +66,17 @@ class Connection:
         """Why the channel has ended; None while it has not."""
         return self._failure
 
-    def begin(self, requests: Sequence[Request]) -> list[Transaction]:
-        """Writes new requests, all in one write. Raises LinkLostError; ProtocolError for what no frame can carry."""
+    def begin(self, requests: Sequence[Request], before_stop: int | None = None) -> list[Transaction]:
+        """Writes new requests, all in one write. Raises LinkLostError; ProtocolError for what no frame can carry.
+
+        before_stop: the stops that had been written when these requests were allowed. Raises StopCameFirstError, and
+            writes nothing, if there is one more: no check of another thread's can be nearer to the wire.
+        """
         with self._write_lock:
             self.check()
+            if before_stop is not None and before_stop != self.stops:
+                raise StopCameFirstError
+            self.stops += any(isinstance(request, Stop) for request in requests)
             with self.changed:
                 transactions = [self._pending.begin(request) for request in requests]
             try:

@@ -23,6 +23,15 @@ class LinkLostError(LinkError):
     """The channel has ended; nothing is asked again until `Link.reconnect` has succeeded."""
 
 
+class StopCameFirstError(DaqError):
+    """A stop was written between the moment of a request's check and its own. It has not been written."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+    def __init__(self) -> None:
+        super().__init__("a stop came first: look at the arm, then ask again")
+
+
 class RequestRefusedError(DaqError):
     """The controller answered that it will not. Nothing has changed there."""
 

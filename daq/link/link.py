@@ -153,23 +153,33 @@ class Link:
         """Tells the control period, for which `Sample` may have to wait."""
         self._connection.timing = replace(self._connection.timing, period_s=period_s)
 
-    def request(self, request: Request, reply: type[R]) -> R:
-        """The reply to one request. Raises RequestRefusedError, LinkTimeoutError, LinkLostError, ProtocolError."""
-        (answer,) = self.exchange(request)
+    @property
+    def stops(self) -> int:
+        """Stops that were written so far. What is allowed now is given this number (`before_stop`), so that it is not
+        written behind a stop of another thread."""
+        return self._connection.stops
+
+    def request(self, request: Request, reply: type[R], before_stop: int | None = None) -> R:
+        """The reply to one request. Raises RequestRefusedError, LinkTimeoutError, LinkLostError, ProtocolError, and
+        StopCameFirstError if `before_stop` is not the number of `stops` any more."""
+        (answer,) = self.exchange(request, before_stop=before_stop)
         return expect(request, answer, reply)
 
-    def exchange(self, *requests: Request) -> tuple[Reply, ...]:
+    def exchange(self, *requests: Request, before_stop: int | None = None) -> tuple[Reply, ...]:
         """The replies to requests written together, in their order; a refusal is a reply.
 
-        Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value.
+        Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value;
+        StopCameFirstError as `request` does.
         """
-        return self.exchange_timed(*requests)[0]
+        return self.exchange_timed(*requests, before_stop=before_stop)[0]
 
-    def exchange_timed(self, *requests: Request) -> tuple[tuple[Reply, ...], tuple[float, ...]]:
+    def exchange_timed(
+        self, *requests: Request, before_stop: int | None = None
+    ) -> tuple[tuple[Reply, ...], tuple[float, ...]]:
         """The same, with the time (s) from its begin to each reply."""
         begun = self._now()
         try:
-            transactions = self._exchange.run(requests)
+            transactions = self._exchange.run(requests, before_stop)
         except LinkError:
             self._unanswered = True
             raise

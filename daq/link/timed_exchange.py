@@ -23,12 +23,12 @@ class TimedExchange:
         self._reading = False
         self._followers = 0
 
-    def run(self, requests: Sequence[Request]) -> list[Transaction]:
+    def run(self, requests: Sequence[Request], before_stop: int | None = None) -> list[Transaction]:
         """Writes `requests` together, returns when all have replies.
 
-        Raises LinkTimeoutError, LinkLostError, ProtocolError.
+        Raises LinkTimeoutError, LinkLostError, ProtocolError; StopCameFirstError as `Connection.begin` does.
         """
-        transactions = self._connection.begin(requests)
+        transactions = self._connection.begin(requests, before_stop)
         try:
             while waiting := self._unanswered(transactions):
                 now = self._connection.now()

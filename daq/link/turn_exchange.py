@@ -30,14 +30,14 @@ class TurnExchange:
         self._connection = connection
         self._turn = threading.Lock()
 
-    def run(self, requests: Sequence[Request]) -> list[Transaction]:
+    def run(self, requests: Sequence[Request], before_stop: int | None = None) -> list[Transaction]:
         """Writes `requests` together, returns when all have replies.
 
-        Raises LinkTimeoutError, LinkLostError, ProtocolError.
+        Raises LinkTimeoutError, LinkLostError, ProtocolError; StopCameFirstError as `Connection.begin` does.
         """
         connection = self._connection
         with self._turn:
-            transactions = connection.begin(requests)
+            transactions = connection.begin(requests, before_stop)
             try:
                 self._listen(requests)
                 while waiting := [transaction for transaction in transactions if transaction.reply is None]:

@@ -6,7 +6,7 @@ import time
 
 from daq.contracts.errors import ReachError, SafetyError
 from daq.contracts.limp import doubts_line, require_no_jump
-from daq.link import RequestRefusedError
+from daq.link import RequestRefusedError, StopCameFirstError
 from daq.runner import StoppedError
 from daq.safety import Event, State
 from firmware_protocol.commands import Refusal
@@ -43,34 +43,44 @@ def require_current(robot: OwnedRobot, order: Long | Quick, within: float) -> No
 def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
     """Carries out an order, and returns the answer's data. Raises DaqError; nothing has changed then, unless the error
     says so."""
+    stops = robot.controller.link.stops  # before the look at stops: one that is written after it comes first
     require_current(robot, order, WAITS_AT_MOST)
     if robot.activity != "none" and not isinstance(order, _WHILE_TEACHING):
         raise SafetyError(f"not while the arm is busy ({robot.activity}): wait for its end, or stop it")
+    try:
+        return _carried_out(robot, order, stops)
+    except StopCameFirstError as error:
+        raise _overtaken(order.kind, robot.end_cause()) from error
+
+
+def _carried_out(robot: OwnedRobot, order: Quick, stops: int) -> dict[str, object]:
+    """The answer's data. Raises StopCameFirstError for what would change something behind a stop that was written since
+    there were so many `stops`."""
     match order:
         case ReadGains():
             return {"gains": robot.read_gains()}
         case WriteGains():
-            return _write_gains(robot, order)
+            return _write_gains(robot, order, stops)
         case ReadProcess():
             return _process(robot)
         case WriteOutput():
             _require_not_stopped(robot, order)
-            robot.controller.write_outputs(1 << order.output, order.on << order.output)
+            robot.controller.write_outputs(1 << order.output, order.on << order.output, stops)
             return _process(robot)
         case MoveGripper():
             _require_not_stopped(robot, order)
-            robot.controller.set_gripper(closed=order.closed)
+            robot.controller.set_gripper(closed=order.closed, before_stop=stops)
             return _process(robot)
         case Reset():
             return {"text": _reset(robot, order)}
 
 
-def _write_gains(robot: OwnedRobot, order: WriteGains) -> dict[str, object]:
+def _write_gains(robot: OwnedRobot, order: WriteGains, stops: int) -> dict[str, object]:
     readings = robot.controller.next_snapshot().joints
     require_no_jump({joint: reading.error for joint, reading in readings}, order.gains)
     for joint, gain in sorted(order.gains.items()):
         robot.machine.joint(joint)
-        robot.controller.set_gains(joint, *gain)
+        robot.controller.set_gains(joint, *gain, before_stop=stops)
     return {"gains": robot.read_gains()}
 
 

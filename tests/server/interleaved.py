@@ -29,7 +29,7 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import RobotIdentity, StopResult
 from daq.driver import Controller
 from daq.driver.set_point_watch import SetPointWatch
-from daq.link import LinkState, RequestRefusedError
+from daq.link import LinkState, RequestRefusedError, StopCameFirstError
 from daq.runner import ArmControl, require_not_stopped
 from daq.teaching.controller_arm import ControllerArm
 from firmware_protocol import commands as c
@@ -140,18 +140,21 @@ class Wire:
         """When the board took each stop."""
         self.confirmed: list[Stopped] = []
         self.faults: list[str] = []
-        self.motions = 0
+        self.motions = self.stops = 0
 
-    def request(self, request: c.Request, _kind: object) -> Any:
+    def request(self, request: c.Request, _kind: object, before_stop: int | None = None) -> Any:
         """One request and its reply, each of which takes time."""
-        return self.exchange(request)[0]
+        return self.exchange(request, before_stop=before_stop)[0]
 
     def exchange_timed(self, *requests: c.Request) -> tuple[tuple[Any, ...], tuple[float, ...]]:
         return self.exchange(*requests), (0.0,) * len(requests)
 
-    def exchange(self, *requests: c.Request) -> tuple[Any, ...]:
+    def exchange(self, *requests: c.Request, before_stop: int | None = None) -> tuple[Any, ...]:
         """Requests that are written together reach the board together."""
         self.world.step()
+        if before_stop is not None and before_stop != self.stops:
+            raise StopCameFirstError
+        self.stops += any(isinstance(request, c.Stop) for request in requests)
         replies = tuple(map(self._answer, requests))
         self.world.step()
         for request, reply in zip(requests, replies, strict=True):

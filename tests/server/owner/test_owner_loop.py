@@ -26,7 +26,7 @@ class SilentForAWhile:
     """A controller that gives a sample, then none twice while its line stays open, then samples again."""
 
     def __init__(self) -> None:
-        self.link = SimpleNamespace(state=LinkState.CONNECTED, lock_step=True, url="mock://")
+        self.link = SimpleNamespace(state=LinkState.CONNECTED, lock_step=True, url="mock://", stops=0)
         self.period_s = 0.0
         self.ticks = iter(range(1000))
         self.silence: Iterator[bool] = iter([False, True, True])

@@ -94,7 +94,8 @@ def test_a_silent_robot_holds_up_no_more_than_so_many() -> None:
 
 def _gripper_of(moved: list[bool]) -> SimpleNamespace:
     return SimpleNamespace(
-        set_gripper=lambda *, closed: moved.append(closed),
+        link=SimpleNamespace(stops=0),
+        set_gripper=lambda *, closed, before_stop: moved.append(closed),
         process=lambda: SimpleNamespace(inputs=0, outputs=0, gripper=True),
     )
 

@@ -10,10 +10,10 @@ import pytest
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.renderer import refusal_words
-from model.discrepancy.inverse_dynamics import looks
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.looks import LEAST_OF_TORQUE
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.inverse_dynamics import repeats
+from model.inverse_dynamics.repeats import LEAST_OF_TORQUE
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 
@@ -77,7 +77,7 @@ def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected
 
 @pytest.mark.parametrize("share", [LEAST_OF_TORQUE, 0.05])
 def test_noise_is_a_share_of_the_torque_of_the_drive_at_least(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(looks, "LEAST_OF_TORQUE", share)
+    monkeypatch.setattr(repeats, "LEAST_OF_TORQUE", share)
     training, held_out = traces()
     assert training.drive is not None
     found = slide(training, held_out, TorqueOptions(effects=FRICTION))
