@@ -23,6 +23,7 @@ PYTHONS = dict(pythons())
 WORDS = {
     "batch": "fit {folder} --out batch",
     "blind": "--seeds 1 --folder blind",
+    "check": "{trace}",
     "compare": "ma2000 {trace}",
     "design": "ma2000",
     "diagnose": "{trace}",

@@ -95,7 +95,7 @@ def test_a_silent_robot_holds_up_no_more_than_so_many() -> None:
 def _gripper_of(moved: list[bool]) -> SimpleNamespace:
     return SimpleNamespace(
         link=SimpleNamespace(stops=0),
-        set_gripper=lambda *, closed, before_stop: moved.append(closed),
+        set_gripper=lambda *, closed, before_stop: moved.append(closed and before_stop == 0),
         process=lambda: SimpleNamespace(inputs=0, outputs=0, gripper=True),
     )
 
