@@ -198,11 +198,12 @@ class _Witnesses:
                 yield self._of_way(way, joint)
                 return
         if not holds:
-            stretched = self._stretched(motion)
+            scales = list(self._out_of_scale(motion))  # a drive of another unit asks for another inertia as well
+            stretched = self._stretched(motion) if not scales else None
             if stretched is not None:
                 yield stretched
                 return
-            yield from self._out_of_scale(motion)
+            yield from scales
             yield from self._behind(motion)
         if not isinstance(self.model.machine.controller, NoController) and not holds:
             for joint in joints:

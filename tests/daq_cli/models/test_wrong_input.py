@@ -46,7 +46,9 @@ def test_a_model_with_a_joint_that_the_trace_lacks_is_refused(daq: CommandLine, 
 
 def test_degrees_instead_of_radians_are_named(daq: CommandLine, tmp_path: Path) -> None:
     degrees = write_csv(tmp_path / "degrees.csv", scale=57.29577951308232)
-    refused(daq, *fitting(degrees), says=("joint 1", "degrees", "rad"))
+    said = daq(*fitting(degrees))
+    assert (said.code, Path("out.json").exists()) == (2, False), said
+    assert all(word in said.out for word in ("CHECK", "joint 1", "degrees", "rad")), said.out
 
 
 def test_fewer_samples_than_parameters_are_refused(daq: CommandLine, tmp_path: Path) -> None:

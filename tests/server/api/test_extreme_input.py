@@ -45,7 +45,7 @@ def test_a_cursor_that_no_list_gave_out_is_refused(service: Service, path: str, 
     assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, ["cursor"]), answer.text
 
 
-@pytest.mark.parametrize(("body", "refused"), [(b"[" * 50_000, 422), (b'{"a":' * 50_000, 413)])
+@pytest.mark.parametrize(("body", "refused"), [(b"[" * 50_000, 400), (b'{"a":' * 50_000, 413)])
 def test_a_body_nested_beyond_measure_is_refused(service: Service, body: bytes, refused: int) -> None:
     headers: dict[str, Any] = {"Content-Type": "application/json"}
     model = service.robot.post("/models", params={"name": "x"}, content=body, headers=headers)
