@@ -62,8 +62,10 @@ def _shrunk(natural: list[int], least: list[int], texts: list[bool], room: int) 
 
 
 def _least(column: list[str]) -> int:
-    """Width of the longest piece that is not broken."""
-    return max((cell_len(piece) for cell in column for word in _words(cell) for piece in _pieces(word)), default=0)
+    """Width of the longest piece that is not broken, with the indent of all but the first of a cell."""
+    pieces = ([piece for word in _words(cell) for piece in _parts(word)] for cell in column)
+    indented = (INDENT * (place > 0) + piece for cell in pieces for place, piece in enumerate(cell))
+    return max(map(cell_len, indented), default=0)
 
 
 def _words(text: str) -> list[str]:
@@ -72,11 +74,6 @@ def _words(text: str) -> list[str]:
 
 def _parts(word: str) -> list[str]:
     return [word] if _UNIT.fullmatch(word) else _JOINTS.split(word)
-
-
-def _pieces(word: str) -> list[str]:
-    first, *others = _parts(word)
-    return [first, *(INDENT + piece for piece in others)]
 
 
 def _broken(cell: object, width: int) -> Any:
