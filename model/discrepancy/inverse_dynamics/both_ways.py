@@ -6,7 +6,7 @@ one of them shows may be a part of something else that the library has no law fo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 from daq.contracts.errors import SpecError, TraceError
@@ -16,6 +16,7 @@ from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics.judging import SUSPECTED
 from model.discrepancy.inverse_dynamics.left_over import SHAPED_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.looks import Look, Records, first_finding, found_in_torques, meet, names_of
+from model.fitting.choice import SLIDING_FRICTION
 
 PLAIN = 100.0
 """Evidence of all records from which an effect may be plain to see, so that it is named even where the held-out traces
@@ -163,7 +164,7 @@ def _is_shown(step: Step, other: Diagnosis) -> bool:
     if any(_agree(step, one) for one in found_in_torques(other)):
         return True
     suspicion = other.suspicion
-    return suspicion is not None and suspicion.effect in names_of(step) and meet(step.joints, suspicion.joints)
+    return suspicion is not None and meet(step.joints, suspicion.joints) and _alike(names_of(step), {suspicion.effect})
 
 
 def _is_beside(step: Step, others: Sequence[Step]) -> bool:
@@ -173,4 +174,10 @@ def _is_beside(step: Step, others: Sequence[Step]) -> bool:
 
 def _agree(step: Step, other: Step) -> bool:
     """Whether two steps may be of the same effect, on a joint of both."""
-    return meet(step.joints, other.joints) and bool(names_of(step) & names_of(other))
+    return meet(step.joints, other.joints) and _alike(names_of(step), names_of(other))
+
+
+def _alike(names: Set[str], others: Set[str]) -> bool:
+    """Whether there is a name in both, or dry friction in both: its laws differ only where motion is slow or one way,
+    or the load changes, and few motions show that. One of them confirms another."""
+    return bool(names & others) or all(any(name in SLIDING_FRICTION for name in some) for some in (names, others))
