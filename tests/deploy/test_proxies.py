@@ -21,7 +21,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from tests.repository.tracked import ROOT
-from tests.server.dashboard.browser import LIVE, WITHOUT_3D, chromium, playwright
+from tests.server.dashboard.browser import LIVE, NO_3D_HERE, WITHOUT_3D, chromium, playwright
 from tests.server.service import DAQ, Service, running_service
 
 NAMES = ("arm.lab", "lab")
@@ -196,4 +196,4 @@ def test_the_page_works_below_a_path(behind: Behind) -> None:
         expect(page.get_by_text("Lists the robots", exact=False).or_(page.get_by_text("robots").first)).to_be_visible()
         page.get_by_role("link", name="Dashboard").click()
         expect(page).to_have_url(f"{root}/")
-        assert complaints == []
+        assert [one for one in complaints if not one.startswith(NO_3D_HERE)] == []

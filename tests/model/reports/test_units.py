@@ -146,7 +146,7 @@ def test_a_validation_of_a_sliding_joint_is_in_metres(
     assert dict(report.facts)["squared error"].startswith("0.02 m² (")
     assert "measured − expected / m/s²" in labels
     _print_in_time(in_time, axis)
-    assert "rms 0.15 m/s², 15 × the noise floor (0.01)" in capsys.readouterr().out
+    assert "rms 0.15 m/s², 15 times its noise (0.01 m/s²)" in capsys.readouterr().out
 
 
 def test_the_gap_of_joints_that_turn_and_slide_is_shown_in_their_own_units(labels: list[str]) -> None:
