@@ -10,6 +10,7 @@ from importlib.metadata import version
 from fastapi import APIRouter, FastAPI
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from daq.config.documents import site_index
 from server import problems
@@ -50,7 +51,20 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
     app = bare_app(services)
     services.metrics.registry.register(StateMetrics(services))
     app.add_middleware(gate.middleware)
+    app.add_middleware(HeadAsGet)
     return app
+
+
+class HeadAsGet:
+    """Answers HEAD, which monitors send, as GET. The server leaves the body out, as it does for every HEAD."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and scope["method"] == "HEAD":
+            scope = {**scope, "method": "GET"}
+        await self._app(scope, receive, send)
 
 
 def bare_app(services: Services | None) -> FastAPI:

@@ -133,13 +133,13 @@ def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) ->
 def find_bounds(reading: Floats) -> list[tuple[int, int]]:
     """First and last row of each stretch in which a reading stands at its largest or its smallest value, that it comes
     to at full speed: a torque needs longer to stop a joint than from one sample to the next."""
-    rates = np.abs(np.diff(reading))
+    rates = np.diff(reading)
     usual = float(np.sqrt(np.mean(rates**2)))
     found = []
-    for bound in (reading.max(), reading.min()):
+    for bound, towards in ((reading.max(), rates), (reading.min(), -rates)):
         at = np.flatnonzero(np.diff(np.concatenate([[0], (reading == bound).astype(int), [0]])))
         for first, last in zip(at[::2], at[1::2] - 1, strict=True):
-            before = rates[max(0, first - 1 - ENTRY) : max(0, first - 1)]  # the last step is cut short
+            before = towards[max(0, first - 1 - ENTRY) : max(0, first - 1)]  # the last step is cut short
             if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
                 found.append((int(first), int(last)))
     return sorted(found)

@@ -90,8 +90,17 @@ def zone_here() -> str:
 def _after(cron: str, zone: str | None, moment: datetime) -> datetime | None:
     """Returns the first time after `moment` that fits. Where clocks are put forward, a time that is left out comes when
     they are; where they are put back, a time that comes twice counts once (unless the expression means every hour)."""
-    found = next(CronSim(cron, moment.astimezone(ZoneInfo(zone or "UTC"))), None)
+    found = next(CronSim(_of_the_clock(cron), moment.astimezone(ZoneInfo(zone or "UTC"))), None)
     return None if found is None else found.astimezone(UTC)
+
+
+def _of_the_clock(cron: str) -> str:
+    """The expression with the minutes and hours of a step such as `*/30` as a range, unless it means every hour. What
+    begins with a star is taken for time that passes, and would come twice, or not at all, when clocks change."""
+    minutes, hours, *days = cron.split()
+    if hours == "*":
+        return cron
+    return " ".join([minutes.replace("*", "0-59"), hours.replace("*", "0-23"), *days])
 
 
 def _not_valid(field: str, line: str) -> ProblemError:

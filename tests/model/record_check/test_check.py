@@ -24,6 +24,7 @@ from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import base_model
 from model.record_check.check import check_records, repaired
 from model.record_check.finding import doubts_in
+from model.record_check.readings import find_bounds
 from model.reports.diagnosis_report import diagnosis_report
 from model.reports.page import html
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -96,6 +97,14 @@ def test_wraps_are_said_and_taken_out_where_no_controller_has_used_them() -> Non
     with_friction = model.with_effect("coulomb_friction", (1,))
     left = [fit_torques(with_friction, [one], options=options).in_sample for one in (turned, wrapped)]
     assert left[1] == pytest.approx(left[0], rel=1e-6)
+
+
+def test_a_joint_that_rests_on_the_edge_of_a_count_is_at_no_bound() -> None:
+    rests = np.tile([0.0, -1.0], 200)
+    rests[100:110] = -1.0
+    assert find_bounds(rests) == []
+    comes = np.minimum(0.05 * np.arange(400.0), 10.0)
+    assert find_bounds(comes) == [(200, 399)]
 
 
 def test_spikes_are_a_doubt_beside_a_fit() -> None:

@@ -142,6 +142,8 @@ def test_a_trace_from_elsewhere_is_read_before_it_is_taken_in(service: Service) 
 def test_health_and_system_tell_how_it_is(service: Service) -> None:
     base = service.url
     assert service.client.get(f"{base}/healthz").json()["status"] == "ok"
+    asked = service.client.head(f"{base}/healthz")
+    assert (asked.status_code, asked.content) == (200, b""), "monitors ask so"
     checks = service.client.get(f"{base}/readyz").json()["checks"]
     assert checks == {"database": "", "room": "", "traces": "", "notifications": "", "robot ma2000": ""}
     assert service.client.get("/system").json()["storage"]["database"] == "sqlite"

@@ -232,7 +232,7 @@ def test_no_kind_of_motion_is_left_out() -> None:
     assert {trajectory["kind"] for trajectory, _, _ in OF_EVERY_KIND} == kinds
 
 
-@pytest.mark.parametrize("cron", ["0 2 * * *", "30 2 * * *"])
+@pytest.mark.parametrize("cron", ["0 2 * * *", "30 2 * * *", "*/60 2 * * *"])
 @pytest.mark.parametrize(
     ("begin", "hours"),
     [
@@ -252,6 +252,22 @@ def test_a_nightly_run_comes_once_a_night_also_when_the_clocks_change(
     local = [run.astimezone(berlin) for run in runs if run is not None]
     assert [run.hour for run in local] == hours
     assert [run.date() for run in local] == [(begin + timedelta(days=day)).date() for day in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("cron", "hours"),
+    [("*/30 2 * * *", ["02:00", "02:30"]), ("0 */2 * * *", ["02:00", "04:00"]), ("0 * * * *", ["02:00", "02:00"])],
+)
+def test_steps_of_the_clock_come_once_when_it_is_put_back_and_every_hour_means_every_hour(
+    cron: str, hours: list[str]
+) -> None:
+    berlin = ZoneInfo("Europe/Berlin")
+    plan = Plan(datetime(2026, 10, 25, 1, 55, tzinfo=berlin).astimezone(UTC), 0.0, None, cron, "Europe/Berlin")
+    begun = first(plan)
+    assert begun is not None
+    later = following(plan, 1, begun, begun)
+    assert later is not None
+    assert [f"{run.astimezone(berlin):%H:%M}" for run in (begun, later)] == hours
 
 
 def test_a_cron_run_at_the_very_start_counts_and_missed_ones_are_left_out() -> None:
