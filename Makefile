@@ -20,7 +20,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 # Even with -j: `page` and the background part of `lint` both install the page's packages into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo docs page test test-all checks page-tests lint format types requirements bench golden firmware clean distclean
+.PHONY: help serve demo docs page test test-thorough test-all checks compiled page-tests lint format types requirements bench golden firmware clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -39,19 +39,24 @@ docs: $(FOR_DEVELOPMENT) ## build the documents' site into docs/_site, strictly;
 page: | $(FOR_USE) ## build the dashboard's page where it is out of date
 	@$(BIN)/python hatch_build.py
 
-test: checks ## lint, types, import contracts, then the tests
+test: checks ## lint, types, import contracts, then the quick tests and one path through every door
 	@echo "== tests"
-	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow"
+	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow" --part quick
 
-test-all: checks ## the same, with the slow tests
-	@echo "== tests, the slow ones too"
+test-thorough: compiled ## all other tests, but for the slow ones
+	@echo "== thorough tests"
+	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow" --part thorough
+
+test-all: checks compiled ## every test, the slow ones too
+	@echo "== every test"
 	@$(BIN)/python -m pytest -q $(WORKERS)
 
-# What all workers of the tests need is compiled meanwhile, once: each would do it again, or wait for the one that does.
-checks: $(FOR_DEVELOPMENT) page ## lint and the tests of the page, while what the tests need is compiled
-	@$(BIN)/python -m tests.compile_ahead & ahead=$$!; \
-	$(MAKE) --no-print-directory lint page-tests; code=$$?; \
-	wait $$ahead || code=1; exit $$code
+checks: $(FOR_DEVELOPMENT) page ## lint and the tests of the page
+	@$(MAKE) --no-print-directory lint page-tests
+
+# What all workers of the tests need is compiled once: each would do it again, or wait for the one that does.
+compiled: $(FOR_DEVELOPMENT) page ## compile what the thorough tests need
+	@$(BIN)/python -m tests.compile_ahead
 
 page-tests: $(FOR_DEVELOPMENT) ## the tests of the modules of the page
 	@echo "== tests of the page's modules"

@@ -1,4 +1,4 @@
-"""Compiles what all workers of the tests need, once: `python -m tests.compile_ahead`, as `make test` does.
+"""Compiles what all workers of the tests need, once: `python -m tests.compile_ahead`, as `make test-thorough` does.
 
 Bytecode of the tests with their assertions rewritten, and the machine code of the simulation. What is missing here, the
 first test that needs it compiles.

@@ -9,7 +9,7 @@ from hypothesis import settings
 from xdist.remote import Producer
 
 from tests.left_running import Running, mark_this_process
-from tests.order import UnitScheduling, alternate, is_against_the_clock
+from tests.order import UnitScheduling, alternate, is_against_the_clock, is_thorough
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
@@ -42,6 +42,11 @@ MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--port", metavar="URL", help="run the hardware tests on the real controller at this port")
     parser.addoption(
+        "--part",
+        choices=("quick", "thorough"),
+        help="run the files that take no time, and one path through every door (`make test`), or all others",
+    )
+    parser.addoption(
         "--lab-data",
         type=Path,
         metavar="FOLDER",
@@ -61,6 +66,14 @@ def lab_data(request: pytest.FixtureRequest) -> Path:
     """The folder of measured traces (`--lab-data`); a test that asks for it is marked `lab_data`."""
     folder: Path = request.config.getoption("--lab-data")
     return folder
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """The files of the other part are not even read."""
+    part = config.getoption("--part")
+    if part is None or collection_path.is_dir() or not collection_path.name.startswith("test_"):
+        return None
+    return is_thorough(collection_path) == (part == "quick") or None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -22,9 +22,30 @@ AGAINST_THE_CLOCK = (
 fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. They
 are tried again, and the summary names each that was: one that comes up again and again is a race, not a busy machine.
 What runs on a real arm is never repeated by itself."""
+DOORS = (
+    "contract/test_reading.py",
+    "daq_cli/test_run.py",
+    "daq_cli/models/test_diagnose.py",
+    "ma2000/test_arm.py",
+    "mock/process/test_process.py",
+    "server/api/test_wrong_input.py",
+    "server/dashboard/test_stop.py",
+)
+"""Files that `make test` runs all the same: one path through every door."""
 ONE_WORKER = ("server/dashboard", "server/jobs", "server", "deploy", "model/thesis")
 """Folders whose tests share a service, a browser or a reproduction of the thesis, each costly to make: one worker runs
 the whole folder."""
+
+
+def is_thorough(path: Path) -> bool:
+    """Whether a file of tests takes long (`thorough.txt`), and is no door."""
+    name = path.relative_to(TESTS).as_posix()
+    return name in _thorough() and name not in DOORS
+
+
+@cache
+def _thorough() -> frozenset[str]:
+    return frozenset((TESTS / "thorough.txt").read_text("utf-8").split())
 
 
 def is_against_the_clock(test: pytest.Item) -> bool:
