@@ -175,18 +175,16 @@ def _beside_file(step: Step, name: str, value: FoundValue, stated: Mapping[str, 
 
 
 def _moved(numbers: Sequence[FittedNumber]) -> list[str]:
-    """Numbers of the machine file, a line each: as stated, as fitted, and how far apart."""
-    rows = [
-        (n.name, with_deviation(n.stated, n.deviation, n.unit), with_deviation(n.fitted, None, n.unit)) for n in numbers
-    ]
-    name, stated, fitted = (max(map(len, column)) for column in zip(*rows, strict=True))
-    return [
-        "of the machine file that the fit moved most: stated → fitted (stated deviations)",
-        *(
-            f"  {row[0]:<{name}}  {row[1]:>{stated}} → {row[2]:>{fitted}}  ({n.distance:.1f})"
-            for row, n in zip(rows, numbers, strict=True)
-        ),
-    ]
+    """Numbers of the machine file as stated, as fitted, and how far apart: a line each, or two where it is too wide."""
+    pairs = [(with_deviation(n.stated, n.deviation, n.unit), with_deviation(n.fitted, None, n.unit)) for n in numbers]
+    stated, fitted = (max(map(len, column)) for column in zip(*pairs, strict=True))
+    name = max(len(n.name) for n in numbers)
+    values = [f"{a:>{stated}} → {b:>{fitted}}  ({n.distance:.1f})" for (a, b), n in zip(pairs, numbers, strict=True)]
+    lines = ["those that the fit moved most: stated → fitted (stated deviations)"]
+    for n, said in zip(numbers, values, strict=True):
+        fits = name + max(map(len, values)) <= WIDTH - INDENT - 4
+        lines += [f"  {n.name:<{name}}  {said}"] if fits else [f"  {n.name}", f"    {said}"]
+    return lines
 
 
 def _filled(label: str, text: str, indent: int = INDENT) -> list[str]:
