@@ -81,10 +81,8 @@ def _step(step: Step, earlier: Sequence[Step], stated: Mapping[str, Parameter]) 
     lines += [" " * INDENT + line for line in candidates_lines(step, earlier)]
     if step.parameters:
         lines += _filled("added" if step.adopted else "tried", "")
-        lines += [
-            f"{'':{INDENT}}{name} = {_value(v)}{_beside_file(step, name, v, stated)}"
-            for name, v in step.parameters.items()
-        ]
+        for name, v in step.parameters.items():
+            lines += _filled("", f"{name} = {_value(v)}{_beside_file(step, name, v, stated)}")
     if not step.adopted and step.effect is not None:
         lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
     if step.excess_removed_holdout is not None:
@@ -189,4 +187,11 @@ def _moved(numbers: Sequence[FittedNumber]) -> list[str]:
 
 def _filled(label: str, text: str, indent: int = INDENT) -> list[str]:
     """Text beside a label, wrapped."""
-    return wrap(text, WIDTH, initial_indent=f"{label:<{indent}}", subsequent_indent=" " * indent) or [label]
+    lines = wrap(
+        f"{label:<{indent}}{text}",
+        WIDTH,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return lines or [label]
