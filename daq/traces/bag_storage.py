@@ -53,12 +53,14 @@ class Contents:
     types:    type of the messages on each topic
     messages: moment of reception (ns since 1970) and bytes of each message, by topic
     missing:  one line for everything that the bag promises, or once held, and that is not here
+    ended:    whether metadata.yaml, which a recorder writes when it ends, says how many messages there are
     ros_1:    whether messages are laid out as those of ROS 1
     """
 
     types: dict[str, str] = field(default_factory=dict)
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
+    ended: bool = False
     ros_1: bool = False
 
     def topic(self, name: str, kind: str) -> bool:
@@ -103,6 +105,7 @@ def _folder(path: Path, found: Contents, limits: TraceLimits) -> None:
     names, mode = about.get("relative_file_paths"), str(about.get("compression_mode") or "").lower()
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise TraceError(f"{path / METADATA}: names no files (relative_file_paths)")
+    found.ended = bool(_topics(about))
     for kind in _topics(about).values():
         found.topic(*kind[:2])
     for name in names:
@@ -343,9 +346,12 @@ def _rows(file: Path, database: sqlite3.Connection, found: Contents, limits: Tra
 def _hold_to_its_own_metadata(
     file: Path, database: sqlite3.Connection, found: Contents, before: Mapping[str, int]
 ) -> None:
+    """Notes what a database's own metadata promise and it lacks. Some releases of ROS leave that table empty."""
     row = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
+    if row is None or found.ended:
+        return
     with suppress(TraceError):
-        about = _about(str(row[0]).encode(), file.name) if row else {}
+        about = _about(str(row[0]).encode(), file.name)
         paths = about.get("relative_file_paths")
         if isinstance(paths, list) and len(paths) > 1:
             return  # of all files of the bag together; metadata.yaml says the same
@@ -392,7 +398,7 @@ def _recovered(file: Path, folder: Path, found: Contents) -> Path:
     whole = _frames(wal) if wal in beside else 0
     with closing(sqlite3.connect(copy)) as database:
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        _, applied, _ = database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+        _, applied, _ = database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()  # the others count 0 pages
         if whole > max(applied, 0):
             line = f"{whole - max(applied, 0)} of {whole} pages of {beside[0].name} are damaged or were never committed"
             found.missing.append(f"{line}; rows in them are missing")

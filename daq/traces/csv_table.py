@@ -32,6 +32,9 @@ SIGNALS = ("set_point", "position", "drive", "velocity")
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 """Note in a trace whose positions were integrated."""
 
+FILE_TIME = "Its date is the last change of its file."
+"""Note in a trace whose description states no `created`."""
+
 SHOWN = 20
 """Number of columns that an error lists."""
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
@@ -96,6 +99,8 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
     record = description.record(path, description.load_machine(path), trace_id_of(data, *described))
+    if description.created is None:
+        said.append(FILE_TIME)
     if "position" not in signals:
         signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")

@@ -17,7 +17,7 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq.contracts.refused import refused_words
-from daq.contracts.trace import Floats, Moment, TraceRecord
+from daq.contracts.trace import EARLIEST, LATEST, Floats, Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
 from daq.traces.recording import software
@@ -88,11 +88,14 @@ class Description(FrozenRecord):
 
     def record(self, path: Path, machine: Machine | None, identity: str) -> TraceRecord:
         """The record of the trace in the file `path`. `identity` follows from what the files hold, so that a model
-        fitted to the trace goes on naming it."""
+        fitted to the trace goes on naming it. Where no date is stated, it is that of the file's last change.
+
+        Raises TraceError.
+        """
         own_name = machine.name if machine else path.stem
         return TraceRecord(
             trace_id=identity,
-            created=self.created or datetime.now(UTC),
+            created=self.created or _last_change(path),
             software=software(),
             source=self.source,
             robot=own_name if self.robot is None else self.robot,
@@ -103,6 +106,15 @@ class Description(FrozenRecord):
             notes=self.notes,
             outcome=self.outcome,
         )
+
+
+def _last_change(path: Path) -> datetime:
+    """When a file was last changed, within the years that a trace can be of. Raises TraceError."""
+    try:
+        changed = os.stat(path).st_mtime
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+    return datetime.fromtimestamp(min(max(changed, EARLIEST.timestamp()), LATEST.timestamp() - 1.0), UTC)
 
 
 def toml_path(path: Path) -> Path:

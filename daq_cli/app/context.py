@@ -54,17 +54,18 @@ def print_table(table: Table) -> None:
     print_fitting(table, Console(highlight=False, markup=False))
 
 
-def print_prose(text: str, label: str = "") -> None:
-    """Prints sentences of a result on standard output, broken at words to the terminal's width.
+def print_prose(text: str, label: str = "", *, err: bool = False) -> None:
+    """Prints sentences on standard output, broken at words to the terminal's width.
 
     Args:
         label: begins the first line; the others begin below its first word's end. A number keeps its unit beside it.
+        err: prints on standard error.
     """
     width = shutil.get_terminal_size().columns
     whole = _BEFORE_UNIT.sub(_TIED, printable(text))
     indent = " " * min(len(label), LABEL)
     lines = wrap(label + whole, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-    print("\n".join(lines).replace(_TIED, " "))
+    print("\n".join(lines).replace(_TIED, " "), file=sys.stderr if err else sys.stdout)
 
 
 @dataclass

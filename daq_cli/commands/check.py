@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from daq.contracts import exit_codes
-from daq_cli.app.context import JsonOption, print_json, print_table
+from daq_cli.app.context import JsonOption, print_json
 from daq_cli.models.model_input import (
     MODEL_HELP,
     TraceFolderOption,
@@ -17,12 +16,8 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.record_doubts import end_if_doubted, print_record
 from daq_cli.robot.access import robot_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from model.record_check.finding import RecordFinding
 
 app = typer.Typer(add_completion=False)
 
@@ -40,7 +35,6 @@ def check(
     """Check units, signs, columns, times and readings of traces. The exit code is 2 where any is doubted."""
     from model.machine_model.model import base_model
     from model.record_check.check import check_records
-    from model.record_check.finding import doubts_in
 
     robot = robot_of(context)
     read = read_traces(robot, folder, traces)
@@ -49,20 +43,8 @@ def check(
     found = check_records(of, read)
     if json:
         print_json([finding.model_dump(mode="json") for finding in found])
+    elif found:
+        print_record(found)
     else:
-        _print(found, len(read))
-    if doubts_in(found):
-        raise typer.Exit(exit_codes.WRONG_INPUT)
-
-
-def _print(found: Sequence[RecordFinding], traces: int) -> None:
-    from rich.table import Table
-
-    if not found:
-        print(f"nothing is doubted in {traces} trace{'' if traces == 1 else 's'}")
-        return
-    table = Table("", "trace", "joint", "what", "what to do", box=None, header_style="bold")
-    for one in found:
-        joint = "" if one.joint is None else str(one.joint)
-        table.add_row(one.consequence, one.record, joint, one.says, one.advice)
-    print_table(table)
+        print(f"nothing is doubted in {len(read)} trace{'' if len(read) == 1 else 's'}")
+    end_if_doubted(found)

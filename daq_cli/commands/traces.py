@@ -10,7 +10,7 @@ import typer
 from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
 from daq_cli.app import completion
-from daq_cli.app.context import JsonOption, console, print_json, print_table, printable
+from daq_cli.app.context import JsonOption, console, print_json, print_prose, print_table, printable
 from daq_cli.robot.access import robot_of
 from daq_cli.robot.answers import BagChoice
 
@@ -243,8 +243,9 @@ def _print_imported(robot: RobotAccess, file: Path) -> None:
     except ImportError:  # a plain installation reads traces and computes nothing
         return
     doubts = lines_of(doubts_in(check_records(base_model(machine), [trace])))
-    lines = [f"CHECK  {line}" for line in doubts] or ["check: nothing is doubted"]
-    typer.echo(printable("\n".join([*lines, f"next: daq {'check' if doubts else 'diagnose'} {file}"])), err=True)
+    for line in doubts or ["nothing is doubted"]:
+        print_prose(line, "CHECK  " if doubts else "check: ", err=True)
+    typer.echo(printable(f"next: daq {'check' if doubts else 'diagnose'} {file}"), err=True)
 
 
 def _has(trace: Trace, signal: str) -> bool:

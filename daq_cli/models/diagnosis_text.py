@@ -81,10 +81,8 @@ def _step(step: Step, earlier: Sequence[Step], stated: Mapping[str, Parameter]) 
     lines += [" " * INDENT + line for line in candidates_lines(step, earlier)]
     if step.parameters:
         lines += _filled("added" if step.adopted else "tried", "")
-        lines += [
-            f"{'':{INDENT}}{name} = {_value(v)}{_beside_file(step, name, v, stated)}"
-            for name, v in step.parameters.items()
-        ]
+        for name, v in step.parameters.items():
+            lines += _filled("", f"{name} = {_value(v)}{_beside_file(step, name, v, stated)}")
     if not step.adopted and step.effect is not None:
         lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
     if step.excess_removed_holdout is not None:
@@ -175,20 +173,25 @@ def _beside_file(step: Step, name: str, value: FoundValue, stated: Mapping[str, 
 
 
 def _moved(numbers: Sequence[FittedNumber]) -> list[str]:
-    """Numbers of the machine file, a line each: as stated, as fitted, and how far apart."""
-    rows = [
-        (n.name, with_deviation(n.stated, n.deviation, n.unit), with_deviation(n.fitted, None, n.unit)) for n in numbers
-    ]
-    name, stated, fitted = (max(map(len, column)) for column in zip(*rows, strict=True))
-    return [
-        "of the machine file that the fit moved most: stated → fitted (stated deviations)",
-        *(
-            f"  {row[0]:<{name}}  {row[1]:>{stated}} → {row[2]:>{fitted}}  ({n.distance:.1f})"
-            for row, n in zip(rows, numbers, strict=True)
-        ),
-    ]
+    """Numbers of the machine file as stated, as fitted, and how far apart: a line each, or two where it is too wide."""
+    pairs = [(with_deviation(n.stated, n.deviation, n.unit), with_deviation(n.fitted, None, n.unit)) for n in numbers]
+    stated, fitted = (max(map(len, column)) for column in zip(*pairs, strict=True))
+    name = max(len(n.name) for n in numbers)
+    values = [f"{a:>{stated}} → {b:>{fitted}}  ({n.distance:.1f})" for (a, b), n in zip(pairs, numbers, strict=True)]
+    lines = ["those that the fit moved most: stated → fitted (stated deviations)"]
+    for n, said in zip(numbers, values, strict=True):
+        fits = name + max(map(len, values)) <= WIDTH - INDENT - 4
+        lines += [f"  {n.name:<{name}}  {said}"] if fits else [f"  {n.name}", f"    {said}"]
+    return lines
 
 
 def _filled(label: str, text: str, indent: int = INDENT) -> list[str]:
     """Text beside a label, wrapped."""
-    return wrap(text, WIDTH, initial_indent=f"{label:<{indent}}", subsequent_indent=" " * indent) or [label]
+    lines = wrap(
+        f"{label:<{indent}}{text}",
+        WIDTH,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return lines or [label]

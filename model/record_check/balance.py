@@ -39,6 +39,9 @@ EXPLAINS = 0.25
 """Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
 CLEAR = 5.0
 """Deviations of an estimate from which it is clear, however its noise goes on from sample to sample."""
+MOST_BEHIND = 1 / 8
+"""Longest delay that is estimated, in widths of the smoothing: the fastest motion that passes it turns by 1 rad in that
+time, and the straight line by which a delay is estimated is off by a sixth there."""
 MOST_FRICTION = 5.0
 """Most torque that a drive gives, in torques that weight and inertia need: sound rigs have up to 4.6."""
 TURNED = 0.75
@@ -79,7 +82,8 @@ class Balance:
     turned: float
     """Share of what is left that gravity takes off where it is turned round, if it is that which is left; else 0."""
     behind: Floats
-    """(n,) samples that the drive comes behind the motion that it makes; 0 where that is not clear. A drive that is
+    """(n,) samples that the drive comes behind the motion that it makes; 0 where that is not clear, or longer than the
+    smoothing lets a delay be estimated. A drive that is
     held until the next sample comes half of one before."""
 
     @property
@@ -306,7 +310,7 @@ def _left(torque: Floats, speed: Floats, rate: Floats, width: int) -> tuple[floa
         return left, 0.0
     spread = float(np.mean((level - columns @ line) ** 2)) * width
     deviation = float(np.sqrt(spread * np.linalg.inv(columns.T @ columns)[2, 2]))
-    return left, float(-line[2]) if abs(line[2]) > CLEAR * deviation else 0.0
+    return left, float(-line[2]) if CLEAR * deviation < abs(line[2]) < MOST_BEHIND * width else 0.0
 
 
 def _width(motion: Motion) -> int | None:

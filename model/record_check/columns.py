@@ -26,7 +26,7 @@ from model.record_check.balance import (
 from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
 from model.record_check.law import Reading as ColumnReading
-from model.record_check.words import CHECK_COLUMNS, number
+from model.record_check.words import CHECK_COLUMNS, number, times_of
 
 FACTOR_OF_UNIT = 1.2
 """Ratio within which a factor is that of another unit: gains and motors are hardly off by more."""
@@ -121,9 +121,13 @@ class _Witnesses:
         """A drive of the right sign that is not what the gains make, or not at once."""
         if not 1 / FACTOR_OF_GAIN < fit.factor < FACTOR_OF_GAIN:
             return self._scale(joint, fit.factor, "what the controller's gains make of set point and position")
-        if fit.reading.late:
-            says = "its drive stands one sample too low: it follows from set point and position of the row before."
-            return self._doubt("drive-late", joint, says, "Move the drive up by one row.", value=1.0, allowed=0.0)
+        late = fit.reading.late
+        if late:
+            way, other, seen = ("low", "up", "before") if late > 0 else ("high", "down", "after")
+            rows = times_of(abs(late), "row")
+            says = f"its drive stands {rows} too {way}: it follows from set point and position {rows} {seen}."
+            advice = f"Move the drive {other} by {rows}."
+            return self._doubt("drive-late", joint, says, advice, value=float(late), allowed=0.0)
         return None
 
     def _drives_motion(self, joint: int, motion: Motion | None) -> bool:
@@ -220,7 +224,8 @@ class _Witnesses:
             late = 0.0 if found is None else float(found.behind[place])
             if late > BEHIND:
                 says = f"its drive comes {number(late)} samples after the motion that it makes: it stands too low."
-                advice = "Move the drive up by one row, if each row is read at one moment."
+                rows = times_of(math.ceil(late - BEHIND), "row")
+                advice = f"Move the drive up by {rows}, if each row is read at one moment."
                 yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
 
     def _stretched(self, motion: Motion) -> RecordFinding | None:

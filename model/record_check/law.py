@@ -25,6 +25,8 @@ AT_LIMIT = 0.98
 """Share of the largest drive from which it may be cut off."""
 SEVERAL = 3
 """Samples at the largest drive that show a limit."""
+MOST_ROWS = 3
+"""Rows by which the drive's column may have slipped against the others, up or down, to be looked for."""
 DEGREE = math.pi / 180.0
 
 
@@ -33,7 +35,8 @@ class Reading:
     """A way to read the columns of one joint.
 
     Args:
-        position, set_point: what stands in these columns. late: samples that the drive stands too low in the file.
+        position, set_point: what stands in these columns. late: samples that the drive stands too low in the file;
+            below 0 too high.
         swapped: whether position and set point are exchanged. turned: those of both that are in degrees.
     """
 
@@ -67,8 +70,10 @@ def fits_of(trace: Trace, machine: Machine, joint: int) -> list[LawFit]:
         formed = formed_drive(trace, machine, joint, reading)
         if formed is None:
             return []
-        late = reading.late
-        found.append(_fit(reading, formed[: len(formed) - late], drive[late:]))
+        late, rows = reading.late, len(drive)
+        found.append(
+            _fit(reading, formed[max(0, -late) : rows - max(0, late)], drive[max(0, late) : rows + min(0, late)])
+        )
     return found
 
 
@@ -121,7 +126,7 @@ def formed_drive(trace: Trace, machine: Machine, joint: int, reading: Reading, s
 
 def _ways(position: Floats, asked: Floats, *, slides: bool) -> Iterator[Reading]:
     yield Reading(position, asked)
-    yield Reading(position, asked, late=1)
+    yield from (Reading(position, asked, late=late) for late in range(-MOST_ROWS, MOST_ROWS + 1) if late)
     yield Reading(asked, position, swapped=True)  # of a cascade; a PID's drive has the other sign, as in the first
     if not slides:
         yield Reading(position * DEGREE, asked, turned="positions")

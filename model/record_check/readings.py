@@ -6,6 +6,7 @@ interval lies outside the speeds of both its neighbours by more than the record'
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -36,8 +37,6 @@ MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
 BRIDGED = (10.0, 0.05)
 """Longest gap that is bridged: so many intervals, and so many seconds more; a joint goes on as it did."""
-WHOLE = 0.1
-"""Distance from a whole turn, as a share of it, at which a jump is that of a wrapped encoder: it moves meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Jump:
 
 @dataclass(frozen=True)
 class FalseReadings:
-    """The jumps of a reading, sorted: wraps by whole turns; spikes, pairs of jumps there and back; stuck, jumps after
+    """The jumps of a reading, sorted: wraps by one turn; spikes, pairs of jumps there and back; stuck, jumps after
     readings that did not change, with the row since which; others."""
 
     wraps: tuple[Jump, ...]
@@ -91,15 +90,15 @@ def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
     allowed = max(noise + kink, LEAST_COUNTS * rounding)
     found = []
     for k in np.flatnonzero(outside > allowed):
-        around = rate[max(0, k - 2) : k + 5]
-        found.append(Jump(int(k) + 1, float(rate[k + 1] - np.median(around)), allowed))
+        moved_by_itself = float(np.median(rate[max(0, k - 2) : k + 5]) * intervals[k + 1] / usual)
+        found.append(Jump(int(k) + 1, float(reading[k + 2] - reading[k + 1]) - moved_by_itself, allowed))
     return found
 
 
 def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -> FalseReadings:
     """Jumps by what makes them. turns: whole turns of the joint, or of its sensor, in the reading's unit."""
-    wraps = [j for j in jumps if any(_whole(j.size, turn) for turn in turns)]
-    left = [j for j in jumps if j not in wraps and abs(j.size) > j.usual]
+    wraps = [j for j in jumps if _wrapped(j, turns)]
+    left = [j for j in jumps if not _wrapped(j, turns) and abs(j.size) > j.usual]
     spikes: list[Jump] = []
     stuck: list[tuple[int, Jump]] = []
     others: list[Jump] = []
@@ -122,12 +121,10 @@ def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -
 
 
 def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) -> Floats:
-    """The reading (k,) with whole turns added behind each wrap."""
-    whole = reading.copy()
-    for jump in wraps:
-        turn = next(turn for turn in turns if _whole(jump.size, turn))
-        whole[jump.row + 1 :] -= turn * round(jump.size / turn)
-    return whole
+    """The reading (k,) with a whole turn added behind each wrap."""
+    turned = np.zeros(len(reading))
+    turned[[jump.row + 1 for jump in wraps]] = [_wrapped(jump, turns) for jump in wraps]
+    return np.asarray(reading - np.cumsum(turned))
 
 
 def find_bounds(reading: Floats) -> list[tuple[int, int]]:
@@ -171,9 +168,10 @@ def noise_of(reading: Floats, step: float = 0.0) -> float:
     return max(spread, step / np.sqrt(12.0))
 
 
-def _whole(size: float, turn: float) -> bool:
-    turns = round(size / turn)
-    return turns != 0 and abs(size - turns * turn) < WHOLE * turn
+def _wrapped(jump: Jump, turns: Sequence[float]) -> float:
+    """The turn by which a reading wraps there, with its sign; 0 where noise and acceleration leave more beside it."""
+    nearest = min(turns, key=lambda turn: abs(abs(jump.size) - turn), default=math.inf)
+    return math.copysign(nearest, jump.size) if abs(abs(jump.size) - nearest) <= jump.usual else 0.0
 
 
 def _returns(jumps: Sequence[Jump], first: int) -> int | None:

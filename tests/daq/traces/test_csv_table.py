@@ -1,6 +1,7 @@
 """CSV out and in again, to the bit; and one line with row and column for what is wrong in a file."""
 
 import dataclasses
+import os
 import tomllib
 from pathlib import Path
 
@@ -10,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace import Trace
-from daq.traces.csv_table import export_csv, import_csv
+from daq.contracts.trace import EARLIEST, Trace
+from daq.traces.csv_table import FILE_TIME, export_csv, import_csv
 from daq.traces.reader import read_trace
 from tests.daq.traces.samples import CREATED, record, write
 
@@ -98,6 +99,12 @@ def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:
     trace = import_csv(path)
     assert (trace.joints, trace.record.source, trace.record.robot) == ((1,), "imported", "rig")
     assert trace.record.outcome is None
+    os.utime(path, (1e9, 1e9))
+    again = [import_csv(path).record for _ in range(2)]
+    assert again[0] == again[1]
+    assert (again[0].created.isoformat(), again[0].notes) == ("2001-09-09T01:46:40+00:00", FILE_TIME)
+    os.utime(path, (-1e9, -1e9))  # no time at which a trace can have been recorded
+    assert import_csv(path).record.created == EARLIEST
     np.testing.assert_array_equal(trace.position[:, 0], [1, 0.001])
     assert trace.drive is not None
     np.testing.assert_array_equal(trace.drive[:, 0], [2, -4])

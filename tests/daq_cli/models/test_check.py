@@ -34,13 +34,15 @@ def changed(path: Path, *, spikes: bool = False, slower: float = 1.0) -> Path:
     return path
 
 
-def test_a_record_is_checked_and_its_faults_have_their_place(daq: CommandLine) -> None:
+def test_a_record_is_checked_and_its_faults_have_their_place(daq: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     write_swing(Path("sound.csv"), 1)
     assert daq("check", "sound.csv", "--model", SINGLE_AXIS).code == 0
     changed(Path("spiked.csv"), spikes=True)
     said = daq("check", "spiked.csv", "--model", SINGLE_AXIS)
     assert said.code == 2
-    assert "3 spikes" in " ".join(said.out.split())
+    assert " ".join(said.out.split()).startswith("CHECK spiked.csv: joint 1: 3 spikes at 1.50, 2.50, 4.50 s, of ")
+    assert max(map(len, said.out.splitlines())) <= 80
     said = daq("check", "spiked.csv", "--model", SINGLE_AXIS, "--json")
     (found,) = [one for one in json.loads(said.out) if one["consequence"] == "doubt"]
     assert (said.code, found["kind"], found["joint"], found["count"]) == (2, "spikes", 1, 3)

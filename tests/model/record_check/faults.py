@@ -126,6 +126,19 @@ def slow_times(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     return Faulty(replace(trace, time=2.0 * trace.time), ("time-scale",))
 
 
+def slipped(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """An encoder that slips by nearly a turn, or by several, while it turns."""
+    turning = [j for j in machine.modelled_joints if machine.joint(j).kind == "revolute"]
+    turning = [j for j in turning if _source(trace, machine, j)[0] == "position"]
+    if not turning:
+        return None
+    joint = int(draw.choice(turning))
+    _, signal = _source(trace, machine, joint)
+    row = int(draw.choice(np.flatnonzero(np.diff(signal[:-20]))[20:])) + 2
+    signal[row:] += 2 * math.pi * draw.choice([0.92, 1.08, 2.0, 3.0])
+    return Faulty(_with(trace, "position", joint, signal), ("jump",), joint, float(trace.time[row]))
+
+
 def late_drive(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
     """Drives one row too low."""
     if trace.drive is None:
@@ -187,6 +200,7 @@ FAULTS: dict[str, Fault] = {
     for one in (
         spikes,
         wraps,
+        slipped,
         stuck,
         saturated,
         cut_out,

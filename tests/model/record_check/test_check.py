@@ -107,6 +107,36 @@ def test_a_joint_that_rests_on_the_edge_of_a_count_is_at_no_bound() -> None:
     assert find_bounds(comes) == [(200, 399)]
 
 
+def test_one_turn_is_a_wrap_however_uneven_the_stamps_are_and_any_other_jump_is_one() -> None:
+    machine, turned = rigs.geared_machine(), rigs.geared_trace(3, {}, 8.0)
+    uneven = np.random.default_rng(1).uniform(0.75, 1.25, len(turned) - 1) * float(turned.time[1] - turned.time[0])
+    time = np.concatenate([[0.0], np.cumsum(uneven)])
+    position = np.column_stack([np.interp(time, turned.time, turned.position[:, 0])])
+    for turns, kind in ((1.0, "wraps"), (-1.0, "wraps"), (0.92, "jump"), (2.0, "jump")):
+        slipped = replace(turned, time=time, position=position + turns * 2 * np.pi * (time > 4.0)[:, None])
+        found = [one.kind for one in check_records(base_model(machine), [slipped]) if one.kind in ("wraps", "jump")]
+        assert found == [kind], turns
+
+
+@pytest.mark.parametrize("rows", [-3, -2, -1, 2, 3])
+def test_the_rows_by_which_a_drive_has_slipped_are_told(rows: int, tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    assert trace.drive is not None
+    (one,) = check_records(base_model(machine), [replace(trace, drive=np.roll(trace.drive, rows, axis=0))])
+    assert (one.kind, one.value, one.consequence) == ("drive-late", rows, "doubt")
+    assert f"Move the drive {'up' if rows > 0 else 'down'} by {abs(rows)} row" in one.advice
+
+
+def test_without_a_controller_only_a_delay_that_can_be_estimated_is_told(tmp_path: Path) -> None:
+    machine, trace = example("motor_bench")(tmp_path)
+    assert trace.drive is not None
+    for rows in (1, 2, 3):
+        (one,) = check_records(base_model(machine), [replace(trace, drive=np.roll(trace.drive, rows, axis=0))])
+        assert (one.kind, f"by {rows} row" in one.advice) == ("drive-late", True)
+    for other in (np.roll(trace.drive, 12, axis=0), trace.drive / 4.448):
+        assert "drive-late" not in kinds(machine, replace(trace, drive=other))
+
+
 def test_spikes_are_a_doubt_beside_a_fit() -> None:
     position = SLIDE.position.copy()
     position[[300, 700, 1100]] += 0.05

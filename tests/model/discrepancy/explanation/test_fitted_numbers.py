@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from daq.contracts.machine import load_machine
-from daq_cli.models.diagnosis_text import answer_text
+from daq_cli.models.diagnosis_text import WIDTH, answer_text
 from model.discrepancy.diagnosis import Diagnosis, FoundValue
 from model.discrepancy.explanation.fitted_numbers import most_moved, stated_beside, stated_numbers
 from model.machine_model.model import Model, base_model
@@ -87,13 +87,15 @@ def test_terminal_and_page_list_them() -> None:
     taken = step("link_mass", (1,), parameters={"joint1.link_mass.added": added})
     found = answer(after, steps=(taken,), verdict="named")
     text = answer_text(found)
-    assert "numbers  of the machine file that the fit moved most: stated → fitted (stated deviations)" in text
+    assert "numbers  those that the fit moved most: stated → fitted (stated deviations)" in text
     assert f"  link1.mass  {mass.value:.4g} ± {mass.deviation:.2g} kg → {fitted.value:.4g} kg  (1.5)" in text
-    assert f"= 0.2 kg (95 %: 0.1 to 0.3); the file states {mass.value:.4g} ± {mass.deviation:.2g} kg" in text
+    added_to = f"= 0.2 kg (95 %: 0.1 to 0.3); the file states {mass.value:.4g} ± {mass.deviation:.2g} kg"
+    assert added_to in " ".join(text.split())
+    assert max(map(len, text.splitlines())) <= WIDTH
     sections = {s.title: s for s in diagnosis_report(found).sections}
     (table,) = sections["What the fit made of the machine's numbers"].blocks
     assert isinstance(table, Table)
     assert [cell.text for cell in table.rows[0]][0::3] == ["link1.mass", "1.5"]
     (named,) = (b for b in sections["What adding it did"].blocks if isinstance(b, Table))
     assert named.head[-1] == "in the file"
-    assert "numbers  of" not in answer_text(answer(GIVEN))
+    assert "numbers  those" not in answer_text(answer(GIVEN))
