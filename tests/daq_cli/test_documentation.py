@@ -19,7 +19,7 @@ from daq.contracts.errors import DaqError
 from daq_cli.app.lazy import SUBCOMMANDS
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "command-line.md").read_text("utf-8")
-EXAMPLES = [shlex.split(text) for text in re.findall(r"\| `daq ([^`]+)` \|", PAGE)]
+EXAMPLES = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
 
 
 def commands() -> dict[tuple[str, ...], Any]:

@@ -61,7 +61,7 @@ def test_the_readme_shows_the_two_commands_of_a_new_user() -> None:
 def test_the_index_of_decisions_names_every_one_by_its_title() -> None:
     folder = ROOT / "docs" / "decisions"
     index = (folder / "README.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| \[(\d{4})\]\((\S+)\) \| (.+) \|$", index, re.MULTILINE)
+    rows = re.findall(r"^- \[(\d{4})\]\((\S+)\): (.+)$", index, re.MULTILINE)
     files = sorted(path for path in folder.glob("*.md") if path.name != "README.md")
     titles = [path.read_text(encoding="utf-8").partition("\n")[0] for path in files]
     assert [(name, f"# {number}: {title}") for number, name, title in rows] == [
