@@ -48,6 +48,7 @@ _NUMBERS: dict[str, dict[str, int]] = {
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
     "dynamics": {"damping": 1, "friction": 1},
     "mimic": {"multiplier": 1, "offset": 1},
+    "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1},
 }
 """How many numbers the attributes of an element hold."""
 
@@ -169,6 +170,8 @@ def _joint(joint: Xml.Element, origin: str) -> JointText:
     if axis is not None and kind in MOVING and math.hypot(*axis) < 1e-6:
         raise SpecError(f"{where}: axis xyz is {axis}; a direction is needed")
     limit, dynamics, mimic = joint.find("limit"), joint.find("dynamics"), joint.find("mimic")
+    for end in _NUMBERS["safety_controller"]:
+        _number(joint.find("safety_controller"), end, where)
     low, high = (_number(limit, end, where) or 0.0 for end in ("lower", "upper"))
     if low > high:
         raise SpecError(f"{where}: limit lower {low} is above upper {high}")
@@ -200,6 +203,11 @@ def _doubts(robot: Xml.Element) -> Iterator[str]:
         for end in ("lower", "upper")
         if joint.get("type") == "revolute"
     ]
+    soft = [shown(joint.get("name")) for joint in robot.findall("joint") if _is_softer(joint)]
+    if soft:
+        yield f"joint {', '.join(soft)}: the soft limits of its safety_controller are narrower, and are not taken over"
+    if any((ratio.text or "").strip() not in ("", "1", "1.0") for ratio in robot.iter("mechanicalReduction")):
+        yield "a mechanicalReduction of its transmissions is not taken over: state gear_ratio in the machine file"
     if max(turns, default=0.0) > FULL_TURN:
         yield f"an origin is turned by rpy {max(turns):.4g} rad, more than once round: are angles in degrees?"
     if NO_LIMIT > max(limits, default=0.0) > MOST_TURNS * FULL_TURN:
@@ -214,6 +222,14 @@ def _doubts(robot: Xml.Element) -> Iterator[str]:
             what = f"{mass:.4g} kg with moments to {max(moments):.4g} kg·m²"
             yield f"link {shown(link.get('name'))} has {what}, which no body has: are they in g, mm or placeholders?"
             return
+
+
+def _is_softer(joint: Xml.Element) -> bool:
+    """Whether a joint has soft limits within its limits; both 0 are none."""
+    ends = ("lower", "upper")
+    low, high = (_number(joint.find("limit"), end, "") or 0.0 for end in ends)
+    softer, stricter = (_number(joint.find("safety_controller"), f"soft_{end}_limit", "") or 0.0 for end in ends)
+    return softer < stricter and (softer > low or stricter < high)
 
 
 def _largest(limit: float | None) -> float | None:

@@ -111,6 +111,16 @@ def test_a_doubt_is_in_the_notes_of_the_machine(tmp_path: Path) -> None:
         machine_from_urdf(written(tmp_path, far))
 
 
+def test_what_is_not_taken_over_of_limits_and_gears_is_noted(tmp_path: Path) -> None:
+    inside = '<safety_controller soft_lower_limit="-0.1" soft_upper_limit="0.1" k_velocity="1"/></joint>'
+    geared = "<transmission><joint/><mechanicalReduction>50</mechanicalReduction></transmission></robot>"
+    text = TWO_JOINTS.replace("</joint>", inside, 1).replace("</robot>", geared)
+    notes = machine_from_urdf(written(tmp_path, text)).notes
+    assert "the soft limits of its safety_controller are narrower" in notes
+    assert "mechanicalReduction of its transmissions is not taken over" in notes
+    assert "safety_controller" not in machine_from_urdf(written(tmp_path, TWO_JOINTS)).notes
+
+
 @pytest.mark.parametrize("declared", ['xmlns:xacro="http://www.ros.org/wiki/xacro"', ""])
 def test_xacro_that_was_not_expanded_is_named(tmp_path: Path, declared: str) -> None:
     with pytest.raises(SpecError, match=r"is xacro that was not expanded; .*`xacro FILE > robot\.urdf`"):
