@@ -77,9 +77,9 @@ def test_what_is_missing_is_counted_in_samples(
     due = first.tick + every
     reply = controller.link.exchange
 
-    def later(*requests: Request) -> tuple[Reply, ...]:
+    def later(*requests: Request, before_stop: int | None = None) -> tuple[Reply, ...]:
         if not any(isinstance(one, Sample) for one in requests):
-            return reply(*requests)
+            return reply(*requests, before_stop=before_stop)
         controller.clock.sleep_until(controller.clock.now() + late * controller.period_s)
         return reply(*(Sample(due + late - 1, one.mask) if isinstance(one, Sample) else one for one in requests))
 
