@@ -6,7 +6,7 @@ one of them shows may be a part of something else that the library has no law fo
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from dataclasses import replace
 
 from daq.contracts.errors import SpecError, TraceError
@@ -79,6 +79,8 @@ def _join(look: Look, exchanged: Look) -> Diagnosis:
         left = _plain_alone(exchanged) or other
         return _with_note(left, Note(kind="traces-contradict", values={"effects": effects}))
     confirmed = [step for step in found if _is_shown(step, other) or exchanged.speaks_for(step)]
+    others = [one for one in seen if not any(_agree(one, step) for step in found)]
+    confirmed += _by_relatives([step for step in found if step not in confirmed], others)
     missing = [s for s in found if s not in confirmed and (not _is_plain(s) or _is_beside(s, confirmed))]
     if len(missing) == len(found):
         plain = _plain_alone(exchanged)
@@ -164,7 +166,24 @@ def _is_shown(step: Step, other: Diagnosis) -> bool:
     if any(_agree(step, one) for one in found_in_torques(other)):
         return True
     suspicion = other.suspicion
-    return suspicion is not None and meet(step.joints, suspicion.joints) and _alike(names_of(step), {suspicion.effect})
+    return suspicion is not None and suspicion.effect in names_of(step) and meet(step.joints, suspicion.joints)
+
+
+def _by_relatives(steps: Sequence[Step], others: Sequence[Step]) -> list[Step]:
+    """Those of the steps of dry friction that another law of it confirms, each by one: such laws differ only where
+    motion is slow or one way, or the load changes, and few motions show that."""
+    left = [one for one in others if _rubs(one)]
+    found = []
+    for step in filter(_rubs, steps):
+        relative = next((one for one in left if meet(step.joints, one.joints)), None)
+        if relative is not None:
+            left.remove(relative)
+            found.append(step)
+    return found
+
+
+def _rubs(step: Step) -> bool:
+    return any(name in SLIDING_FRICTION for name in names_of(step))
 
 
 def _is_beside(step: Step, others: Sequence[Step]) -> bool:
@@ -174,10 +193,4 @@ def _is_beside(step: Step, others: Sequence[Step]) -> bool:
 
 def _agree(step: Step, other: Step) -> bool:
     """Whether two steps may be of the same effect, on a joint of both."""
-    return meet(step.joints, other.joints) and _alike(names_of(step), names_of(other))
-
-
-def _alike(names: Set[str], others: Set[str]) -> bool:
-    """Whether there is a name in both, or dry friction in both: its laws differ only where motion is slow or one way,
-    or the load changes, and few motions show that. One of them confirms another."""
-    return bool(names & others) or all(any(name in SLIDING_FRICTION for name in some) for some in (names, others))
+    return meet(step.joints, other.joints) and bool(names_of(step) & names_of(other))

@@ -131,6 +131,8 @@ def test_of_several_effects_those_that_the_others_show_are_named() -> None:
     elsewhere = answer(named("gear_loss"), named("stribeck_friction", joints=(2,)))
     assert joined(both, elsewhere)[0] == [("gear_loss", [])]
     assert joined(both, both)[0] == [("gear_loss", []), ("stribeck_friction", [])]
+    relative = answer(named("gear_loss"), named("coulomb_friction"))  # another law of dry friction confirms one
+    assert joined(both, relative)[0] == [("gear_loss", []), ("stribeck_friction", [])]
     apart = answer(named("gear_loss", evidence=PLENTY), named("backlash", evidence=PLENTY, joints=(2,)))
     assert joined(apart, answer(named("gear_loss")))[0] == [("gear_loss", []), ("backlash", [])]
 
