@@ -105,3 +105,9 @@ def test_files_that_are_never_tried_again_are_there() -> None:
     for name in DETERMINISTIC:
         assert (ROOT / "tests" / name).is_file(), name
         assert any(name.startswith(f"{folder}/") for folder in AGAINST_THE_CLOCK), name
+
+
+def test_every_thorough_file_is_there() -> None:
+    names = (ROOT / "tests" / "thorough.txt").read_text("utf-8").split()
+    assert names == sorted(set(names))
+    assert [name for name in names if not (ROOT / "tests" / name).is_file()] == []
