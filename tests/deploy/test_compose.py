@@ -58,6 +58,8 @@ def test_who_has_no_token_is_refused_and_the_stop_listener_answers(running: Comp
     stop = f"http://{host}:8301/api/v1/robots/ma2000/stop"
     assert httpx.post(stop).status_code == 401
     assert httpx.post(stop, headers=api.headers).json()["confirmed"]
+    # The listener answers before the service knows of its stop.
+    until(api, str(api.base_url).rstrip("/"), lambda status: status["arm"] == "stopped")
     assert reset(api).is_success
 
 
