@@ -5,8 +5,6 @@ They are collected once, in one process, which then divides. Each of N workers t
 it would have by itself. A test in which a worker dies has failed, and the others of its unit run in another.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -1,7 +1,5 @@
 """How the page's files reach a browser."""
 
-from __future__ import annotations
-
 import asyncio
 import gzip
 import json
