@@ -1,7 +1,5 @@
 """`daq stop`, whatever it finds: it says what became of it, and never says more than it knows."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

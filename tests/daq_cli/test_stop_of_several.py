@@ -1,7 +1,5 @@
 """`daq stop` with several robots in daq.toml: all of them unless one is named, and all in doubt."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What cannot be is refused in one line that says what, where and what is allowed; nothing moves, nothing is lost."""
 
-from __future__ import annotations
-
 import socket
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The Mega's firmware image on a simulated ATmega2560, as a shared library."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from pathlib import Path

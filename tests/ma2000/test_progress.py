@@ -1,7 +1,5 @@
 """Progress of the long calls: a bar, nothing, or the caller's own."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import subprocess

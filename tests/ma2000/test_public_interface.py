@@ -1,7 +1,5 @@
 """`import ma2000`: its names, what it loads, and what it says of files in its way."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

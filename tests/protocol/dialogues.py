@@ -11,8 +11,6 @@ A step is what the host sends, what the bridge answers, or what happens to the b
 `"$s+1"` is one more. `"?"` is anything. Set points that are written are those in force, so that nothing moves.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

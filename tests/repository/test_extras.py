@@ -1,7 +1,5 @@
 """What needs an extra that is not installed says in one line which one, from Python and on the command line."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

@@ -1,7 +1,5 @@
 """One service for most tests, and one for jobs: starting one costs more than most of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

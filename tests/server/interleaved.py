@@ -6,8 +6,6 @@ last byte and its turn among the threads, and wherever they wait. A seed decides
 made here: the wire with a board that stops and releases as PROTOCOL.md says (section 6), the clock, and the stores.
 """
 
-from __future__ import annotations
-
 import math
 import queue
 import threading
@@ -279,7 +277,7 @@ class Turn:
     def __init__(self, world: World) -> None:
         self._world, self._set = world, False
 
-    def __enter__(self) -> Turn:
+    def __enter__(self) -> "Turn":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """What becomes of queue, trace and states when things break."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import os

@@ -1,7 +1,5 @@
 """A clock that is set back, and a disk without room: in a service inside the tests' process."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The service starts without the libraries that only its worker processes and the mock need."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Folders of worlds: the same for a seed, imported by the product, and of no code of the product's."""
 
-from __future__ import annotations
-
 import ast
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What the driver says when a controller is not what it should be, and when a link fails under it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

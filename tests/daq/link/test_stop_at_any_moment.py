@@ -1,7 +1,5 @@
 """A stop from one thread while another waits for a sample: written at once, confirmed by itself."""
 
-from __future__ import annotations
-
 import threading
 from queue import Empty, SimpleQueue
 
@@ -38,7 +36,7 @@ class SampleWaitsForStop:
     def waited(self) -> float:
         return 0.0
 
-    def connect(self) -> SampleWaitsForStop:
+    def connect(self) -> "SampleWaitsForStop":
         return self
 
     def write(self, data: bytes) -> None:

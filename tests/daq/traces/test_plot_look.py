@@ -1,7 +1,5 @@
 """A figure looks as it was judged by eye once: sizes, colours and strokes, and every text in its place."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What cannot give a model is refused in one line that says what, where and what is allowed; no file is written."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Which effects the records of an arm can tell from the hidden one, on an experiment short enough for a test."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

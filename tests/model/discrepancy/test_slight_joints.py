@@ -1,7 +1,5 @@
 """A joint that shares an effect only slightly is named as such, and is not in the headline."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, Step

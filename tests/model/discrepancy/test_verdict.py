@@ -1,7 +1,5 @@
 """What is answered when nothing more is found, and what is taken back."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, SignalError

@@ -1,7 +1,5 @@
 """The arithmetic between simulation and result, on numbers small enough to be done by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

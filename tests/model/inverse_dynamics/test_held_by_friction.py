@@ -1,7 +1,5 @@
 """Friction of a joint that hardly moves takes whatever holds it, up to its level."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A recorded motion: what its low-pass keeps, what its derivatives lose, and how a recorded drive acts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The noise that repeated motion shows."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from daq.contracts.trace import Trace

@@ -1,7 +1,5 @@
 """The torque balance: on simulated records whose torques are known, and its derivatives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

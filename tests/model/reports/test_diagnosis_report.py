@@ -1,7 +1,5 @@
 """The page of a diagnosis tells the whole story, for every verdict, from the answer alone."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

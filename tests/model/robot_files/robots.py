@@ -1,7 +1,5 @@
 """Small URDFs, sound and hostile."""
 
-from __future__ import annotations
-
 INERTIAL = (
     '<inertial><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/><mass value="2"/>'
     '<inertia ixx="0.02" ixy="0" ixz="0.001" iyy="0.03" iyz="0" izz="0.02"/></inertial>'

@@ -1,7 +1,5 @@
 """Arms of published URDFs have the dynamics that Pinocchio and MuJoCo give them, each with a reader of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

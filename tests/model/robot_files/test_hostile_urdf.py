@@ -1,7 +1,5 @@
 """A URDF that nobody means is refused in one line that says what is wrong and where."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Connections that ask for nothing, and what they may take from whoever asks."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 

@@ -1,7 +1,5 @@
 """Who gets in, and what browsers may not do behind a person's back."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Iterator
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The description of the API: complete, usable for generated clients, and true."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re

@@ -1,7 +1,5 @@
 """Taught programs that the service keeps: until they are deleted, whoever has the control and whatever restarts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Worker processes give way to the service, and do not outlive it."""
 
-from __future__ import annotations
-
 import os
 import select
 import subprocess

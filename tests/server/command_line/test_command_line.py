@@ -1,7 +1,5 @@
 """`daq --server URL`: what the local command does, with a service's robot."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The pure rules of the queue: states, order, schedule, what is missing."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from typing import Any, get_args
 from zoneinfo import ZoneInfo

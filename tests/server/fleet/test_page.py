@@ -1,7 +1,5 @@
 """The page on several arms: its commands and its program work as they stand there."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

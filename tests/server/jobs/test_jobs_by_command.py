@@ -1,7 +1,5 @@
 """`daq --server URL fit` and the like: computed by the service, kept by it, told as if it had been done here."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta

@@ -1,7 +1,5 @@
 """E-mail, through a mail server that is not this project's (aiosmtpd)."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 import ssl

@@ -1,7 +1,5 @@
 """A service tells its webhooks what happens; a command tries them; nobody sees or changes an address by a request."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Gains, signals, gripper and reset: carried out soon, or not at all."""
 
-from __future__ import annotations
-
 import time
 from concurrent.futures import Future
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """A queue on stores of its own, with a clock turned by hand and an arm that answers what a test says."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

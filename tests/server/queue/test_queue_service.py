@@ -1,7 +1,5 @@
 """The queue's own thread, on stores of its own and an arm that answers what a test says."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """Teaching in the service, without a robot: when a command was said, and what is left of a lead."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import Future
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The search for a motion of its own: admissible, repeatable, no worse than what is offered, and kept by the mock."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

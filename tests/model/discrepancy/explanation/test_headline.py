@@ -1,7 +1,5 @@
 """The headline of an answer names what was found."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, PlacedEffect, SignalError, Suspicion

@@ -1,7 +1,5 @@
 """Held-out traces are fitted to in turn: they may show what the others do not, and confirm or exclude what these do."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 from types import SimpleNamespace

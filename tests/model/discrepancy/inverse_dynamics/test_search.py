@@ -1,7 +1,5 @@
 """Which candidates of a step are fitted, how far, and what a rival that was refused means for the next one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,8 +1,6 @@
 """Effects that stated numbers can take over, at the price of being far from what is stated; and laws that only
 resemble what is missing."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

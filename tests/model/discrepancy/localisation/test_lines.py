@@ -1,7 +1,5 @@
 """A line over a smooth spectrum is found at the rate that theory gives, and noise is not taken for one more often."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

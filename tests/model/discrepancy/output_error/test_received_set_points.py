@@ -1,7 +1,5 @@
 """Which set points a controller worked with, told by its drive: a third of the time it stands at its limit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Steps: candidates that held-out traces refuse give way to the next, and parameters are those of the last fit."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 
