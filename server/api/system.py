@@ -127,7 +127,8 @@ def _checks(services: Services) -> dict[str, str]:
         checks[name] = _problem_of_folder(rig.catalogue.folder)
         if rig.archive is not None:
             checks[f"archive of {rig.robot.name}"] = "; ".join(rig.archive.warnings(services.settings.traces.warn_at))
-        checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
+        arm = rig.robot.arm
+        checks[f"robot {rig.robot.name}"] = rig.robot.problem if arm is None else arm.unheard
     return checks
 
 

@@ -16,7 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.service.notifications import DestinationStatus, Notification, NotificationStatus
 from server.clock import Clock
 from server.database_errors import DamagedError, one_line
-from server.notifications.delivery import DeliveryError, Message
+from server.notifications.delivery import DeliveryError, Message, problem_of
 from server.notifications.destinations import Destination
 from server.notifications.outbox import Due, Outbox, pause_after
 
@@ -226,11 +226,10 @@ class Notifier:
         try:
             answer = self._destinations[key].sender.send(due.message)
         except Exception as error:
-            told = isinstance(error, DeliveryError)
-            if not told:
+            expected = error if isinstance(error, DeliveryError) else None
+            if expected is None:
                 log.exception("notifications: %s", key)
-            line = str(error) if told else f"{type(error).__name__}: see the log"
-            self._failed(key, due, line, error if isinstance(error, DeliveryError) else None)
+            self._failed(key, due, problem_of(error), expected)
             return
         now = self._clock.utc()
         self._until_written(lambda: self._outbox.sent(due, now))

@@ -387,7 +387,8 @@ class Scene:
         self.control = ArmControl(self.controller)
         freezer = Freezer("arm", "wire")
         freezer.control = self.control
-        self.guardian = Guardian(cast(Any, None), None, lambda cause: freezer._stop(self.control, cause))
+        listener = cast(Any, SimpleNamespace(problem=""))
+        self.guardian = Guardian(listener, None, lambda cause: freezer._stop(self.control, cause))
         self.guardian._thread = cast(Any, SimpleNamespace(is_alive=lambda: True))
         self.inbox = InboxHere(self.world, self._spawn_cancel)
         self.owned = OwnedRobot(
