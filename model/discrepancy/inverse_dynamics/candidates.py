@@ -30,6 +30,9 @@ FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
 """Terms of a bent sensor that a trial frees; the shorter waves keep the priors of a sound one."""
 UNDER_LOAD = {"load_dependent_friction": "arm", "gravity_torque_friction": "share"}
 """Effects whose friction goes with a load that the posture decides, and the parameter that multiplies it."""
+SPRINGS = ("spring_torque", "one_sided_spring")
+"""Effects whose torque goes with the position and does not repeat every turn: no joint that turns round has them, since
+after a turn it is where it was."""
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 
@@ -53,6 +56,8 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
                 continue
             if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
+            if name in SPRINGS and _turns_round(model, joints[0], case.records):
+                continue
             trial = _trial(model, name, joints, now)
             if trial.starts:
                 yield trial
@@ -77,6 +82,13 @@ def _constant_load(model: Model, name: str, column: int, records: Sequence[Recor
     rubbing = model.with_effect(name, (column + 1,), {UNDER_LOAD[name]: 1.0})
     levels = np.concatenate([levels_along(rubbing, r)[r.rows, column] for r in records])
     return bool(np.ptp(levels) < CONSTANT_LOAD * np.abs(levels).max() + 1e-12)
+
+
+def _turns_round(model: Model, joint: int, records: Sequence[RecordedMotion]) -> bool:
+    """Whether a joint turns by more than a whole turn in any record."""
+    revolute = model.machine.joint(joint).kind == "revolute"
+    column = model.machine.modelled_joints.index(joint)
+    return revolute and any(float(np.ptp(r.position[:, column])) > 2 * np.pi for r in records)
 
 
 def _present(model: Model, name: str, joints: tuple[int, ...]) -> bool:
