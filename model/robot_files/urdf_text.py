@@ -115,6 +115,10 @@ def _robot(text: str, origin: str) -> Xml.Element:
         raise SpecError(f"{origin}: not XML: {error}") from error
     if any("xacro" in element.tag.rpartition("}")[0] for element in root.iter()):
         raise SpecError(f"{origin}: {XACRO}")
+    space, brace, _ = root.tag.rpartition("}")
+    if brace:  # a default namespace, of which no other reader of URDF knows
+        for element in root.iter():
+            element.tag = element.tag.removeprefix(space + brace)
     if root.tag != "robot":
         raise SpecError(f"{origin}: its outermost element is <{shown(root.tag)[1:-1]}>; a URDF has <robot>")
     return root
