@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.stated_numbers import number_trials, sta
 from model.discrepancy.inverse_dynamics.trial import Trial
 from model.effects.effect import Effect
 from model.effects.library import library
-from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, turns_round
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.effect_parameters import suits_drive
@@ -40,7 +40,7 @@ CONSTANT_LOAD = 0.05
 def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once; of what the file states,
     whether it is another size than stated; and numbers of the machine that the fit has moved."""
-    names = case.options.effects
+    names, round_ = case.options.effects, turns_round(case.records, model.machine)
     for name, effect in library().items():
         if name in NOT_IN_TORQUES or (names is not None and name not in names):
             continue
@@ -56,7 +56,7 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
                 continue
             if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
-            if name in SPRINGS and _turns_round(model, joints[0], case.records):
+            if name in SPRINGS and round_[joints[0] - 1]:
                 continue
             trial = _trial(model, name, joints, now)
             if trial.starts:
@@ -82,13 +82,6 @@ def _constant_load(model: Model, name: str, column: int, records: Sequence[Recor
     rubbing = model.with_effect(name, (column + 1,), {UNDER_LOAD[name]: 1.0})
     levels = np.concatenate([levels_along(rubbing, r)[r.rows, column] for r in records])
     return bool(np.ptp(levels) < CONSTANT_LOAD * np.abs(levels).max() + 1e-12)
-
-
-def _turns_round(model: Model, joint: int, records: Sequence[RecordedMotion]) -> bool:
-    """Whether a joint turns by more than a whole turn in any record."""
-    revolute = model.machine.joint(joint).kind == "revolute"
-    column = model.machine.modelled_joints.index(joint)
-    return revolute and any(float(np.ptp(r.position[:, column])) > 2 * np.pi for r in records)
 
 
 def _present(model: Model, name: str, joints: tuple[int, ...]) -> bool:

@@ -1,16 +1,10 @@
 """Which candidates of a step are fitted, how far, and what a rival that was refused means for the next one."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
 
-from daq.contracts.machine import Machine
 from daq.contracts.progress import Never
-from model.discrepancy.inverse_dynamics.candidates import _turns_round
 from model.discrepancy.inverse_dynamics.fitting import fit
 from model.discrepancy.inverse_dynamics.judging import BESIDE_REFUSED, judge
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -28,8 +22,6 @@ from model.discrepancy.inverse_dynamics.search import (
 from model.discrepancy.inverse_dynamics.step_record import _cannot_be_told
 from model.discrepancy.inverse_dynamics.trial import Trial
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
-from model.machine_model.model import base_model
-from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, slide_machine
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
 
 FRICTION = TorqueOptions(effects=("coulomb_friction", "viscous_friction"))
@@ -102,15 +94,3 @@ def test_records_leave_open_what_differs_by_the_cost_of_parameters_alone(
     if parameters > 1:
         small = replace(chosen, evidence=25.0), replace(rival, evidence=25.0 - 16.0)
         assert not _cannot_be_told(TorqueOptions(), *small), "what would not be suspected by itself is no rival"
-
-
-@pytest.mark.parametrize(
-    ("machine", "travel", "round_"),
-    [(bench_machine, 6.5, True), (bench_machine, 6.0, False), (slide_machine, 6.5, False)],
-)
-def test_no_spring_is_looked_for_on_a_joint_that_turns_round(
-    machine: Callable[[], Machine], travel: float, round_: bool
-) -> None:
-    """After a turn the joint is where it was; on the shaft of a motor a slow drift was told as a spring."""
-    record: Any = SimpleNamespace(position=np.array([[0.0], [travel]]))
-    assert _turns_round(base_model(machine()), 1, [record]) is round_
