@@ -100,7 +100,8 @@ def _schedule(robot: RobotAccess, spec: ExperimentSpec, cron: str, *, as_json: b
     first = "" if made.next is None else f"; first on {made.next.astimezone():%Y-%m-%d at %H:%M %Z}"
     _, _, day, _, weekday = cron.split()
     either = "" if "*" in (day[0], weekday[0]) else f", on days {day} of the month and on every weekday {weekday}"
-    print(f"schedule {made.id}: {made.cron} ({made.zone}){either}{first}. `daq queue schedules` lists, `unschedule` cancels")
+    rule = f"{made.cron} ({made.zone}){either}"
+    print(f"schedule {made.id}: {rule}{first}. `daq queue schedules` lists, `unschedule` cancels")
 
 
 def acquire_complete(
