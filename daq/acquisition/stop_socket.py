@@ -91,7 +91,9 @@ def runtime_folders() -> list[Path]:
     sessions = [Path("/run/user") / str(os.getuid())]
     if session := os.environ.get("XDG_RUNTIME_DIR"):
         sessions.insert(0, Path(session))
-    folders = [session / APP for session in sessions if session.is_dir() and os.access(session, os.W_OK | os.X_OK)]
+    # `os.path.isdir`, since that of `Path` raises an error for what may not be looked at.
+    usable = [one for one in sessions if os.path.isdir(one) and os.access(one, os.W_OK | os.X_OK)]
+    folders = [session / APP for session in usable]
     return list(dict.fromkeys([*folders, temporary]))
 
 
@@ -143,8 +145,9 @@ class StopSocket:
         path = folder / self._name
         # Nobody finds the file before it listens: who is refused there takes it for that of a dead process.
         beside = path.with_suffix(".new")
-        made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        made: socket.socket | None = None
         try:
+            made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             _require_own(folder)
             beside.unlink(missing_ok=True)
@@ -152,13 +155,13 @@ class StopSocket:
             made.listen(BACKLOG)
             made.setblocking(False)
             beside.rename(path)
-        except OSError as error:
-            made.close()
+        except (OSError, ReachError) as error:
+            if made is not None:
+                made.close()
+            if isinstance(error, ReachError):
+                raise
             reason = error.strerror or str(error)
             raise ReachError(f"stop socket {path}: cannot be made: {reason}; set {FOLDER_VARIABLE}") from error
-        except ReachError:
-            made.close()
-            raise
         return made, path, _file_at(path)
 
 

@@ -111,7 +111,10 @@ class WaitingEvents:
                 made = None
             self._events.popleft()
             if made is not None:
-                self._written(event.robot, made)
+                try:
+                    self._written(event.robot, made)
+                except Exception:  # it has its row, and the others still wait for theirs
+                    log.exception("%s: %s: not published", event.robot, event.kind)
         return True
 
 

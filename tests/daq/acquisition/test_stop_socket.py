@@ -118,6 +118,23 @@ def test_a_socket_that_cannot_be_made_again_says_so_until_it_can(
         assert (listener.is_there(), listener.problem) == (True, "")
 
 
+def test_a_socket_for_which_no_descriptor_is_left_is_made_once_there_is_one(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_left(*_: object) -> NoReturn:
+        raise OSError(24, "Too many open files")
+
+    with stop_listener("arm") as listener:
+        shutil.rmtree(folder)
+        with monkeypatch.context() as meanwhile:
+            meanwhile.setattr(socket, "socket", none_left)
+            assert listener.renew() is None
+        assert "Too many open files" in listener.problem
+        before = listener.renew()
+        assert before is not None
+        before.close()
+
+
 def test_a_stop_needs_no_room_on_a_disk(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object, **__: object) -> NoReturn:
         raise OSError(28, "No space left on device")
