@@ -107,9 +107,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item,
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield
     may_skip = any(item.get_closest_marker(mark) for mark in MAY_ALWAYS_SKIP)
     if SKIPS_ARE_ERRORS and report.skipped and not may_skip and not hasattr(report, "wasxfail"):

@@ -82,7 +82,8 @@ class _Crew:
 
     def _start(self, number: int, tasks: int) -> _Worker:
         receiver, sender = Pipe(duplex=False)
-        process = os.fork()
+        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of a thread that a library began
+            process = os.fork()
         os.setpgid(process, process)  # 0 in the worker. Ctrl-C is the first process's, which hands it on once
         if process == 0:
             for worker in self.workers:

@@ -330,10 +330,7 @@ DIALOGUES = (
     Dialogue(
         "what a bridge cannot do it refuses before it looks at the payload",
         ("CLOCK",),
-        (
-            *misunderstood(0x40, "", 1, NOT_CAPABLE),
-            *misunderstood(0x40, "e8030000", 2, NOT_CAPABLE),
-        ),
+        (*misunderstood(0x40, "", 1, NOT_CAPABLE), *misunderstood(0x40, "e8030000", 2, NOT_CAPABLE)),
     ),
     Dialogue(
         "the ring gives each period once, in order, and a lost reply costs nothing",

@@ -170,11 +170,7 @@ def test_a_failed_import_of_anything_else_stays_what_it_is(name: str) -> None:
 @pytest.mark.parametrize(
     ("package", "needs_it", "line"),
     [
-        (
-            "websockets",
-            lambda: WebSocket("ws://127.0.0.1:9", None, 1.0, 1, None),
-            "live stream .*websockets.*[live]",
-        ),
+        ("websockets", lambda: WebSocket("ws://127.0.0.1:9", None, 1.0, 1, None), "live stream .*websockets.*[live]"),
         ("mujoco", lambda: start_mock(MockPort()), "the mock controller .*mujoco.*[robot]"),
         ("matplotlib", lambda: ma2000.plot(NO_TRACE), "ma2000.plot .*matplotlib.*[robot]"),
         ("distributed", lambda: open_workers("dask://127.0.0.1:9"), "executor dask://.*distributed.*[cluster]"),

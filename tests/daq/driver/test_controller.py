@@ -5,13 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from daq.driver import (
-    Controller,
-    ControllerRestartedError,
-    GainsNotTakenError,
-    NoSampleError,
-    ProtocolVersionError,
-)
+from daq.driver import Controller, ControllerRestartedError, GainsNotTakenError, NoSampleError, ProtocolVersionError
 from daq.driver.line_rate import bytes_of_a_compact_turn, bytes_of_a_turn
 from daq.link import Link, LinkState, LinkTimeoutError, RequestRefusedError
 from daq.transport import TransportError

@@ -91,7 +91,8 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
     bench.answer_sample()
     sampler.join(WITHIN)
     assert samples == [SNAPSHOT]
-    assert bench.order == [Sample, Stop, Stop]
+    assert bench.order[:3] == [Sample, Stop, Stop]
+    assert set(bench.order[3:]) <= {Stop}, "asked again where the machine is busy"
 
 
 def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:

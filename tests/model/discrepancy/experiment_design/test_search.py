@@ -39,10 +39,7 @@ def simple_rival(effect: str, joint: int, values: dict[str, float]) -> Candidate
 
 @pytest.fixture(scope="module")
 def rivals() -> tuple[CandidateFit, CandidateFit]:
-    return (
-        simple_rival("coulomb_friction", 2, {"torque": 6.0}),
-        simple_rival("dead_zone", 2, {"width": 0.8}),
-    )
+    return (simple_rival("coulomb_friction", 2, {"torque": 6.0}), simple_rival("dead_zone", 2, {"width": 0.8}))
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from model.discrepancy.localisation.lines import (
-    HALF,
-    has_line_over_position,
-    has_line_over_time,
-    line_over_median,
-)
+from model.discrepancy.localisation.lines import HALF, has_line_over_position, has_line_over_time, line_over_median
 
 SAMPLES = 1000
 FLOOR = 0.3
