@@ -16,9 +16,7 @@ GROWN = 1.1
 """Ratio of a joint's mean square errors on held-out traces, above which a fit has made them worse beyond noise."""
 
 
-def verdict(
-    steps: Sequence[Step], *, unexplained: bool, suspected: bool = False, partly: bool = False
-) -> Verdict:
+def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False, partly: bool = False) -> Verdict:
     """The verdict of either method.
 
     Args:

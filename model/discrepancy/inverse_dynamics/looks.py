@@ -61,8 +61,8 @@ class Look:
         """Whether these records speak for the effect of a step, though they do not let it be named: by their motion, or
         since they leave more beside it."""
         own = names_of(step)
-        beside = (s for s in self.answer.steps if s.refusal is not None and s.refusal.kind == LEAVES_MORE)
-        if any(own & names_of(s) and meet(step.joints, s.joints) for s in beside):
+        refused = (s for s in self.workflow.found.steps if s.refusal is not None and s.refusal.kind == LEAVES_MORE)
+        if any(own & names_of(s) and meet(step.joints, s.joints) for s in refused):
             return True
         same = (f for f in self.workflow.beyond_motion if f.effect in own and meet(step.joints, f.joints))
         return any(f.effect != REPEATING or self._repeats_alike(step, f) for f in same)

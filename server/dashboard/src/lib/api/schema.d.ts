@@ -2403,7 +2403,7 @@ export interface components {
              * Verdict
              * @enum {string}
              */
-            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect" | "check-the-record";
+            verdict: "nothing-significant" | "named" | "ambiguous" | "partly" | "suspected" | "unknown-effect" | "check-the-record";
             /** Summary */
             summary: string;
             /** Significant */
