@@ -126,7 +126,8 @@ def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, li
     try:
         found = contents(path, limits)
         name = _topic(path, found, topic)
-        return name, list(_decoded(f"{path}: topic {_listed([name])}", found.messages[name], found.ros_1)), found.missing
+        states = _decoded(f"{path}: topic {_listed([name])}", found.messages[name], found.ros_1)
+        return name, list(states), found.missing
     except TraceError:
         raise
     except MemoryError as error:

@@ -116,6 +116,16 @@ def cut_out(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     return Faulty(_rows(trace, kept), ("gap",), None, float(trace.time[row]))
 
 
+def bursts(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
+    """Stamps of arrival through a buffer that is emptied after 1.2 to 4 samples."""
+    usual = float(np.median(np.diff(trace.time)))
+    latency = usual * draw.uniform(1.2, 4.0)
+    time = np.ceil(trace.time / latency - draw.uniform(0.0, 1.0)) * latency
+    for row in range(1, len(time)):
+        time[row] = max(time[row], time[row - 1] + min(2e-4, 0.02 * usual))
+    return Faulty(replace(trace, time=time), ("bursts",))
+
+
 def milliseconds(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     """Times in ms."""
     return Faulty(replace(trace, time=1e3 * trace.time), ("time-scale", "drive-scale"))
@@ -204,6 +214,7 @@ FAULTS: dict[str, Fault] = {
         stuck,
         saturated,
         cut_out,
+        bursts,
         milliseconds,
         slow_times,
         late_drive,
