@@ -19,7 +19,8 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.record_check.columns import column_findings
-from model.record_check.finding import FindingKind, RecordFinding
+from model.record_check.drives import drive_findings
+from model.record_check.finding import FindingKind, RecordFinding, doubts_in
 from model.record_check.readings import (
     FalseReadings,
     Jump,
@@ -62,9 +63,16 @@ def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding,
             bursts = list(_on_bursts(trace))
             found += bursts or [
                 *_on_readings(trace, model.machine),
-                *column_findings(repaired(trace, model.machine), model),
+                *_on_columns(repaired(trace, model.machine), model),
             ]
     return tuple(found)
+
+
+def _on_columns(trace: Trace, model: Model) -> Iterator[RecordFinding]:
+    columns = column_findings(trace, model)
+    yield from columns
+    if not doubts_in(columns):
+        yield from drive_findings(trace, model)
 
 
 def repaired(trace: Trace, machine: Machine) -> Trace:

@@ -62,6 +62,26 @@ def spikes(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     return Faulty(_with(trace, name, joint, signal), ("spikes",), joint, float(trace.time[rows[0]]))
 
 
+def drive_spikes(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """Three values of a drive, of one sample, far beyond all others."""
+    return _column_spikes("drive", trace, machine, draw)
+
+
+def set_point_spikes(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """The same of a set point."""
+    return _column_spikes("set_point", trace, machine, draw)
+
+
+def _column_spikes(name: str, trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    if getattr(trace, name) is None:
+        return None
+    joint = _joint(machine, draw)
+    signal = getattr(trace, name)[:, trace.column(joint)].copy()
+    rows = np.sort(draw.choice(np.arange(20, len(signal) - 20, 10), 3, replace=False))
+    signal[rows] += draw.uniform(4.0, 8.0) * np.ptp(signal) * draw.choice([-1.0, 1.0], 3)
+    return Faulty(_with(trace, name, joint, signal), ("spikes",), joint, float(trace.time[rows[0]]))
+
+
 def wraps(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
     """An encoder of one turn, whose end lies within the motion."""
     turning = [j for j in machine.modelled_joints if machine.joint(j).kind == "revolute"]
@@ -209,6 +229,8 @@ FAULTS: dict[str, Fault] = {
     one.__name__: one
     for one in (
         spikes,
+        drive_spikes,
+        set_point_spikes,
         wraps,
         slipped,
         stuck,
