@@ -37,6 +37,12 @@ ENTRY = 3
 """Intervals before a bound, in each of which a reading that is cut off there moves on."""
 MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
+BURST = 0.25
+"""Most of the mean interval that lies between the stamps of one burst: no sampler is so uneven."""
+ON_GRID = 0.1
+"""Most that bursts are apart beside whole times of one interval, in that interval."""
+MOST_OFF_GRID = 0.05
+"""Share of bursts that may be further off: stamps of a busy computer."""
 BRIDGED = (10.0, 0.05)
 """Longest gap that is bridged: so many intervals, and so many seconds more; a joint goes on as it did."""
 
@@ -150,6 +156,26 @@ def find_bounds(reading: Floats) -> list[tuple[int, int]]:
             if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
                 found.append((int(first), int(last)))
     return sorted(found)
+
+
+def find_bursts(time: Floats) -> tuple[float, float] | None:
+    """The interval (s) after which a buffer is emptied, and the mean interval of samples, where stamps are those of
+    arrival: several at once, and bursts on a grid. None where they are not."""
+    intervals = np.diff(time)
+    mean = float(intervals[intervals <= np.quantile(intervals, 0.99)].mean())
+    begins = intervals > BURST * mean
+    if int((~begins).sum()) < max(STUCK, 0.01 * len(intervals)) or int(begins.sum()) < 2 * STUCK:
+        return None
+    between = np.diff(time[1:][begins])
+    # whole times of one interval: of the shortest between bursts, or a half or a third of it
+    shortest = float(np.quantile(between, MOST_OFF_GRID))
+    near = between[between < 1.5 * shortest]
+    for parts in (1, 2, 3):
+        grid = float(np.median(near)) / parts
+        apart = np.abs(between / grid - np.round(between / grid))
+        if grid > BURST * mean and float(np.mean(apart > ON_GRID)) <= MOST_OFF_GRID:
+            return grid, mean
+    return None
 
 
 def find_gaps(time: Floats) -> list[tuple[int, float]]:

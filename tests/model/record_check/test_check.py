@@ -196,6 +196,24 @@ def test_a_scale_is_said_of_what_has_it(fault: str, tmp_path: Path) -> None:
         assert (one.kind, words in one.line) == (kind, True), one.line
 
 
+@pytest.mark.parametrize("latency", [0.008, 0.016, 0.032])
+def test_stamps_of_arrival_are_the_one_doubt(latency: float, tmp_path: Path) -> None:
+    machine, trace = example("motor_bench")(tmp_path)
+    time = np.ceil(trace.time / latency) * latency
+    for row in range(1, len(time)):
+        time[row] = max(time[row], time[row - 1] + 2e-4)
+    (one,) = (one for one in check_records(base_model(machine), [replace(trace, time=time)]))
+    assert (one.kind, one.consequence, one.value) == ("bursts", "doubt", pytest.approx(latency, rel=1e-3))
+    assert "latency timer" in one.advice
+
+
+def test_a_record_of_one_row_is_no_sound_one(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time,position_1,drive_1\n0,0.1,0.2\n")
+    (one,) = doubts_in(check_records(base_model(rigs.slide_machine()), [import_csv(path)]))
+    assert (one.kind, one.says) == ("short", "1 sample; at least 3 are needed.")
+
+
 def test_spikes_are_a_doubt_beside_a_fit() -> None:
     position = SLIDE.position.copy()
     position[[300, 700, 1100]] += 0.05

@@ -69,6 +69,10 @@ HOSTILE: dict[str, tuple[str, str]] = {
         robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="0 1"/>')),
         "joint 'j': axis xyz is '0 1'; 3 finite numbers are needed",
     ),
+    "an axis beyond measure": (
+        robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="1e308 1e308 0"/>')),
+        "joint 'j': axis xyz is '1e308 1e308 0'; 3 finite numbers are needed, ±1e+09 at most",
+    ),
     "no axis to speak of": (
         robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="0 0 0"/>')),
         "joint 'j': axis xyz is [0.0, 0.0, 0.0]; a direction is needed",

@@ -5347,7 +5347,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            kind: "bursts" | "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "short" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
             /**
              * Consequence
              * @enum {string}
