@@ -11,9 +11,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from daq_cli.app.needed import MODEL, SERVER
 
 import ma2000
-from daq_cli.app.needed import MODEL, SERVER
 from tests.repository.fresh import Distributions, build, installed, pythons, run, unpacked
 from tests.repository.tracked import ROOT
 

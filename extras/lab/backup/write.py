@@ -12,9 +12,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from daq.traces import disk
-from server.backup.database import copy_database, note_dropped, revision_of
-from server.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
-from server.backup.places import DATABASE, BackupError, Places, is_trace
+from extras.lab.backup.database import copy_database, note_dropped, revision_of
+from extras.lab.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
+from extras.lab.backup.places import DATABASE, BackupError, Places, is_trace
 
 RESERVE = 20_000_000
 """Number of bytes that must stay free on the disk beside a backup."""

@@ -20,8 +20,8 @@ def backup(
 ) -> None:
     """Copy the service's database, traces, models and results into one file, also while the service runs."""
     from daq_cli.app.progress import shown_progress
-    from server.backup.places import places_of
-    from server.backup.write import back_up
+    from extras.lab.backup.places import places_of
+    from extras.lab.backup.write import back_up
     from server.clock import SystemClock
 
     places = places_of(invocation(context).configuration)

@@ -18,8 +18,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
-from server.audit.command import by_command, computers_user
-from server.backup.database import (
+from extras.lab.backup.database import (
     add_to_audit,
     forget_what_may_have_ended,
     head_of_audit,
@@ -29,9 +28,10 @@ from server.backup.database import (
     revision_of,
     robots_of_traces,
 )
-from server.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
-from server.backup.places import DATABASE, BackupError, Places, is_trace
-from server.backup.write import RESERVE
+from extras.lab.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
+from extras.lab.backup.places import DATABASE, BackupError, Places, is_trace
+from extras.lab.backup.write import RESERVE
+from server.audit.command import by_command, computers_user
 from server.jobs.mailbox import REQUEST
 from server.store.lock import sole_use
 

@@ -25,9 +25,9 @@ def restore(
 ) -> None:
     """Restore the database, traces, models and results of a backup. The service must not run."""
     from daq_cli.app.progress import shown_progress
-    from server.backup.manifest import verify
-    from server.backup.places import places_of
-    from server.backup.restore import restore as bring_back
+    from extras.lab.backup.manifest import verify
+    from extras.lab.backup.places import places_of
+    from extras.lab.backup.restore import restore as bring_back
     from server.clock import SystemClock
 
     if file.exists() and not file.is_file():

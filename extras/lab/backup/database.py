@@ -12,9 +12,9 @@ from alembic.script import ScriptDirectory
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.audit import AuditNote
+from extras.lab.backup.places import BackupError
 from server.audit.chain import Head
 from server.audit.log import AuditLog
-from server.backup.places import BackupError
 from server.database_errors import line_of, open_to_read
 from server.store.address import file_address
 from server.store.engine import BUSY_TIMEOUT_MS, Store

@@ -14,8 +14,8 @@ from typing import IO, Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from daq.contracts.frozen import FrozenRecord
+from extras.lab.backup.places import DATABASE, NAMES, BackupError
 from firmware_protocol.invalid import first_invalid
-from server.backup.places import DATABASE, NAMES, BackupError
 
 FORMAT = 1
 MANIFEST = "manifest.json"

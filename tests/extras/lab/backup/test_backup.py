@@ -13,6 +13,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from alembic.script import ScriptDirectory
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
@@ -20,14 +21,15 @@ from sqlalchemy import select
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
+from extras.lab.backup.database import head_of_audit, revision_of
+from extras.lab.backup.manifest import MANIFEST, verify
+from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
+from extras.lab.backup.restore import restore
+from extras.lab.backup.write import back_up
 from server.access.sessions import Person, SessionStore
-from server.backup.manifest import MANIFEST, verify
-from server.backup.places import DATABASE, BackupError, Places, places_of
-from server.backup.restore import restore
-from server.backup.write import back_up
 from server.experiments.review import Given, Review
 from server.store.archived import Archived, ArchivedStore
-from server.store.engine import Store
+from server.store.engine import Store, migrations
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
 from server.store.queues import QueueState, QueueStore
@@ -524,3 +526,13 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     states = [QueueStore(store).get(robot) for robot in ("left", "right")]
     store.close()
     assert all(state is not None and state.paused for state in states)
+
+
+@pytest.mark.parametrize("name", ["why?", "a%41b", "50%", "a#b", "x?mode=memory&y", "ü :@"])
+def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: str) -> None:
+    places = places_in(tmp_path / name)
+    store = Store(places.url)
+    store.migrate()
+    store.close()
+    assert revision_of(places.database) == ScriptDirectory.from_config(migrations()).get_current_head()
+    assert head_of_audit(places.database) == "nothing"

@@ -1,0 +1,70 @@
+"""What a plug-in adds to the core, and where plug-ins are found.
+
+A plug-in is an object `Plugin`, named by an entry point of the group `ma2000_daq.plugins`:
+
+    [project.entry-points."ma2000_daq.plugins"]
+    gripper = "gripper_plugin:PLUGIN"
+
+It is a description: names, one-line helps, and references like "module:object", which are imported when they are used.
+So the module that describes it imports nothing but this one, and `daq --help` stays fast. The core has the same
+description of its own commands. docs/plugins.md shows a whole plug-in.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Literal
+
+from daq.contracts.extras import Extra
+
+GROUP = "ma2000_daq.plugins"
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A subcommand of `daq`."""
+
+    name: str
+    line: str
+    """One line of help."""
+    module: str
+    """The module with the command: a Typer named `app`."""
+    about: Literal["robot", "computer", "service"] = "robot"
+    """What it is about: a robot, here or at a server; this computer alone, so that `--server` is refused; everything
+    that one service has, so that `--robot` is refused, too."""
+    needs: Extra = "robot"
+    """The extra whose packages it needs here."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """What a plug-in adds."""
+
+    commands: tuple[Command, ...] = ()
+
+
+@cache
+def plugins() -> tuple[Plugin, ...]:
+    """Returns the plug-ins that are installed, by their names. One that cannot be loaded is left out with a warning: a
+    robot must be stopped all the same."""
+    found = (_loaded(entry) for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
+    return tuple(plugin for plugin in found if plugin is not None)
+
+
+def _loaded(entry: EntryPoint) -> Plugin | None:
+    try:
+        plugin = entry.load()
+    except ModuleNotFoundError as error:
+        if error.name is not None and f"{entry.module}.".startswith(f"{error.name}."):
+            return None  # its own package was taken away, as `extras/` may be
+        plugin = error
+    except Exception as error:  # noqa: BLE001 - somebody else's module may raise anything
+        plugin = error
+    if isinstance(plugin, Plugin):
+        return plugin
+    log.warning("plug-in %s (%s) is left out: %s", entry.name, entry.value, plugin)
+    return None
