@@ -19,21 +19,9 @@ CORE = {
         Command("io", "Show and switch process signals, and the gripper.", "daq_cli.commands.process_io"),
         Command("teach", "Jog the arm, lead it, make steps, and play back.", "daq_cli.commands.teach.motion"),
         Command(
-            "commission",
-            "Commission an arm, step by step, up to its acceptance sheet.",
-            "daq_cli.commands.commission.command",
-            about="computer",
-        ),
-        Command(
             "robot",
             "Check what a controller promises; nothing moves.",
             "daq_cli.commands.robot_check",
-            about="computer",
-        ),
-        Command(
-            "memory",
-            "Watch the shared memory, and find out what lies where.",
-            "daq_cli.commands.memory",
             about="computer",
         ),
         Command("calibrate", "Measure what the machine really does.", "daq_cli.commands.calibrate"),
