@@ -41,10 +41,21 @@ class Command:
 
 
 @dataclass(frozen=True)
+class Name:
+    """A name of the Python package `ma2000`."""
+
+    name: str
+    module: str
+    needs: Extra | None = None
+    """The extra whose packages it needs; none beside those that a client has."""
+
+
+@dataclass(frozen=True)
 class Plugin:
     """What a plug-in adds."""
 
     commands: tuple[Command, ...] = ()
+    names: tuple[Name, ...] = ()
 
 
 @cache

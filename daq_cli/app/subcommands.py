@@ -57,12 +57,6 @@ CORE = {
         Command("traces", "List, show, plot, convert and verify traces.", "daq_cli.commands.traces"),
         Command("config", "Show and check the configuration.", "daq_cli.commands.config", about="computer"),
         Command(
-            "machine",
-            "Turn URDF into machine files, and models into URDF and MJCF.",
-            "daq_cli.commands.machine",
-            about="computer",
-        ),
-        Command(
             "mock", "Start a mock controller that others can connect to.", "daq_cli.commands.mock", about="computer"
         ),
         Command(

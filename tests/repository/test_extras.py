@@ -21,7 +21,6 @@ from daq.executors import open_workers
 from daq.transport import MockPort
 from daq.transport.mock_process import start_mock
 from daq_cli.app.subcommands import called, extra_of, subcommands
-from ma2000 import _HOME
 from tests.repository.tracked import ROOT
 from tests.repository.without_extras import packages_beyond, run_without
 
@@ -102,7 +101,7 @@ def test_each_public_name_works_for_a_client_or_says_which_extra_it_needs(tmp_pa
         assert re.fullmatch(line, said)
     assert not {"Client", "read_trace", "read_traces", "write_trace", "load_machine"} & set(found["said"])
     only_when_called = {"plot", "batch", "write_urdf", "write_mjcf"}
-    assert set(found["offered"]) == {*_HOME, "__version__"} - set(found["said"]) - only_when_called
+    assert set(found["offered"]) == set(ma2000.__all__) - set(found["said"]) - only_when_called
 
 
 @pytest.mark.slow

@@ -35,7 +35,6 @@ from daq.traces.csv_table import import_csv
 from daq.traces.ros_bag import BagChoice, import_bag
 from model.machine_model.model import base_model
 from model.machine_model.model_file import load_model, save_model
-from model.robot_files.urdf_reader import read_urdf
 from tests.daq.traces.damaged_traces import AT_RANDOM
 
 CASES = 60_000
@@ -186,7 +185,6 @@ def _texts(folder: Path) -> dict[str, tuple[bytes, Read]]:
         "map.toml": ((HOME / "firmware_protocol/memory_map.toml").read_bytes(), load_memory_map),
         "spec.json": (ExperimentSpec().model_dump_json(indent=1).encode(), spec),
         "spec.toml": (b'joints = [1, 2]\n[trajectory]\nkind = "ramp"\n', spec),
-        "arm.urdf": ((HOME / "examples/reach_arm.urdf").read_bytes(), read_urdf),
         "model.json": (model.read_bytes(), load_model),
     }
 
@@ -218,8 +216,8 @@ def kinds(folder: Path) -> list[Kind]:
 class Campaign:
     """Damaged files, one after the other."""
 
-    def __init__(self, folder: Path) -> None:
-        self.kinds = kinds(folder)
+    def __init__(self, kinds: list[Kind]) -> None:
+        self.kinds = kinds
         self.tally = Tally()
         self._sound = {kind.name: kind.read(kind.opened) for kind in self.kinds}
 
@@ -268,7 +266,7 @@ def damaged(chosen: list[Kind], rng: random.Random) -> Iterator[tuple[Kind, str,
                 yield kind, way, damage(rng, kind.data)
 
 
-def campaign(cases: int, seed: int, folder: Path) -> Tally:
+def campaign(cases: int, seed: int, kinds: list[Kind]) -> Tally:
     """So many damaged files."""
-    running = Campaign(folder)
+    running = Campaign(kinds)
     return running.run(itertools.islice(damaged(running.kinds, random.Random(seed)), cases))

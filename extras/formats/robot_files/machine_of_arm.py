@@ -27,11 +27,11 @@ from daq.contracts.machine import (
 )
 from daq.contracts.quantity import Quantity
 from daq.contracts.refused import refused_words
+from extras.formats.robot_files.denavit_hartenberg import Frames, Parameters, frames_of
+from extras.formats.robot_files.description import DescribedJoint
+from extras.formats.robot_files.serial_arm import ArmJoint, SerialArm, serial_arm
+from extras.formats.robot_files.urdf_reader import read_urdf
 from model.arrays import Floats
-from model.robot_files.denavit_hartenberg import Frames, Parameters, frames_of
-from model.robot_files.description import DescribedJoint
-from model.robot_files.serial_arm import ArmJoint, SerialArm, serial_arm
-from model.robot_files.urdf_reader import read_urdf
 
 EXPECTED_FRICTION = 0.1
 """Expected size of friction that the URDF does not state, as a share of the joint's largest torque: typical of geared

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from xml.etree import ElementTree as Xml
 
+from extras.formats.robot_files.bodies_of_model import OutgoingArm, OutgoingLink, left_out, outgoing_arm
+from extras.formats.robot_files.numbers import text_of
+from extras.formats.robot_files.urdf_text import NO_LIMIT
 from model import layout as at
 from model.machine_model.model import Model
-from model.robot_files.bodies_of_model import OutgoingArm, OutgoingLink, left_out, outgoing_arm
-from model.robot_files.numbers import text_of
-from model.robot_files.urdf_text import NO_LIMIT
 
 HELD = frozenset((at.VISCOUS, at.COULOMB))
 """Numbers of effects that a URDF has a place for, beside those of the bodies."""

@@ -12,15 +12,15 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace, TraceRecord
+from extras.formats.robot_files.bodies_of_model import outgoing_arm
+from extras.formats.robot_files.machine_of_arm import machine_from_urdf
+from extras.formats.robot_files.mjcf_writer import mjcf_text
 from model.fitting.log_cholesky import ENTRIES as PLACES
 from model.fitting.log_cholesky import second_moments
 from model.fitting.options import FitOptions, Prior
 from model.inverse_dynamics.fit import TorqueFit, fit_torques, torque_curves
 from model.machine_model.model import Model, base_model
-from model.robot_files.bodies_of_model import outgoing_arm
-from model.robot_files.machine_of_arm import machine_from_urdf
-from model.robot_files.mjcf_writer import mjcf_text
-from tests.model.robot_files.arms import ARMS, InPinocchio, PublishedArm
+from tests.extras.formats.robot_files.arms import ARMS, InPinocchio, PublishedArm
 
 PERIOD = 0.004
 BODIES = ("link*.mass", "link*.centre_*", "link*.inertia_*")

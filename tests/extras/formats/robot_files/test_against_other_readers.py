@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from extras.formats.robot_files.machine_of_arm import machine_from_urdf
 from model.dynamics import recursive
 from model.machine_model.model import base_model
-from model.robot_files.machine_of_arm import machine_from_urdf
 from model.simulation.chain_of_model import chain_of
-from tests.model.robot_files.arms import ARMS, InMujoco, InPinocchio
+from tests.extras.formats.robot_files.arms import ARMS, InMujoco, InPinocchio
 
 AGREEMENT = 1e-9
 REFUSED_BY_MUJOCO = ("tiago, lift and arm", "pr2, lift and arm")

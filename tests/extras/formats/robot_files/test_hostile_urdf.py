@@ -9,11 +9,15 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.errors import SpecError
+from extras.formats.robot_files.machine_of_arm import machine_from_urdf
+from extras.formats.robot_files.urdf_reader import read_urdf
+from extras.formats.robot_files.urdf_text import checked_urdf
 from model.machine_model.model import base_model
-from model.robot_files.machine_of_arm import machine_from_urdf
-from model.robot_files.urdf_text import checked_urdf
-from tests.model.robot_files.arms import ARMS
-from tests.model.robot_files.robots import HOSTILE, INERTIAL, TURNING, TWO_JOINTS, joint, link, robot
+from tests.daq.traces.file_fuzz import Kind, campaign
+from tests.extras.formats.robot_files.arms import ARMS
+from tests.extras.formats.robot_files.robots import HOSTILE, INERTIAL, TURNING, TWO_JOINTS, joint, link, robot
+
+EXAMPLES = Path(__file__).parents[4] / "examples"
 
 
 def written(folder: Path, text: str) -> Path:
@@ -125,3 +129,11 @@ def test_what_is_not_taken_over_of_limits_and_gears_is_noted(tmp_path: Path) -> 
 def test_xacro_that_was_not_expanded_is_named(tmp_path: Path, declared: str) -> None:
     with pytest.raises(SpecError, match=r"is xacro that was not expanded; .*`xacro FILE > robot\.urdf`"):
         machine_from_urdf(written(tmp_path, f'<robot name="a" {declared}><xacro:arm name="b"/></robot>'))
+
+
+def test_damaged_files_are_refused_in_one_line_or_read_as_a_whole(tmp_path: Path) -> None:
+    data, path = (EXAMPLES / "reach_arm.urdf").read_bytes(), tmp_path / "arm.urdf"
+    path.write_bytes(data)
+    tally = campaign(300, 2, [Kind("URDF", path, path, read_urdf, data)])
+    assert not tally.faults, "\n".join(tally.examples)
+    assert tally.ends["read"] > 30

@@ -10,9 +10,9 @@ import numpy as np
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
+from extras.formats.robot_files.description import DescribedJoint, Description, turned
 from model.arrays import Floats
 from model.kinematics.chain import inertia_about
-from model.robot_files.description import DescribedJoint, Description, turned
 
 
 @dataclass(frozen=True, eq=False)

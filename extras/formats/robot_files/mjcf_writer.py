@@ -9,11 +9,11 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from extras.formats.robot_files.bodies_of_model import OutgoingLink, left_out, outgoing_arm
+from extras.formats.robot_files.numbers import text_of
 from model import layout as at
 from model.arrays import Floats
 from model.machine_model.model import Model
-from model.robot_files.bodies_of_model import OutgoingLink, left_out, outgoing_arm
-from model.robot_files.numbers import text_of
 
 HELD = frozenset((at.VISCOUS, at.COULOMB, at.SPRING, at.SPRING_REST, at.FLUX_LOSS))
 """Numbers of effects that MJCF has a place for, beside those of the bodies."""

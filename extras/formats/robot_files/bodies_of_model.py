@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq.contracts.machine import NoController
+from extras.formats.robot_files.denavit_hartenberg import transform
 from model import layout as at
 from model.arrays import Floats
 from model.drives.magnet import back_emf_constant, torque_constant
 from model.effects.library import effect
 from model.machine_model.model import Model
-from model.robot_files.denavit_hartenberg import transform
 from model.simulation.chain_of_model import chain_of
 
 IN_BODIES = frozenset((at.MASS_ADDED, at.PAYLOAD, at.TILT_X, at.TILT_Y, at.SHIFT))

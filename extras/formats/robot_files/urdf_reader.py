@@ -11,9 +11,9 @@ import numpy as np
 
 from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
+from extras.formats.robot_files.description import DescribedJoint, DescribedLink, Description
+from extras.formats.robot_files.urdf_text import MOVING, CheckedUrdf, checked_urdf
 from model.arrays import Floats
-from model.robot_files.description import DescribedJoint, DescribedLink, Description
-from model.robot_files.urdf_text import MOVING, CheckedUrdf, checked_urdf
 
 
 def read_urdf(path: Path) -> Description:
@@ -75,6 +75,7 @@ def _joint(body: Any, link: str, checked: CheckedUrdf) -> DescribedJoint | None:
         return None
     text = checked.joints[name]
     axis = np.array(body.joints[0].axis)
+    axis /= np.abs(axis).max()  # the square of a number beyond measure overflows
     return DescribedJoint(
         name,
         "prismatic" if MOVING[text.kind] == "prismatic" else "revolute",

@@ -16,8 +16,8 @@ from daq_cli.app.quantities import parse_numbers
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from model.robot_files.machine_of_arm import JointParts
-    from model.robot_files.serial_arm import ArmJoint
+    from extras.formats.robot_files.machine_of_arm import JointParts
+    from extras.formats.robot_files.serial_arm import ArmJoint
 
 SOURCE = "as told when the file was made"
 KINDS = ("torque", "current", "other")
@@ -30,7 +30,7 @@ def asked_parts(joints: Sequence[ArmJoint]) -> dict[str, JointParts]:
 
 
 def _parts(name: str, slides: bool) -> JointParts:
-    from model.robot_files.machine_of_arm import JointParts
+    from extras.formats.robot_files.machine_of_arm import JointParts
 
     torque, inertia, speed = ("N", "kg", "m/s") if slides else ("N·m", "kg·m²", "rad/s")
     viscous = _asked(f"{name}: viscous friction at the joint", f"{torque} per {speed}")

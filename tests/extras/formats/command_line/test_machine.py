@@ -15,7 +15,7 @@ from daq.contracts.machine import load_machine
 from tests.daq_cli.hostile import FILES, hostile_file, refuses
 from tests.daq_cli.invoke import CommandLine
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "reach_arm.urdf"
+EXAMPLE = Path(__file__).parents[4] / "examples" / "reach_arm.urdf"
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as Xml
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
-from model.robot_files.description import Follower
+from extras.formats.robot_files.description import Follower
 
 LARGEST = 8 << 20
 """Size (characters) of the largest URDF that is read; a humanoid's has a tenth of it."""

@@ -14,17 +14,17 @@ import pytest
 from daq.config.machine_text import machine_text
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine, parse_machine, shipped_machines
+from extras.formats.robot_files.machine_of_arm import machine_from_urdf
+from extras.formats.robot_files.mjcf_writer import mjcf_text
+from extras.formats.robot_files.urdf_writer import urdf_text
 from model.arrays import Floats
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model, base_model
-from model.robot_files.machine_of_arm import machine_from_urdf
-from model.robot_files.mjcf_writer import mjcf_text
-from model.robot_files.urdf_writer import urdf_text
 from model.simulation.chain_of_model import chain_of
-from tests.model.robot_files.arms import ARMS
+from tests.extras.formats.robot_files.arms import ARMS
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
+EXAMPLES = Path(__file__).parents[4] / "examples"
 OWN = [*shipped_machines(), *(str(path) for path in sorted(EXAMPLES.glob("*.toml")))]
 MACHINES = [pytest.param(name, id=Path(name).stem) for name in [*OWN, *ARMS]]
 """Rods and cylinders, bodies, joints that slide, bases that lie on their side; and arms that others described."""

@@ -57,10 +57,10 @@ def from_urdf(
     """
     from daq.config.machine_text import machine_text
     from daq.contracts.machine import load_machine
-    from daq_cli.models.joint_questions import asked_parts
-    from model.robot_files.machine_of_arm import machine_of_arm
-    from model.robot_files.serial_arm import serial_arm
-    from model.robot_files.urdf_reader import read_urdf
+    from extras.formats.robot_files.joint_questions import asked_parts
+    from extras.formats.robot_files.machine_of_arm import machine_of_arm
+    from extras.formats.robot_files.serial_arm import serial_arm
+    from extras.formats.robot_files.urdf_reader import read_urdf
 
     if output is not None:
         _check_new(output)
@@ -91,7 +91,7 @@ def to_urdf(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)], output: OutputFile = None, json: JsonOption = False
 ) -> None:
     """Write a machine, or a fitted model with its numbers, as URDF. What a URDF cannot hold is named."""
-    from model.robot_files.urdf_writer import urdf_text
+    from extras.formats.robot_files.urdf_writer import urdf_text
 
     _write(read_model(model), urdf_text, output, "urdf", json)
 
@@ -101,7 +101,7 @@ def to_mjcf(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)], output: OutputFile = None, json: JsonOption = False
 ) -> None:
     """Write a machine, or a fitted model with its numbers, as MJCF for MuJoCo. What MJCF cannot hold is named."""
-    from model.robot_files.mjcf_writer import mjcf_text
+    from extras.formats.robot_files.mjcf_writer import mjcf_text
 
     _write(read_model(model), mjcf_text, output, "mjcf", json)
 
