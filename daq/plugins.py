@@ -15,8 +15,9 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import Literal
+from typing import Any, Literal
 
 from daq.contracts.extras import Extra
 
@@ -56,6 +57,10 @@ class Plugin:
 
     commands: tuple[Command, ...] = ()
     names: tuple[Name, ...] = ()
+    parts: tuple[str, ...] = ()
+    """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
+    routes: tuple[str, ...] = ()
+    """Routers of FastAPI below /api/v1, as "module:router"."""
 
 
 @cache
@@ -64,6 +69,12 @@ def plugins() -> tuple[Plugin, ...]:
     robot must be stopped all the same."""
     found = (_loaded(entry) for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
     return tuple(plugin for plugin in found if plugin is not None)
+
+
+def named(reference: str) -> Any:
+    """Returns the object "module:object"."""
+    module, _, name = reference.partition(":")
+    return getattr(import_module(module), name)
 
 
 def _loaded(entry: EntryPoint) -> Plugin | None:

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -27,6 +27,7 @@ from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.notifications import Notification, Topic
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
+from daq.plugins import named, plugins
 from daq.trajectories import control_period
 from server.access.caller import Caller
 from server.access.lanes import Lanes
@@ -46,7 +47,6 @@ from server.catalogue.catalogue import Catalogue
 from server.catalogue.room import of_robots, storage_warnings
 from server.clock import Clock, SystemClock
 from server.experiments.review import Given
-from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
@@ -59,6 +59,7 @@ from server.notifications.occasions import Faults, of_experiment, of_job, of_pau
 from server.notifications.outbox import Outbox
 from server.notifications.service import Notifier
 from server.owner.messages import Answer
+from server.parts import Part
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
@@ -93,6 +94,7 @@ ENDING = 0.5
 KEEPING = 0.3
 """Share (s) of that time in which rows that could not be written are kept in a file."""
 log = logging.getLogger("server")
+P = TypeVar("P", bound=Part)
 
 
 @dataclass(frozen=True)
@@ -200,10 +202,10 @@ class Services:
         """Called when a session has begun, and when one was left, with its caller."""
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
-        self.comparisons = Comparisons(self.jobs)
         self.notifier = self._make_notifier(settings, destinations)
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
+        self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
@@ -216,9 +218,15 @@ class Services:
             raise not_found(f"robot {name!r:.60}", f"this service has {', '.join(self._robots)}")
         return self._robots[name]
 
+    def part(self, kind: type[P]) -> P:
+        """Returns the part of a plug-in that is of this class."""
+        return next(part for part in self.parts if isinstance(part, kind))
+
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
         self.notifier.start()
+        for part in self.parts:
+            part.start()
         for rig in self.robots():
             try:
                 found = rig.catalogue.bring_up_to_date()
@@ -249,7 +257,10 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
-        _all_within(ENDING, [partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)])
+        ends = [partial(part.close, ENDING) for part in self.parts]
+        _all_within(
+            ENDING, [*ends, partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)]
+        )
         self.store.close()
         self.closed = True
 
@@ -335,7 +346,7 @@ class Services:
     def warnings(self) -> list[str]:
         """Returns what will need somebody soon, one line each."""
         warn_at, rigs = self.settings.traces.warn_at, self.robots()
-        found = self.storage_warnings()
+        found = self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
         for rig in rigs:
             lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]

@@ -21,15 +21,17 @@ from daq.contracts.service.fleet import (
 )
 from daq.contracts.service.jobs import Job, ParameterWords
 from daq.contracts.service.traces import CatalogueEntry
+from extras.lab.fleet.drift import Pair, changes_of
 from model.machine_model.model_file import model_of
 from model.machine_model.parameter_words import words_by_name
-from server.fleet.drift import Pair, changes_of
+from server.parts import Part
 from server.problems import ProblemError
-from server.store.jobs import JobStore, traces_of
+from server.services import Services
+from server.store.jobs import traces_of
 
 MOST_FITS = 100
 """Number of the newest fits of a robot that are compared."""
-log = logging.getLogger("server.fleet")
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -50,11 +52,11 @@ class Kept:
     words: dict[str, ParameterWords]
 
 
-class Comparisons:
+class Comparisons(Part):
     """Keeps what was read of each result, since results never change and are large. Safe to use from any thread."""
 
-    def __init__(self, jobs: JobStore) -> None:
-        self._jobs = jobs
+    def __init__(self, services: Services) -> None:
+        self._jobs = services.jobs
         self._kept: dict[str, Kept] = {}
 
     def compare(self, arms: Sequence[Arm], experiment: str | None, days: float) -> FleetComparison:

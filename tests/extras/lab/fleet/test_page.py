@@ -16,7 +16,7 @@ from tests.server.other_user import other_users_command_line
 
 pytestmark = pytest.mark.slow
 
-PAGE = Path(__file__).parents[3].joinpath("docs", "fleet.md").read_text("utf-8")
+PAGE = Path(__file__).parents[4].joinpath("docs", "fleet.md").read_text("utf-8")
 URL = "http://127.0.0.1:8300"
 LINES = [
     line
