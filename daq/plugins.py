@@ -52,11 +52,24 @@ class Name:
 
 
 @dataclass(frozen=True)
+class Importer:
+    """Makes traces of recordings of others, for `daq traces import`."""
+
+    what: str
+    """What it makes a trace of: "the joint states in a bag"."""
+    claims: str
+    """"module:function" of a path and its first 16 bytes: whether the file is one for it."""
+    read: str
+    """"module:function" of a path, `TraceLimits` and `daq.traces.kinds.Choice`: returns a `Trace`."""
+
+
+@dataclass(frozen=True)
 class Plugin:
     """What a plug-in adds."""
 
     commands: tuple[Command, ...] = ()
     names: tuple[Name, ...] = ()
+    importers: tuple[Importer, ...] = ()
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     routes: tuple[str, ...] = ()

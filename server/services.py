@@ -257,10 +257,8 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
-        ends = [partial(part.close, ENDING) for part in self.parts]
-        _all_within(
-            ENDING, [*ends, partial(self.notifier.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)]
-        )
+        last = [partial(end, ENDING) for end in (self.notifier.close, *(part.close for part in self.parts))]
+        _all_within(ENDING, [*last, partial(self.audit.writer.close, ENDING - KEEPING)])
         self.store.close()
         self.closed = True
 

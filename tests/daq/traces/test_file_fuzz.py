@@ -11,4 +11,4 @@ from tests.daq.traces.file_fuzz import CASES, campaign, kinds
 def test_damaged_files_of_every_kind_are_refused_in_one_line_or_read_as_a_whole(tmp_path: Path, cases: int) -> None:
     tally = campaign(cases, 2, kinds(tmp_path))
     assert not tally.faults, "\n".join(tally.examples)
-    assert tally.ends["read"] > cases // 10
+    assert tally.ends["read"] > cases // 20  # of texts few are read once they are damaged

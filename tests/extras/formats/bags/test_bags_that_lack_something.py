@@ -18,8 +18,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
-from daq.traces.bag_storage import JOINT_STATE
-from tests.daq.traces.test_ros_bag import NS, START, bag, imported, state
+from extras.formats.bags.bag_storage import JOINT_STATE
+from tests.extras.formats.bags.test_ros_bag import NS, START, bag, imported, state
 
 STORE: Any = get_typestore(Stores.ROS2_HUMBLE)
 

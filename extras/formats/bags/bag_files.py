@@ -1,22 +1,17 @@
-"""Which file is what, by its content; and the files of a bag, checked against the limits of traces."""
+"""Which file is a bag, and the files of one, checked against the limits of traces."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
-from typing import Literal
 
 import zstandard
 from mcap.writer import MCAP0_MAGIC
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces import disk, layout
-from daq.traces.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC, journals_of
-from daq.traces.ends import first_metadata
-
-Kind = Literal["trace", "bag", "csv"]
-"""What reads a file: that of traces, `import_bag` or `import_csv`."""
+from daq.contracts.trace_limits import TraceLimits
+from daq.traces import disk
+from daq.traces.kinds import first_bytes, is_trace
+from extras.formats.bags.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC, journals_of
 
 STORAGES = (".mcap", ".db3", ".bag")
 COMPRESSED = ".zstd"
@@ -25,23 +20,19 @@ _FRAMES = (0xFD2FB528, *range(0x184D2A50, 0x184D2A60))
 _PIECE = 1 << 20
 
 
-def kind_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Kind:
-    """What a file is by its first bytes; by its name where these say nothing, as those of a damaged or absent file."""
-    if path.is_dir():
-        return "bag" if (path / METADATA).exists() else "csv"
-    first = b""
-    with suppress(OSError), disk.open_regular(path) as stream:
-        first = stream.read(len(SQLITE_MAGIC))
-    if first.startswith(MCAP0_MAGIC):
-        return "trace" if is_trace(path, limits) else "bag"
-    if first == SQLITE_MAGIC or first.startswith(ROS_1_MAGIC):
-        return "bag"
-    return "bag" if path.suffix.lower() in STORAGES else "trace" if path.name.endswith(layout.PART_SUFFIX) else "csv"
+def is_bag(path: Path, first: bytes) -> bool:
+    """Whether a file is a bag by its first bytes, or by its name. A folder is one, or what is left of one."""
+    begins = first.startswith((MCAP0_MAGIC, ROS_1_MAGIC)) or first == SQLITE_MAGIC
+    return path.is_dir() or begins or path.suffix.lower() in STORAGES
 
 
 def check_files(path: Path, limits: TraceLimits) -> None:
     """Raises TraceError where a bag is none, is a trace already, or exceeds a limit, also once it is uncompressed."""
-    if kind_of(path, limits) == "csv":
+    if path.is_dir() and not (path / METADATA).exists():
+        inside = sorted(one.name for one in path.iterdir() if one.suffix in STORAGES)
+        rather = f"; name the file in it, {path / inside[0]}" if inside else ""
+        raise TraceError(f"{path}: is a folder without {METADATA}, as a recording leaves that was cut off{rather}")
+    if not is_bag(path, first_bytes(path)):
         wanted = f"a folder with {METADATA}, or a file {', '.join(STORAGES)}"
         raise TraceError(f"{path}: {f'is no bag: that is {wanted}' if path.exists() else 'there is no such bag'}")
     try:
@@ -90,12 +81,3 @@ def _size_uncompressed(file: Path, limits: TraceLimits) -> int:
     except zstandard.ZstdError as error:
         raise TraceError(f"{file}: is damaged: {error}") from error
     return count
-
-
-def is_trace(file: Path, limits: TraceLimits) -> bool:
-    """Whether a file begins as a trace of this project. Raises OSError."""
-    try:
-        with disk.open_regular(file) as stream:
-            return first_metadata(stream, limits, str(file))[0] == layout.START_METADATA
-    except TraceError:
-        return False

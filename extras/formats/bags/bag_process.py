@@ -19,7 +19,8 @@ from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.extras import require_extra
 from daq.contracts.trace import Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces.ros_bag import NO_MEMORY, BagChoice, import_bag
+from daq.traces.kinds import Choice
+from extras.formats.bags.ros_bag import NO_MEMORY, import_bag
 
 SPARE = 64 << 20
 """Memory (bytes) beside that for files and messages: rosbags takes it for its definitions of types."""
@@ -29,17 +30,17 @@ _SIGNALS = ("time", "position", "velocity", "drive")
 _UNLIMITED = 1 << 62
 
 
-def import_bag_apart(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: BagChoice | None = None) -> Trace:
+def import_bag_apart(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
     """What `import_bag` returns, made in another process, which may use no more memory than `memory_of` says.
 
     Each file that it writes is limited too, and lies in a folder of its own that is removed in any case.
     Raises TraceError, also where the memory does not suffice, and MissingExtraError.
     """
     require_extra("ros", f"{path}: reading a bag", "rosbags")
-    order = {"path": str(path), "limits": limits.model_dump(), "choice": vars(choice or BagChoice())}
+    order = {"path": str(path), "limits": limits.model_dump(), "choice": vars(choice or Choice())}
     with TemporaryDirectory() as folder:
         done = subprocess.run(
-            [sys.executable, "-P", "-m", "daq.traces.bag_process"],
+            [sys.executable, "-P", "-m", "extras.formats.bags.bag_process"],
             input=json.dumps(order).encode(),
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -72,7 +73,7 @@ def main() -> int:
     }
     code = REFUSED
     try:
-        trace = import_bag(Path(order["path"]), limits, BagChoice(**given))
+        trace = import_bag(Path(order["path"]), limits, Choice(**given))
         answer, code = _packed(trace), 0
     except DaqError as error:
         answer = str(error).encode("utf-8", "surrogateescape")

@@ -15,10 +15,11 @@ from rosbags.typesys import Stores, get_typestore
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces.bag_storage import JOINT_STATE
+from daq.traces.kinds import Choice
 from daq.traces.reader import read_trace
-from daq.traces.ros_bag import BagChoice, import_bag
 from daq.traces.store import write_trace
+from extras.formats.bags.bag_storage import JOINT_STATE
+from extras.formats.bags.ros_bag import import_bag
 from tests.daq.traces.samples import write
 
 NS = 10**9
@@ -44,7 +45,7 @@ def state(store: Any, number: int, **changes: Any) -> Any:
 
 def imported(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, **choice: Any) -> Trace:
     """The trace in a bag whose effort is a torque."""
-    return import_bag(path, limits, BagChoice(**({"drive_unit": "N·m"} | choice)))
+    return import_bag(path, limits, Choice(**({"drive_unit": "N·m"} | choice)))
 
 
 def bag(
@@ -181,7 +182,7 @@ def test_files_that_are_no_bag_are_told_in_one_line(tmp_path: Path) -> None:
         (tmp_path / "x.db3", "is neither MCAP nor SQLite nor a bag of ROS 1"),
         (tmp_path / "x.bag", "is neither MCAP nor SQLite nor a bag of ROS 1"),
         (tmp_path / "absent.db3", "cannot be read"),
-        (tmp_path, "is no bag: that is a folder with metadata.yaml"),
+        (tmp_path, "is a folder without metadata.yaml"),
     ]:
         with pytest.raises(TraceError, match=complaint) as told:
             imported(path)

@@ -22,10 +22,11 @@ from daq.contracts.joint_matching import other_joints
 from daq.contracts.trace import EARLIEST, INCOMPLETE, LATEST, Floats, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds
-from daq.traces.bag_files import check_files
-from daq.traces.bag_storage import JOINT_STATE, LARGEST_MESSAGE, Contents, contents
 from daq.traces.description import Description, DriveUnit
+from daq.traces.kinds import Choice
 from daq.traces.naming import trace_id_of
+from extras.formats.bags.bag_files import check_files
+from extras.formats.bags.bag_storage import JOINT_STATE, LARGEST_MESSAGE, Contents, contents
 
 NO_MEMORY = "is damaged, or needs more memory than it may use (traces.limits.file_bytes and total_bytes)"
 SHOWN = 8
@@ -59,35 +60,17 @@ class _State:
     effort: Floats
 
 
-@dataclass(frozen=True)
-class BagChoice:
-    """What is taken from a bag; it goes before the TOML beside it.
-
-    topic:      of the joint states; needed where several topics have some
-    joints:     names of the joints to take, in the order of the trace's joints; messages without them are left out
-    times:      `received` takes the times at which messages were received, in place of those in the messages
-    drive_unit: of the effort; `none` leaves the effort out
-    numbering:  names of a machine's joints 1, 2 …, for a bag whose TOML names no machine
-    """
-
-    topic: str | None = None
-    joints: tuple[str, ...] | None = None
-    times: Times | None = None
-    drive_unit: DriveUnit | Literal["none"] | None = None
-    numbering: tuple[str, ...] = ()
-
-
-def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: BagChoice | None = None) -> Trace:
+def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
     """The joint states in a bag as a trace: a folder with metadata.yaml, or a file of MCAP, SQLite or ROS 1.
 
     A TOML file of the same name beside it holds what messages cannot. What the bag promises and does not hold is told
     in the notes, and the outcome is then `interrupted`.
 
-    Nothing here limits the memory that a bag takes: `daq.traces.bag_process` does, for the bags of strangers.
+    Nothing here limits the memory that a bag takes: `bag_process` does, for the bags of strangers.
     Raises TraceError with one line for anything that is no bag, holds no joint states, or contradicts itself, and
     MissingExtraError where rosbags is not installed.
     """
-    path, choice = Path(path), choice or BagChoice()
+    path, choice = Path(path), choice or Choice()
     require_extra("ros", f"{path}: reading a bag", "rosbags")
     path = path if path.name else path.resolve()
     description, described = BagDescription.read(path, limits)

@@ -11,10 +11,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces.bag_process import import_bag_apart
-from daq.traces.bag_storage import JOINT_STATE
-from daq.traces.ros_bag import BagChoice, import_bag
-from tests.daq.traces.test_ros_bag import bag, state
+from daq.traces.kinds import Choice
+from extras.formats.bags.bag_process import import_bag_apart
+from extras.formats.bags.bag_storage import JOINT_STATE
+from extras.formats.bags.ros_bag import import_bag
+from tests.extras.formats.bags.test_ros_bag import bag, state
 
 MIB = 1 << 20
 SMALL = TraceLimits(file_bytes=8 * MIB, total_bytes=8 * MIB, chunk_bytes=8 * MIB)
@@ -23,7 +24,7 @@ BOMB = bytes(256 * MIB)
 
 def test_a_trace_from_another_process_is_the_same_to_the_bit(tmp_path: Path) -> None:
     path = bag(tmp_path / "ä", [{"velocity": [0.1, 0.2]}] * 5, topics=("/left", "/right"))
-    choice = BagChoice("/right", ("lift",), "received", "A")
+    choice = Choice("/right", ("lift",), "received", "A")
     assert import_bag_apart(path, SMALL, choice) == import_bag(path, SMALL, choice)
 
 
@@ -35,7 +36,7 @@ def test_a_bag_whose_file_is_compressed_as_a_whole_is_read(tmp_path: Path) -> No
         connection = writer.add_connection("/joint_states", JOINT_STATE, typestore=store)
         for number in range(3):
             writer.write(connection, number, store.serialize_cdr(state(store, number), JOINT_STATE))
-    assert len(import_bag_apart(tmp_path / "a", SMALL, BagChoice(drive_unit="none"))) == 3
+    assert len(import_bag_apart(tmp_path / "a", SMALL, Choice(drive_unit="none"))) == 3
 
 
 def ros_1(path: Path) -> Path:
