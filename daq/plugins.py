@@ -13,7 +13,8 @@ description of its own commands. docs/plugins.md shows a whole plug-in.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -70,6 +71,9 @@ class Plugin:
     commands: tuple[Command, ...] = ()
     names: tuple[Name, ...] = ()
     importers: tuple[Importer, ...] = ()
+    dialects: Mapping[str, str] = field(default_factory=dict)
+    """Line protocols by the name that a port's URL has: "module:function" of the joints' numbers on the bus, which
+    makes a `firmware_protocol.dialect.LinkDialect`."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     routes: tuple[str, ...] = ()
