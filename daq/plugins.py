@@ -74,6 +74,11 @@ class Plugin:
     dialects: Mapping[str, str] = field(default_factory=dict)
     """Line protocols by the name that a port's URL has: "module:function" of the joints' numbers on the bus, which
     makes a `firmware_protocol.dialect.LinkDialect`."""
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Sections of daq.toml by name: classes `daq.config.section.Section`, as "module:Class"."""
+    migrations: Mapping[str, str] = field(default_factory=dict)
+    """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
+    database, each named so that it begins with this name."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     routes: tuple[str, ...] = ()

@@ -21,10 +21,8 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.extras import require_extra
 from daq.contracts.service.events import ServiceEvent
-from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
-from daq.contracts.service.notifications import Notification, Topic
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
 from daq.plugins import named, plugins
@@ -54,12 +52,8 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
-from server.notifications.destinations import Destination, destinations_of
-from server.notifications.occasions import Faults, of_experiment, of_job, of_pause
-from server.notifications.outbox import Outbox
-from server.notifications.service import Notifier
 from server.owner.messages import Answer
-from server.parts import Part
+from server.parts import Attention, Part
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
@@ -166,7 +160,6 @@ class Services:
         self.clock = clock or SystemClock()
         parse_service_address(settings.server.executor)
         bucket = open_bucket(settings.archive)
-        destinations = destinations_of(settings.notifications)
         self.closed = False
         """Whether `close` has done everything."""
         self.store = Store(address_of(settings.server))
@@ -202,10 +195,9 @@ class Services:
         """Called when a session has begun, and when one was left, with its caller."""
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
-        self.notifier = self._make_notifier(settings, destinations)
+        self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
-        self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
@@ -224,7 +216,6 @@ class Services:
 
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
-        self.notifier.start()
         for part in self.parts:
             part.start()
         for rig in self.robots():
@@ -257,7 +248,7 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
-        last = [partial(end, ENDING) for end in (self.notifier.close, *(part.close for part in self.parts))]
+        last = [partial(part.close, ENDING) for part in self.parts]
         _all_within(ENDING, [*last, partial(self.audit.writer.close, ENDING - KEEPING)])
         self.store.close()
         self.closed = True
@@ -285,10 +276,9 @@ class Services:
             return self._robots[name].status()
 
         hub = Hub(self.clock, history, status)
-        faults = Faults()
         robot.listeners.append(hub.on_report)
         robot.listeners.append(lambda report: self.metrics.count_report(name, report))
-        robot.listeners.append(lambda report: self._tell(faults.new(name, report, self.clock.utc())))
+        robot.listeners.append(lambda report: self._tell(lambda part: part.arm_reported(name, report)))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobService(
@@ -350,38 +340,24 @@ class Services:
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
         return found
 
-    def _make_notifier(self, settings: Settings, destinations: list[Destination]) -> Notifier:
-        """Returns what tells people elsewhere."""
-        return Notifier(
-            destinations,
-            Outbox(self.store),
-            self.clock,
-            attempts=settings.notifications.attempts,
-            look=self._what_lasts,
-            given_up=lambda line: log.error("notifications: %s", line),
-            count=self.metrics.count_notification,
-        )
+    def _tell(self, news: Callable[[Part], None]) -> None:
+        for part in self.parts:
+            news(part)
 
-    def _tell(self, notification: Notification | None) -> None:
-        if notification is not None:
-            self.notifier.tell(notification)
-
-    def _what_lasts(self) -> dict[str, Notification]:
+    def attention(self) -> dict[str, Attention]:
         """Returns what needs somebody for as long as it lasts, by a key that stays the same meanwhile."""
-
-        def attention(topic: Topic, text: str, robot: str | None = None) -> Notification:
-            return Notification(topic=topic, kind="attention", at=self.clock.utc(), text=text, robot=robot)
-
         found = {}
         if lines := self.storage_warnings():
-            found["storage"] = attention("storage.warning", "; ".join(lines))
+            found["storage"] = Attention("storage.warning", "; ".join(lines))
         for rig in self.robots():
             name, queue = rig.robot.name, rig.queue.status()
             if rig.archive is not None and (problem := rig.archive.status().problem):
-                found[f"archive {name}"] = attention("archive.away", f"{name}: {problem}", name)
+                found[f"archive {name}"] = Attention("archive.away", f"{name}: {problem}", name)
             if queue.waiting_for:
                 line = f"{name}: {queue.queued} experiments wait: {queue.waiting_for}"
-                found[f"held {name}"] = attention("queue.held", line, name)
+                found[f"held {name}"] = Attention("queue.held", line, name)
+        for part in self.parts:
+            found |= part.attention()
         return found
 
     def storage_warnings(self) -> list[str]:
@@ -414,10 +390,8 @@ class Services:
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
                 reviewer=None if settings.robot.review == "off" else settings.robot.review,
-                paused=lambda reason: self.notifier.tell(of_pause(robot.name, reason, self.clock.utc())),
-                ended=lambda identity, state, reason: self.notifier.tell(
-                    of_experiment(robot.name, identity, state, reason, self.clock.utc())
-                ),
+                paused=lambda reason: self._tell(lambda part: part.queue_paused(robot.name, reason)),
+                ended=lambda *end: self._tell(lambda part: part.experiment_ended(robot.name, *end)),
             )
         )
         robot.listeners.append(queue.on_report)
@@ -446,8 +420,7 @@ class Services:
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
         self.metrics.count_job(job)
-        if job.state in ENDS:
-            self.notifier.tell(of_job(job, self.clock.utc()))
+        self._tell(lambda part: part.job_changed(job))
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:

@@ -47,13 +47,6 @@ CORE = {
             about="service",
             needs="server",
         ),
-        Command(
-            "notify",
-            "Try the notifications of the configuration.",
-            "daq_cli.commands.notify",
-            about="service",
-            needs="server",
-        ),
         Command("traces", "List, show, plot, convert and verify traces.", "daq_cli.commands.traces"),
         Command("config", "Show and check the configuration.", "daq_cli.commands.config", about="computer"),
         Command(

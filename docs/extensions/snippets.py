@@ -20,7 +20,7 @@ RUN: Mapping[tuple[str, str], str] = {
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_page.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",
-    ("notifications.md", "console"): "tests/server/notifications/test_service.py",
+    ("notifications.md", "console"): "tests/extras/lab/notifications/test_service.py",
     ("one-joint-rig.md", "python"): "tests/repository/test_snippets.py",
     ("own-effect.md", "python"): "tests/model/effects/test_own_effect.py",
     ("python.md", "python"): "tests/ma2000/test_public_interface.py",

@@ -9,16 +9,26 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.audit import AuditNote
 from extras.lab.backup.places import BackupError
 from server.audit.chain import Head
 from server.audit.log import AuditLog
-from server.database_errors import line_of, open_to_read
+from server.database_errors import line_of, one_line, open_to_read
 from server.store.address import file_address
 from server.store.engine import BUSY_TIMEOUT_MS, Store
-from server.store.schema import difference, expected_schema, foreign, migrations, remove, schema_of
+from server.store.schema import (
+    VERSION,
+    difference,
+    expected_schema,
+    foreign,
+    migrations,
+    remove,
+    revisions_of,
+    schema_of,
+)
 
 
 def copy_database(source: Path, target: Path) -> None:
@@ -57,13 +67,15 @@ def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
             found = schema_of(connection.execute)
-            own = {} if revision is None else expected_schema(revision)
+            own = {} if revision is None else expected_schema(revisions_of(connection.execute))
             wrong = difference(found, own) or ("its tables have no version" if found and not own else None)
             if wrong is not None:
                 raise BackupError(f"database {database.name}: {wrong}: the backup is damaged")
             strange = foreign(found, own)
             for kind, name in strange:
                 remove(connection.execute, kind, name)
+    except CommandError as error:
+        raise BackupError(f"database {database.name}: {one_line(error)}: the backup is damaged") from error
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
     return tuple(f"{kind} {name}" for kind, name in strange)
@@ -87,8 +99,9 @@ _FORGOTTEN = (
     "DELETE FROM sessions",
     f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
     f"UPDATE schedules SET {_NOT_APPROVED}",
-    "UPDATE outbox SET state = 'given-up', ended = :now, problem = 'a backup was restored' WHERE state = 'waiting'",
 )
+_GIVEN_UP = "state = 'given-up', ended = :now, problem = 'a backup was restored'"
+_NOT_SENT = f"UPDATE notifications SET {_GIVEN_UP} WHERE state = 'waiting'"
 """What a restore ends."""
 
 
@@ -98,7 +111,7 @@ def forget_what_may_have_ended(database: Path, now: datetime) -> None:
     words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
-            for line in _FORGOTTEN:
+            for line in (*_FORGOTTEN, *((_NOT_SENT,) if _has_table(connection, "notifications") else ())):
                 connection.execute(line, words)
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: its sessions cannot be ended: {error}") from error
@@ -163,6 +176,6 @@ def _has_table(connection: sqlite3.Connection, name: str) -> bool:
 
 def require_known(revision: str | None) -> None:
     """Raises BackupError for tables that no migration of this program makes."""
-    known = {script.revision for script in ScriptDirectory.from_config(migrations()).walk_revisions()}
+    known = {script.revision for script in ScriptDirectory.from_config(migrations()[VERSION]).walk_revisions()}
     if revision is not None and revision not in known:
         raise BackupError(f"the backup's tables are of another version ({revision}): install that version first")

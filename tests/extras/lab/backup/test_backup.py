@@ -26,14 +26,16 @@ from extras.lab.backup.manifest import MANIFEST, verify
 from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
 from extras.lab.backup.restore import restore
 from extras.lab.backup.write import back_up
+from extras.lab.notifications.tables import OutboxRow
 from server.access.sessions import Person, SessionStore
 from server.experiments.review import Given, Review
 from server.store.archived import Archived, ArchivedStore
-from server.store.engine import Store, migrations
+from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
 from server.store.queues import QueueState, QueueStore
-from server.store.tables import OutboxRow, TraceRow
+from server.store.schema import VERSION, migrations
+from server.store.tables import TraceRow
 from server.store.traces import NewTrace, TraceStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.service import Service
@@ -534,5 +536,5 @@ def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: 
     store = Store(places.url)
     store.migrate()
     store.close()
-    assert revision_of(places.database) == ScriptDirectory.from_config(migrations()).get_current_head()
+    assert revision_of(places.database) == ScriptDirectory.from_config(migrations()[VERSION]).get_current_head()
     assert head_of_audit(places.database) == "nothing"

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import httpx
 
-from daq.config.notifications import WebhookSettings
 from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
-from server.notifications.addresses import Address, Resolver, addresses_of, resolve
-from server.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.addresses import Address, Resolver, addresses_of, resolve
+from extras.lab.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.settings import WebhookSettings
 
 WITHIN = 20.0
 """Time (s) for an attempt, from the connection to the status of the answer, whose body is not read."""

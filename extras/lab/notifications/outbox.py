@@ -8,9 +8,9 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import delete, func, select, update
 
-from server.notifications.delivery import Message
+from extras.lab.notifications.delivery import Message
+from extras.lab.notifications.tables import OutboxRow
 from server.store.engine import Store
-from server.store.tables import OutboxRow
 
 PAUSES = (5.0, 30.0, 300.0, 1800.0, 7200.0, 18000.0, 36000.0, 50400.0, 72000.0, 86400.0, 86400.0)
 """Pauses (s) after each failed attempt; from the second one on, those that Standard Webhooks 1.0 proposes."""

@@ -18,15 +18,16 @@ from hypothesis import strategies as st
 from standardwebhooks import Webhook as Witness
 from standardwebhooks import WebhookVerificationError
 
-from daq.config.notifications import WebhookSettings
 from daq.config.settings import load_settings
 from daq.contracts.errors import SpecError
 from daq.contracts.service.notifications import Notification
-from server.notifications.addresses import RefusedAddressError, addresses_of, resolve, why_refused
-from server.notifications.delivery import DeliveryError
-from server.notifications.service import message_of
-from server.notifications.webhook import Webhook, load_secret, signature_of
-from tests.server.notifications.receivers import SECRET, Authority, receiver, secret_file
+from extras.lab.notifications.addresses import RefusedAddressError, addresses_of, resolve, why_refused
+from extras.lab.notifications.delivery import DeliveryError
+from extras.lab.notifications.service import message_of
+from extras.lab.notifications.settings import WebhookSettings
+from extras.lab.notifications.webhook import Webhook, load_secret, signature_of
+from tests.extras.lab.notifications.receivers import SECRET, receiver, secret_file
+from tests.server.authority import Authority
 
 NOW = datetime(2026, 3, 1, 8, tzinfo=UTC)
 MESSAGE = message_of(Notification(topic="test", kind="attention", at=NOW, text="späte Stunde", robot="ma2000"))

@@ -8,11 +8,11 @@ import ssl
 from email.message import EmailMessage
 from email.utils import format_datetime
 
-from daq.config.notifications import EmailSettings, SmtpSettings
 from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.service.notifications import Notification
-from server.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.settings import EmailSettings, SmtpSettings
 
 WITHIN = 20.0
 """Time (s) for one answer of the mail server."""

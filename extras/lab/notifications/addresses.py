@@ -15,7 +15,7 @@ from functools import cache
 from importlib import resources
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 
-from server.notifications.delivery import DeliveryError
+from extras.lab.notifications.delivery import DeliveryError
 
 Address = IPv4Address | IPv6Address
 Resolver = Callable[[str, int], Iterable[str]]

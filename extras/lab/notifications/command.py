@@ -31,12 +31,13 @@ def try_all(
     from time import perf_counter
 
     from daq.contracts.service.notifications import Notification
+    from extras.lab.notifications.delivery import DeliveryError
+    from extras.lab.notifications.destinations import destinations_of
+    from extras.lab.notifications.service import message_of
+    from extras.lab.notifications.settings import NotificationSettings
     from server.clock import SystemClock
-    from server.notifications.delivery import DeliveryError
-    from server.notifications.destinations import destinations_of
-    from server.notifications.service import message_of
 
-    destinations = destinations_of(invocation(context).configuration.notifications)
+    destinations = destinations_of(invocation(context).configuration.section(NotificationSettings))
     chosen = [one for one in destinations if name in (None, one.name)]
     if not destinations:
         raise SpecError("notifications: nobody is told; name somebody in [notifications] (docs/notifications.md)")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from daq.config.notifications import NotificationSettings
 from daq.contracts.service.notifications import NotificationKind
-from server.notifications.delivery import Sender
-from server.notifications.mail import Mail
-from server.notifications.webhook import Webhook
+from extras.lab.notifications.delivery import Sender
+from extras.lab.notifications.mail import Mail
+from extras.lab.notifications.settings import NotificationSettings
+from extras.lab.notifications.webhook import Webhook
 
 
 @dataclass(frozen=True)

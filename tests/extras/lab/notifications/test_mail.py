@@ -16,12 +16,13 @@ from typing import Any
 import pytest
 from aiosmtpd.smtp import SMTP, AuthResult, Envelope, LoginPassword, Session
 
-from daq.config.notifications import EmailSettings, SmtpSettings
 from daq.contracts.service.notifications import Notification
-from server.notifications.delivery import DeliveryError
-from server.notifications.mail import Mail
-from server.notifications.service import message_of
-from tests.server.notifications.receivers import Authority
+from extras.lab.notifications.delivery import DeliveryError
+from extras.lab.notifications.mail import Mail
+from extras.lab.notifications.service import message_of
+from extras.lab.notifications.settings import EmailSettings, SmtpSettings
+from tests.daq_cli.test_hostile_names import NAMES
+from tests.server.authority import Authority
 
 NOW = datetime(2026, 3, 1, 8, tzinfo=UTC)
 ANNA = EmailSettings(to="anna@lab.example")
@@ -164,3 +165,16 @@ def test_a_server_that_is_away_is_told() -> None:
 def test_what_cannot_be_configured(changes: dict[str, Any], why: str) -> None:
     with pytest.raises(ValueError, match=why):
         SmtpSettings(**{"host": "mail.lab", "sender": "arm@lab.example", **changes})
+
+
+@NAMES
+def test_in_an_e_mail(name: str) -> None:
+    now = datetime(2026, 3, 1, 8, tzinfo=UTC)
+    told = Notification(kind="fault", topic="arm.fault", at=now, text=name, robot=name)
+    mail = Mail(EmailSettings(to="anna@lab.example"), SmtpSettings(host="localhost", port=25, sender="daq@lab.example"))
+    written = mail._written(message_of(told))
+    read = message_from_bytes(written.as_bytes(policy=policy.SMTP), policy=policy.default)
+    assert read["Bcc"] is None
+    assert str(read["Subject"]).endswith(": FAULT (arm.fault)")
+    assert read.get_content().splitlines()[: name.count("\n") + 1] == name.splitlines()
+    assert read.get_content_type() == "text/plain"

@@ -13,12 +13,12 @@ import pytest
 from sqlalchemy import text
 
 from daq.contracts.service.notifications import Notification
+from extras.lab.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.destinations import Destination
+from extras.lab.notifications.occasions import Faults
+from extras.lab.notifications.outbox import PAUSES, Outbox, pause_after
+from extras.lab.notifications.service import Notifier, message_of
 from server.clock import SystemClock
-from server.notifications.delivery import DeliveryError, Message
-from server.notifications.destinations import Destination
-from server.notifications.occasions import Faults
-from server.notifications.outbox import PAUSES, Outbox, pause_after
-from server.notifications.service import Notifier, message_of
 from server.owner.messages import ArmReport
 from server.store.engine import Store
 
@@ -170,10 +170,10 @@ def test_while_the_database_cannot_be_written_nobody_waits_and_nothing_is_lost(s
         notifier.tell(told())
         receiver.wait(lambda: len(receiver.taken) == 1)
         with sqlite_store.writing() as session:
-            session.execute(text("ALTER TABLE outbox RENAME TO away"))
+            session.execute(text("ALTER TABLE notifications RENAME TO away"))
         notifier.tell(told("while it is away"))
         with sqlite_store.writing() as session:
-            session.execute(text("ALTER TABLE away RENAME TO outbox"))
+            session.execute(text("ALTER TABLE away RENAME TO notifications"))
         receiver.wait(lambda: len(receiver.taken) == 2)
 
 
@@ -201,7 +201,7 @@ def test_ended_rows_are_removed_after_a_month(store: Store) -> None:
     for days, left in ((29, 1), (31, 0)):
         outbox.begin(["webhook lab"], NOW + timedelta(days=days))
         with store.reading() as session:
-            assert session.execute(text("SELECT count(*) FROM outbox")).scalar() == left
+            assert session.execute(text("SELECT count(*) FROM notifications")).scalar() == left
 
 
 def test_a_clock_that_is_set_back_by_years_delays_no_message(store: Store) -> None:
@@ -254,4 +254,4 @@ def test_without_a_destination_there_is_no_thread(sqlite_store: Store) -> None:
 @pytest.fixture(autouse=True)
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     """The database is tried again at once."""
-    monkeypatch.setattr("server.notifications.service.AGAIN_AFTER", 0.01)
+    monkeypatch.setattr("extras.lab.notifications.service.AGAIN_AFTER", 0.01)

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from standardwebhooks import Webhook as Witness
 
-from daq.config.notifications import NotificationSettings
+from extras.lab.notifications.settings import NotificationSettings
 from server.clock import SystemClock
 from tests.daq_cli.invoke import CommandLine
+from tests.extras.lab.notifications.receivers import SECRET, Receiver, receiver, secret_file
 from tests.server.inside import service_inside
-from tests.server.notifications.receivers import SECRET, Receiver, receiver, secret_file
 
 PATH = "/s3cret-path"
 
@@ -29,7 +29,7 @@ def test_the_end_of_an_experiment_and_a_pause_reach_the_webhook(
 ) -> None:
     with receiver() as there:
         section = NotificationSettings.model_validate(settings_of(tmp_path, there))
-        with service_inside(tmp_path, SystemClock(), monkeypatch, notifications=section) as robot:
+        with service_inside(tmp_path, SystemClock(), monkeypatch, sections={"notifications": section}) as robot:
             assert robot.post("connect").status_code == 200
             spec = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]}
             made = robot.post("experiments", json={"spec": spec}).json()
@@ -69,7 +69,7 @@ def test_a_command_tries_every_destination(
             f'secret = "{table["secret"]}"\n[notifications.webhooks.far]\nurl = "https://127.1/x"\nsecret = "secret"\n',
             "utf-8",
         )
-        page = Path(__file__).parents[3] / "docs" / "notifications.md"
+        page = Path(__file__).parents[4] / "docs" / "notifications.md"
         commands = [line[6:] for line in page.read_text("utf-8").splitlines() if line.startswith("$ daq ")]
         assert commands == ["notify test", "notify test lab"]
         told = daq(*commands[1].split())

@@ -14,11 +14,11 @@ from datetime import datetime, timedelta
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.notifications import DestinationStatus, Notification, NotificationStatus
+from extras.lab.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.destinations import Destination
+from extras.lab.notifications.outbox import Due, Outbox, pause_after
 from server.clock import Clock
 from server.database_errors import DamagedError, one_line
-from server.notifications.delivery import DeliveryError, Message
-from server.notifications.destinations import Destination
-from server.notifications.outbox import Due, Outbox, pause_after
 
 MOST_IN_MEMORY = 1000
 """Number of notifications that wait for the database; further ones are only in the log."""
@@ -28,7 +28,7 @@ AGAIN_AFTER = 1.0
 """Time (s) after which the database is tried again."""
 CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
 """Errors of a database that cannot be read or written now."""
-log = logging.getLogger("server.notifications")
+log = logging.getLogger("extras.lab.notifications")
 
 
 @dataclass

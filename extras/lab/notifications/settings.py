@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 
+from daq.config.section import Section
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.service.notifications import KINDS, NotificationKind
 
@@ -107,8 +108,10 @@ class SmtpSettings(FrozenRecord):
         return self
 
 
-class NotificationSettings(FrozenRecord):
+class NotificationSettings(Section):
     """Section `[notifications]`. Without a table of a webhook or an e-mail nobody is told anything."""
+
+    SHOWN = frozenset(["about", "attempts", "host", "port", "sender", "tls", "to", "user"])
 
     webhooks: Annotated[dict[DestinationName, WebhookSettings], Field(max_length=MOST_DESTINATIONS)] = {}
     """Webhooks, by name."""
@@ -132,6 +135,10 @@ class NotificationSettings(FrozenRecord):
             if plain and webhook.host not in {host.lower() for host in self.private_hosts}:
                 raise ValueError(f"webhooks.{name}.url: http is allowed to private_hosts only; write https")
         return self
+
+    def digested(self) -> dict[str, Any]:
+        """Returns the same, with the hosts of webhooks, whose addresses are not shown."""
+        return super().digested() | {"hosts": {name: webhook.host for name, webhook in self.webhooks.items()}}
 
 
 def require_mail_address(address: str) -> str:
