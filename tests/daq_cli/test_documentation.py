@@ -19,7 +19,9 @@ from daq.contracts.errors import DaqError
 from daq_cli.app.subcommands import subcommands
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "command-line.md").read_text("utf-8")
-EXAMPLES = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
+SHOWN = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
+EXAMPLES = [words for words in SHOWN if words[0] in subcommands()]
+"""Of what is installed: the page also shows what is optional."""
 
 
 def commands() -> dict[tuple[str, ...], Any]:

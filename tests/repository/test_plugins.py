@@ -110,7 +110,11 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tree / ".venv"], check=True, timeout=60)
     (site,) = (tree / ".venv" / "lib").glob("python*/site-packages")
     # The libraries of this environment, without what is installed here to be edited: that would bring the extras.
-    (site / "libraries.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    libraries = Path(sysconfig.get_path("purelib"))
+    (site / "libraries.pth").write_text(f"{libraries}\n{(libraries / 'cmeel.pth').read_text('utf-8')}")
+    for program in Path(sys.executable).parent.iterdir():
+        if not (tree / ".venv" / "bin" / program.name).exists():
+            (tree / ".venv" / "bin" / program.name).symlink_to(program)
     install = [UV, "pip", "install", "--quiet", "--no-deps", "--no-index", "--python", tree / ".venv", wheel]
     subprocess.run(install, check=True, timeout=100)
     for command in (["init", "--quiet"], ["add", "--all"]):

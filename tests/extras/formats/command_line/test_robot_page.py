@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tests.daq_cli.invoke import CommandLine
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "robots-from-urdf.md").read_text("utf-8")
 SESSIONS = [block for block in re.findall(r"^```\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) if "$ daq" in block]
 
