@@ -50,7 +50,7 @@ from benchmarks.mutants import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[1]
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
-PACKAGES = ("firmware_protocol", "daq", "daq_cli", "server", "model", "mock_controller")
+PACKAGES = ("firmware_protocol", "daq", "daq_cli", "server", "model", "mock_controller", "extras")
 TEST_FOLDERS = {
     Path("firmware_protocol", "bridge"): "firmware",
     Path("firmware_protocol"): "protocol",

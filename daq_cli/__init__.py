@@ -27,7 +27,7 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq.contracts.errors import DaqError
     from daq.contracts.extras import missing_extras_named
-    from daq_cli.app.needed import called, extra_of
+    from daq_cli.app.subcommands import called, extra_of
 
     command = called(sys.argv[1:])
     try:

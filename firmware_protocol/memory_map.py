@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Annotated, Literal, NamedTuple
@@ -219,3 +220,24 @@ def default_memory_map() -> MemoryMap:
     return parse_memory_map(
         resources.files("firmware_protocol").joinpath("memory_map.toml").read_text("utf-8"), "memory_map.toml"
     )
+
+
+def memory_map_text(memory_map: MemoryMap, remarks: Sequence[str] = ()) -> str:
+    """The file of a map: remarks, then every register with where each address comes from."""
+    lines = [f"# {remark}" for remark in remarks]
+    lines += ["version = 1", f'name = "{memory_map.name}"', f"base = 0x{memory_map.base:04X}"]
+    lines.append(f"size = 0x{memory_map.size:02X}")
+    for name, register in memory_map.registers.items():
+        lines += ["", f"[registers.{name}]", f'unit = "{register.unit}"', f"bits = {register.bits}"]
+        lines += [f"signed = {str(register.signed).lower()}", f'access = "{register.access}"']
+        lines.append(f"low = {addresses_text(register.low)}")
+        if register.high is not None:
+            lines.append(f"high = {addresses_text(register.high)}")
+        origins = ", ".join(f'"{one}"' for one in register.provenance)
+        lines.append(f"provenance = [{origins}]")
+    return "\n".join(lines) + "\n"
+
+
+def addresses_text(addresses: Sequence[int | None]) -> str:
+    """A list of addresses as the file has it; a question mark for one that is not known."""
+    return "[" + ", ".join("?" if address is None else f"0x{address:04X}" for address in addresses) + "]"

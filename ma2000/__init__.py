@@ -7,15 +7,15 @@
     model = ma2000.base_model(ma2000.load_machine("ma2000"))
     answer = ma2000.diagnose(model, [trace])
 
-What `__all__` names is the public interface (docs/python.md); everything else of the packages is internal and may
-change with any version.
+What `__all__` names is the public interface (docs/python.md), with the names of plug-ins; everything else of the
+packages is internal and may change with any version.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ma2000.own_packages import require_own_packages
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from daq.contracts.service.jobs import FitRequest as FitRequest
     from daq.contracts.service.jobs import ValidateRequest as ValidateRequest
     from daq.contracts.trace import Trace as Trace
+    from daq.plugins import Name
     from daq.traces.catalogue import TraceSummary as TraceSummary
     from daq.trajectories.presets import PRESETS as PRESETS
     from ma2000.arm import Arm as Arm
@@ -50,10 +51,8 @@ if TYPE_CHECKING:
     from ma2000.fitting import fit_torques as fit_torques
     from ma2000.fitting import profile as profile
     from ma2000.local_service import LocalService as LocalService
+    from ma2000.machine_file import save_machine as save_machine
     from ma2000.pictures import plot as plot
-    from ma2000.robot_files import save_machine as save_machine
-    from ma2000.robot_files import write_mjcf as write_mjcf
-    from ma2000.robot_files import write_urdf as write_urdf
     from ma2000.running import Run as Run
     from ma2000.running import RunError as RunError
     from ma2000.running import run as run
@@ -78,7 +77,6 @@ if TYPE_CHECKING:
     from model.machine_model.model import base_model as base_model
     from model.machine_model.model_file import load_model as load_model
     from model.machine_model.model_file import save_model as save_model
-    from model.robot_files.machine_of_arm import machine_from_urdf as machine_from_urdf
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
     from model.thesis.reproduction import Reproduction as Reproduction
@@ -132,26 +130,23 @@ _HOME = {
     "list_traces": "ma2000.files",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
-    "machine_from_urdf": "model.robot_files.machine_of_arm",
     "plot": "ma2000.pictures",
     "profile": "ma2000.fitting",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
     "reproduce_thesis": "ma2000.thesis",
     "run": "ma2000.running",
-    "save_machine": "ma2000.robot_files",
+    "save_machine": "ma2000.machine_file",
     "save_model": "model.machine_model.model_file",
     "simulate": "model.simulation.simulate",
     "validate": "ma2000.studies",
-    "write_mjcf": "ma2000.robot_files",
     "write_table": "ma2000.files",
     "write_trace": "ma2000.files",
-    "write_urdf": "ma2000.robot_files",
 }
 """Module of each public name. They are imported when they are first used: a notebook that only reads traces waits for
 no compiler."""
 
-_ON_A_ROBOT = {"Arm", "Run", "RunError", "connect", "machine_from_urdf", "plot", "run"}
+_ON_A_ROBOT = {"Arm", "Run", "RunError", "connect", "plot", "run"}
 _ON_A_SERVICE = {"LocalService"}
 _WITH_MODELS = {
     "DesignOptions",
@@ -173,8 +168,6 @@ _WITH_MODELS = {
     "reproduce_thesis",
     "simulate",
     "validate",
-    "write_mjcf",
-    "write_urdf",
 }
 _NEEDED: dict[Extra, tuple[str, ...]] = {
     "robot": ("matplotlib", "mujoco", "pydantic_settings"),
@@ -183,23 +176,22 @@ _NEEDED: dict[Extra, tuple[str, ...]] = {
 }
 """Packages that tell whether an extra is installed."""
 
-__all__ = [  # noqa: PLE0604
-    *_HOME,
-    "__version__",
-]
 __version__ = version("ma2000-daq")
 
 require_own_packages()
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """Imports a public name on its first use. Raises MissingExtraError for one whose extra is not installed."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'ma2000' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
+    if name == "__all__":
+        return [*_homes(), "__version__"]
+    home = _HOME.get(name) or (None if name.startswith("_") else _homes().get(name))
+    if home is None:
+        raise AttributeError(f"module 'ma2000' has no attribute {name!r}; it has {', '.join(sorted(_homes()))}")
     from daq.contracts.extras import missing_extras_named
 
     with missing_extras_named(f"ma2000.{name}", _extra_of(name)):
-        found: object = getattr(import_module(_HOME[name]), name)
+        found: object = getattr(import_module(home), name)
     globals()[name] = found
     return found
 
@@ -209,7 +201,19 @@ def __dir__() -> list[str]:
     from daq.contracts.extras import is_installed
 
     works = {extra: all(map(is_installed, packages)) for extra, packages in _NEEDED.items()}
-    return sorted(name for name in __all__ if (extra := _extra_of(name)) is None or works[extra])
+    names = [*_homes(), "__version__"]
+    return sorted(name for name in names if (extra := _extra_of(name)) is None or works[extra])
+
+
+def _homes() -> dict[str, str]:
+    """Module of each public name, those of plug-ins too."""
+    return {**{name: added.module for name, added in _added().items()}, **_HOME}
+
+
+def _added() -> dict[str, Name]:
+    from daq.plugins import plugins
+
+    return {name.name: name for plugin in plugins() for name in plugin.names}
 
 
 def _extra_of(name: str) -> Extra | None:
@@ -218,4 +222,6 @@ def _extra_of(name: str) -> Extra | None:
         return "model"
     if name in _ON_A_SERVICE:
         return "server"
-    return "robot" if name in _ON_A_ROBOT else None
+    if name in _HOME:
+        return "robot" if name in _ON_A_ROBOT else None
+    return added.needs if (added := _added().get(name)) is not None else None

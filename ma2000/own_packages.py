@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("daq", "firmware_protocol", "mock_controller", "model", "server")
+PACKAGES = ("daq", "extras", "firmware_protocol", "mock_controller", "model", "server")
 
 
 class HiddenPackageError(ImportError):

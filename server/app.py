@@ -13,6 +13,7 @@ from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from daq.config.documents import site_index
+from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
@@ -25,7 +26,6 @@ from server.api import (
     jobs,
     live,
     login,
-    notifications,
     presets,
     programs,
     queue,
@@ -111,12 +111,14 @@ def bare_app(services: Services | None) -> FastAPI:
         archive,
         jobs,
         audit,
-        notifications,
         live,
         login,
         system,
     ):
         api.include_router(part.router)
+    for plugin in plugins():
+        for reference in plugin.routes:
+            api.include_router(named(reference))
     app.include_router(api)
     app.include_router(system.plain)
     app.include_router(page_router())

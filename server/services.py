@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -22,12 +22,11 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.extras import require_extra
 from daq.contracts.service.events import ServiceEvent
-from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
-from daq.contracts.service.notifications import Notification, Topic
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
+from daq.plugins import named, plugins
 from daq.trajectories import control_period
 from server.access.caller import Caller
 from server.access.lanes import Lanes
@@ -47,7 +46,6 @@ from server.catalogue.catalogue import Catalogue
 from server.catalogue.room import of_robots, storage_warnings
 from server.clock import Clock, SystemClock
 from server.experiments.review import Given
-from server.fleet.comparison import Comparisons
 from server.jobs.models import Models
 from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
@@ -55,11 +53,8 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
-from server.notifications.destinations import Destination, destinations_of
-from server.notifications.occasions import Faults, of_experiment, of_job, of_pause
-from server.notifications.outbox import Outbox
-from server.notifications.service import Notifier
 from server.owner.messages import Answer
+from server.parts import Attention, Part
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
@@ -95,6 +90,7 @@ ENDING = 0.5
 KEEPING = 0.3
 """Share (s) of that time in which rows that could not be written are kept in a file."""
 log = logging.getLogger("server")
+P = TypeVar("P", bound=Part)
 
 
 @dataclass(frozen=True)
@@ -166,7 +162,6 @@ class Services:
         self.clock = clock or SystemClock()
         parse_service_address(settings.server.executor)
         bucket = open_bucket(settings.archive)
-        destinations = destinations_of(settings.notifications)
         self.closed = False
         """Whether `close` has done everything."""
         self.store = Store(address_of(settings.server))
@@ -203,8 +198,7 @@ class Services:
         """Called when a session has begun, and when one was left, with its caller."""
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
-        self.comparisons = Comparisons(self.jobs)
-        self.notifier = self._make_notifier(settings, destinations)
+        self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
         self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
@@ -219,9 +213,14 @@ class Services:
             raise not_found(f"robot {name!r:.60}", f"this service has {', '.join(self._robots)}")
         return self._robots[name]
 
+    def part(self, kind: type[P]) -> P:
+        """Returns the part of a plug-in that is of this class."""
+        return next(part for part in self.parts if isinstance(part, kind))
+
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
-        self.notifier.start()
+        for part in self.parts:
+            part.start()
         for rig in self.robots():
             try:
                 found = rig.catalogue.bring_up_to_date()
@@ -252,11 +251,9 @@ class Services:
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
-        _all_within(
-            ENDING,
-            [partial(one.close, ENDING) for one in (self.notifier, self._recorded)]
-            + [partial(self.audit.writer.close, ENDING - KEEPING)],
-        )
+        last = [partial(part.close, ENDING) for part in self.parts]
+        last += [partial(self._recorded.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)]
+        _all_within(ENDING, last)
         self.store.close()
         self.closed = True
 
@@ -283,10 +280,9 @@ class Services:
             return self._robots[name].status()
 
         hub = Hub(self.clock, history, status)
-        faults = Faults()
         robot.listeners.append(hub.on_report)
         robot.listeners.append(lambda report: self.metrics.count_report(name, report))
-        robot.listeners.append(lambda report: self._tell(faults.new(name, report, self.clock.utc())))
+        robot.listeners.append(lambda report: self._tell(lambda part: part.arm_reported(name, report)))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobService(
@@ -342,44 +338,30 @@ class Services:
     def warnings(self) -> list[str]:
         """Returns what will need somebody soon, one line each."""
         warn_at, rigs = self.settings.traces.warn_at, self.robots()
-        found = self.storage_warnings()
+        found = self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
         for rig in rigs:
             lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
             found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
         return found
 
-    def _make_notifier(self, settings: Settings, destinations: list[Destination]) -> Notifier:
-        """Returns what tells people elsewhere."""
-        return Notifier(
-            destinations,
-            Outbox(self.store),
-            self.clock,
-            attempts=settings.notifications.attempts,
-            look=self._what_lasts,
-            given_up=lambda line: log.error("notifications: %s", line),
-            count=self.metrics.count_notification,
-        )
+    def _tell(self, news: Callable[[Part], None]) -> None:
+        for part in self.parts:
+            news(part)
 
-    def _tell(self, notification: Notification | None) -> None:
-        if notification is not None:
-            self.notifier.tell(notification)
-
-    def _what_lasts(self) -> dict[str, Notification]:
+    def attention(self) -> dict[str, Attention]:
         """Returns what needs somebody for as long as it lasts, by a key that stays the same meanwhile."""
-
-        def attention(topic: Topic, text: str, robot: str | None = None) -> Notification:
-            return Notification(topic=topic, kind="attention", at=self.clock.utc(), text=text, robot=robot)
-
         found = {}
         if lines := self.storage_warnings():
-            found["storage"] = attention("storage.warning", "; ".join(lines))
+            found["storage"] = Attention("storage.warning", "; ".join(lines))
         for rig in self.robots():
             name, queue = rig.robot.name, rig.queue.status()
             if rig.archive is not None and (problem := rig.archive.status().problem):
-                found[f"archive {name}"] = attention("archive.away", f"{name}: {problem}", name)
+                found[f"archive {name}"] = Attention("archive.away", f"{name}: {problem}", name)
             if queue.waiting_for:
                 line = f"{name}: {queue.queued} experiments wait: {queue.waiting_for}"
-                found[f"held {name}"] = attention("queue.held", line, name)
+                found[f"held {name}"] = Attention("queue.held", line, name)
+        for part in self.parts:
+            found |= part.attention()
         return found
 
     def storage_warnings(self) -> list[str]:
@@ -412,10 +394,8 @@ class Services:
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
                 reviewer=None if settings.robot.review == "off" else settings.robot.review,
-                paused=lambda reason: self.notifier.tell(of_pause(robot.name, reason, self.clock.utc())),
-                ended=lambda identity, state, reason: self.notifier.tell(
-                    of_experiment(robot.name, identity, state, reason, self.clock.utc())
-                ),
+                paused=lambda reason: self._tell(lambda part: part.queue_paused(robot.name, reason)),
+                ended=lambda *end: self._tell(lambda part: part.experiment_ended(robot.name, *end)),
             )
         )
         robot.listeners.append(queue.on_report)
@@ -451,8 +431,7 @@ class Services:
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
         self.metrics.count_job(job)
-        if job.state in ENDS:
-            self.notifier.tell(of_job(job, self.clock.utc()))
+        self._tell(lambda part: part.job_changed(job))
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:

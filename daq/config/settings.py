@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import os
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import platformdirs
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, create_model, field_validator
 from pydantic_settings import (
     BaseSettings,
     EnvSettingsSource,
@@ -18,8 +20,8 @@ from pydantic_settings import (
 
 from daq.config.archive import ArchiveSettings
 from daq.config.limits import merged_limits
-from daq.config.notifications import NotificationSettings
 from daq.config.oidc import OidcSettings
+from daq.config.section import Section
 from daq.config.service import ServiceSettings, TrueOrFalse
 from daq.contracts.documents import parse_toml, read_text, shown
 from daq.contracts.errors import SpecError
@@ -27,8 +29,11 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace_limits import TraceLimits
+from daq.plugins import named, plugins
 from firmware_protocol.invalid import first_invalid
 
+S = TypeVar("S", bound=Section)
+log = logging.getLogger(__name__)
 APP = "ma2000-daq"
 LOCAL_FILE = "daq.toml"
 MOCK_URL = "mock://"
@@ -122,7 +127,6 @@ class Settings(BaseSettings):
     traces: TraceSettings = TraceSettings()
     server: ServiceSettings = ServiceSettings()
     archive: ArchiveSettings = ArchiveSettings()
-    notifications: NotificationSettings = NotificationSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
     """Who runs the experiments; recorded in every trace."""
 
@@ -140,6 +144,14 @@ class Settings(BaseSettings):
         assert isinstance(env_settings, EnvSettingsSource)
         env_settings.env_vars = {k: v for k, v in env_settings.env_vars.items() if k.upper() != SERVER_VARIABLE}
         return env_settings, init_settings
+
+    def section(self, kind: type[S]) -> S:
+        """The section of a plug-in that is of this class."""
+        return next((section for section in self.sections() if isinstance(section, kind)), kind())
+
+    def sections(self) -> tuple[Section, ...]:
+        """The sections of plug-ins."""
+        return tuple(value for _, value in self if isinstance(value, Section))
 
     @property
     def port(self) -> str:
@@ -187,6 +199,20 @@ class Settings(BaseSettings):
         return machine.model_copy(update={"limits": merged_limits(machine, self.robot.limits)})
 
 
+@cache
+def settings_type() -> type[Settings]:
+    """`Settings` with the sections that plug-ins add. One that cannot be loaded is left out with a warning."""
+    found: dict[str, Any] = {}
+    for plugin in plugins():
+        for name, reference in plugin.settings.items():
+            try:
+                kind = named(reference)
+                found[name] = (kind, kind())
+            except Exception as error:  # noqa: BLE001 - somebody else's module may raise anything
+                log.warning("section [%s] (%s) is left out: %s", name, reference, error)
+    return create_model("Settings", __base__=Settings, **found)
+
+
 def config_files(explicit: Path | None = None) -> list[Path]:
     """Candidates for the configuration file, in order: the one requested, ./daq.toml, the user's."""
     if explicit is not None:
@@ -226,7 +252,7 @@ def _parse(path: Path) -> Settings:
 
 def _validated(data: dict[str, Any], origin: str) -> Settings:
     try:
-        settings = Settings(**data)
+        settings = settings_type()(**data)
     except SettingsError as error:
         # An environment variable of a whole section must hold JSON; its name is in the error's text.
         raise SpecError(f"environment: {error}; write single keys, such as DAQ_ROBOT__PORT") from error
@@ -270,8 +296,10 @@ def _is_secret(where: tuple[int | str, ...]) -> bool:
     wrong place shall not find it in a log."""
     if where[:2] == ("server", "oidc"):
         return where[-1] not in OidcSettings.model_fields
-    if where[:1] == ("notifications",):
-        return where[-1] not in ("about", "attempts", "host", "port", "sender", "tls", "to", "user")
+    field = settings_type().model_fields.get(str(where[0])) if where else None
+    kind = None if field is None else field.annotation
+    if isinstance(kind, type) and issubclass(kind, Section):
+        return where[-1] not in kind.SHOWN
     return where[:1] == ("archive",) and where[-1] not in ArchiveSettings.model_fields.keys() - {"endpoint"}
 
 
@@ -283,7 +311,7 @@ def _variable_of(where: tuple[int | str, ...]) -> str | None:
 
 
 def _keys_at(where: tuple[int | str, ...]) -> list[str]:
-    model: type[BaseModel] = Settings
+    model: type[BaseModel] = settings_type()
     for part in where:
         annotation = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
         candidates = [annotation, *getattr(annotation, "__args__", ())]

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
 
+from daq.plugins import named, plugins
 from daq.transport.url import FRAMED, SERVOS, PortUrl, PortUrlError, parse_port_url
 from firmware_protocol.dialect import FramedDialect, LinkDialect
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.errors import ProtocolError
-
-GROUP = "ma2000_daq.dialects"
-"""Entry points of other packages: a name, and what makes a `LinkDialect` of the joints' numbers on the bus."""
 
 
 def dialect_of(url: str) -> LinkDialect:
@@ -23,18 +20,19 @@ def dialect_of(url: str) -> LinkDialect:
     try:
         if port.dialect == SERVOS:
             return DynamixelDialect(port.ids)
-        for entry in entry_points(group=GROUP, name=port.dialect):
-            return _loaded(entry)(port.ids)
+        for plugin in plugins():
+            if (made := plugin.dialects.get(port.dialect)) is not None:
+                return _loaded(port.dialect, made)(port.ids)
     except ProtocolError as error:
         raise PortUrlError(f"port {url!r}: {error}") from error
-    known = sorted({FRAMED, SERVOS} | set(entry_points(group=GROUP).names))
+    known = sorted({FRAMED, SERVOS} | {name for plugin in plugins() for name in plugin.dialects})
     raise PortUrlError(f"port {url!r}: dialect {port.dialect!r} is unknown: {', '.join(known)}")
 
 
-def _loaded(entry: EntryPoint) -> Callable[[tuple[int, ...]], LinkDialect]:
+def _loaded(name: str, reference: str) -> Callable[[tuple[int, ...]], LinkDialect]:
     """What makes a dialect of another package. Raises ProtocolError where it cannot be imported."""
     try:
-        made: Callable[[tuple[int, ...]], LinkDialect] = entry.load()
+        made: Callable[[tuple[int, ...]], LinkDialect] = named(reference)
     except Exception as error:  # another package's own code runs when it is imported
-        raise ProtocolError(f"dialect {entry.name!r} ({entry.value}): {type(error).__name__}: {error}") from error
+        raise ProtocolError(f"dialect {name!r} ({reference}): {type(error).__name__}: {error}") from error
     return made

@@ -7,8 +7,8 @@ from pathlib import Path
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces.bag_files import kind_of
 from daq.traces.csv_table import import_csv
+from daq.traces.kinds import kind_of
 from daq.traces.reader import read_trace
 
 
@@ -20,6 +20,6 @@ def open_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     try:
         return read_trace(path, limits)
     except TraceError as error:
-        if kind == "bag":
-            raise TraceError(f"{error}; `daq traces import` makes a trace of the joint states in a bag") from error
+        if kind != "trace":
+            raise TraceError(f"{error}; `daq traces import` makes a trace of {kind.what}") from error
         raise

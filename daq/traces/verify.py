@@ -14,8 +14,8 @@ from daq.contracts.machine import Machine
 from daq.contracts.trace import INCOMPLETE, LATE_SET_POINTS, Trace, late_set_points_line
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
-from daq.traces.bag_files import kind_of
 from daq.traces.csv_table import import_csv
+from daq.traces.kinds import kind_of
 from daq.traces.reader import TOO_LARGE, trace_of
 from daq.traces.scan import Scan, scan
 

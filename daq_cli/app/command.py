@@ -16,7 +16,8 @@ import typer
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq_cli.app.context import Invocation
-from daq_cli.app.lazy import ALL_ROBOTS, HERE, LazyGroup
+from daq_cli.app.lazy import LazyGroup
+from daq_cli.app.subcommands import subcommand
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.invalid import message_of
 
@@ -87,11 +88,13 @@ def options(
         if not by_default:
             raise SpecError("--port and --server: the server uses its own port; give one of them")
         server = None
-    if server is not None and context.invoked_subcommand in HERE:
+    known = subcommand(context.invoked_subcommand or "")
+    about = "robot" if known is None else known.about
+    if server is not None and about != "robot":
         if not by_default:
             raise SpecError(f"--server: `daq {context.invoked_subcommand}` has nothing to do with a server's robot")
         server = None
-    if robot is not None and context.invoked_subcommand in ALL_ROBOTS:
+    if robot is not None and about == "service":
         raise SpecError(f"--robot: `daq {context.invoked_subcommand}` is about all robots of the configuration")
     context.obj = Invocation(
         config_file=config_file,

@@ -114,6 +114,8 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
 
         parse_address(settings.server.database)
     parse_service_address(settings.server.executor)
+    for section in settings.sections():
+        section.check()
     if settings.archive.bucket is not None:
         from server.archive.bucket import open_bucket
 

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, console, print_json, print_prose, print_table, printable
 from daq_cli.robot.access import robot_of
-from daq_cli.robot.answers import BagChoice
+from daq_cli.robot.answers import ImportChoice
 
 if TYPE_CHECKING:
     from daq.contracts.service.archive import ArchiveStatus, TraceArchive
@@ -208,7 +208,7 @@ def import_(
     """Import a trace of another rig or tool."""
     robot = robot_of(context)
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
-    made = robot.import_trace(file, folder, BagChoice(topic, names, received, drive_unit))
+    made = robot.import_trace(file, folder, ImportChoice(topic, names, received, drive_unit))
     if json:
         print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:

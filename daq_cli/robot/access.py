@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.app.consent import ConsentPrompt
-    from daq_cli.robot.answers import BagChoice, ImportedTrace, ResetDone, RobotState
+    from daq_cli.robot.answers import ImportChoice, ImportedTrace, ResetDone, RobotState
     from daq_cli.robot.pendant import Teaching
 
 
@@ -83,7 +83,7 @@ class RobotAccess(Protocol):
     def find_trace(self, folder: Path, wanted: str) -> Path:
         """Finds a trace by path, number, name or `last` in `folder`; a service's trace is downloaded into it."""
 
-    def import_trace(self, file: Path, folder: Path | None, choice: BagChoice) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: ImportChoice) -> ImportedTrace:
         """Imports a trace of another rig or tool; `choice` is for a bag."""
 
     def program(self, name: Path) -> Program:

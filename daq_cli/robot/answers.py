@@ -32,7 +32,7 @@ class ResetDone:
 
 
 @dataclass(frozen=True)
-class BagChoice:
+class ImportChoice:
     """What is taken from a bag: the topic, the names of the joints, whether the times are those of reception, and the
     unit of the effort. Of any other file only the unit of the drive can be chosen."""
 

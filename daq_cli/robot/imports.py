@@ -1,4 +1,4 @@
-"""Traces of other rigs and tools: CSV files, and bags of ROS."""
+"""Traces of other rigs and tools: CSV files, and what plug-ins read."""
 
 from __future__ import annotations
 
@@ -11,55 +11,52 @@ from typing import Any
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import TraceLimits
-from daq_cli.robot.answers import BagChoice
+from daq_cli.robot.answers import ImportChoice
 
 UNITS = {"V": "V", "A": "A", "N": "N", "N·m": "N·m", "none": "none", "Nm": "N·m", "N.m": "N·m"}
 """What a person may write for the unit of a drive, and what a trace calls it: the last two are N·m as it is typed."""
 
 
-def foreign_trace(file: Path, limits: TraceLimits, choice: BagChoice, numbering: tuple[str, ...]) -> Trace:
-    """The trace in a CSV file or a bag. numbering: names of the joints 1, 2 … of the machine in use, by which those of
-    a bag are numbered. Raises SpecError, TraceError, MissingExtraError."""
-    from daq.traces import ros_bag
-    from daq.traces.bag_files import STORAGES, kind_of
-    from daq.traces.bag_process import import_bag_apart
-    from daq.traces.bag_storage import METADATA
+def foreign_trace(file: Path, limits: TraceLimits, choice: ImportChoice, numbering: tuple[str, ...]) -> Trace:
+    """The trace in a CSV file, or in one that a plug-in reads. numbering: names of the joints 1, 2 … of the machine in
+    use, by which others are numbered. Raises SpecError, TraceError, MissingExtraError."""
+    from daq.plugins import named
     from daq.traces.csv_table import import_csv
+    from daq.traces.kinds import Choice, kind_of
 
     if choice.drive_unit is not None and choice.drive_unit not in UNITS:
         raise SpecError(f"--drive-unit {choice.drive_unit}: write {', '.join(dict.fromkeys(UNITS.values()))}")
     unit: Any = UNITS.get(choice.drive_unit or "")
-    if kind_of(file, limits) != "csv":
-        times: ros_bag.Times | None = "received" if choice.received else None
-        chosen = ros_bag.BagChoice(choice.topic, choice.joints, times, unit, numbering)
-        return import_bag_apart(file, limits, chosen)
-    if file.is_dir():
-        inside = sorted(one.name for one in file.iterdir() if one.suffix in STORAGES)
-        rather = f"; name the file in it, {file / inside[0]}" if inside else ""
-        raise SpecError(f"{file}: is a folder without {METADATA}, as a recording leaves that was cut off{rather}")
-    _require_no_bag_choice(file, choice)
+    kind = kind_of(file, limits)
+    if kind == "trace":
+        raise SpecError(f"{file}: is a trace already; copy it into the folder of traces")
+    if kind != "csv":
+        times: Any = "received" if choice.received else None
+        made: Trace = named(kind.read)(file, limits, Choice(choice.topic, choice.joints, times, unit, numbering))
+        return made
+    _require_no_choice(file, choice)
     if unit == "none":
         raise SpecError(f"{file}: --drive-unit none is for bags; leave the column out")
     return import_csv(file, limits, drive_unit=unit)
 
 
-def _require_no_bag_choice(file: Path, choice: BagChoice) -> None:
-    if choice != BagChoice(drive_unit=choice.drive_unit):
+def _require_no_choice(file: Path, choice: ImportChoice) -> None:
+    if choice != ImportChoice(drive_unit=choice.drive_unit):
         raise SpecError(f"{file}: --topic, --joints and --received are for bags; this is none")
 
 
 @contextmanager
 def to_upload(
-    file: Path, limits: TraceLimits, choice: BagChoice, numbering: Callable[[], tuple[str, ...]]
+    file: Path, limits: TraceLimits, choice: ImportChoice, numbering: Callable[[], tuple[str, ...]]
 ) -> Iterator[tuple[Path, str]]:
     """Yields the file to upload to a service, the trace that is made of anything but a trace, and what was noted in
     making it."""
-    from daq.traces.bag_files import is_trace
+    from daq.traces.kinds import is_trace
     from daq.traces.naming import trace_path
     from daq.traces.store import write_trace
 
     if file.is_file() and is_trace(file, limits):
-        if choice != BagChoice():
+        if choice != ImportChoice():
             raise SpecError(f"{file}: --topic, --joints, --received and --drive-unit are for bags; this is none")
         yield file, ""
         return

@@ -14,7 +14,7 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import ReachError, SafetyError, SpecError, TraceError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import BagChoice, ImportedTrace, ResetDone, RobotState
+from daq_cli.robot.answers import ImportChoice, ImportedTrace, ResetDone, RobotState
 
 if TYPE_CHECKING:
     from daq.acquisition.messages import Finished
@@ -191,7 +191,7 @@ class LocalRobot:
 
         return find_trace(folder, wanted, self.call.trace_limits)
 
-    def import_trace(self, file: Path, folder: Path | None, choice: BagChoice) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: ImportChoice) -> ImportedTrace:
         """Writes the trace into the folder. Raises SpecError, TraceError."""
         from daq.traces.naming import trace_path
         from daq.traces.store import write_trace

@@ -13,7 +13,7 @@ from typing import Any
 import typer.main
 
 from daq_cli.app.command import app
-from daq_cli.app.lazy import SUBCOMMANDS
+from daq_cli.app.subcommands import subcommands
 
 BEGIN = """# Every option
 
@@ -28,8 +28,8 @@ def page() -> str:
     """The page as it should be."""
     whole = typer.main.get_command(app)
     parts = [BEGIN, "## Before the command\n", *_parameters(whole, "daq")]
-    for name, (module, _) in SUBCOMMANDS.items():
-        command = typer.main.get_command(import_module(module).app)
+    for name, known in subcommands().items():
+        command = typer.main.get_command(import_module(known.module).app)
         parts.append(f"## daq {name}\n")
         parts += _command(command, f"daq {name}", 3)
         for (program,) in OWN_HELP.get(name, ()):

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 from sphinx.pycode import ModuleAnalyzer
 
-from daq.config.settings import Settings
+from daq.config.settings import settings_type
 
 from .command_line import plain
 
@@ -24,7 +24,7 @@ the file: `DAQ_`, the section and the key in capitals, with two underscores betw
 
 def page() -> str:
     """The page as it should be. Raises LookupError for a key without a meaning."""
-    return "\n".join([BEGIN, *_section(Settings, "")])
+    return "\n".join([BEGIN, *_section(settings_type(), "")])
 
 
 def _section(part: type[BaseModel], name: str) -> Iterator[str]:

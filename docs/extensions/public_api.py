@@ -24,7 +24,7 @@ BEGIN = """# The public Python interface
 
 Made from the docstrings. [From Python](../python.md) shows programs that use it, and says what public means.
 """
-HOME: dict[str, str] = ma2000._HOME
+HOME: dict[str, str] = ma2000._homes()
 PAGE = "reference/python-api"
 ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[.*?\], ~?numpy\.dtype\[[\w.~]+\]\]")
 log = logging.getLogger(__name__)

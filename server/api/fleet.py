@@ -1,30 +1,19 @@
-"""Routes over all robots: their state at a glance, the stop of all, the same experiment on several."""
+"""Routes over all robots: their state at a glance, the stop of all."""
 
 from __future__ import annotations
 
 import asyncio
-from functools import partial
-from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 
-from daq.contracts.errors import SpecError
 from daq.contracts.service.fleet import (
-    FleetComparison,
-    FleetExperimentRequest,
-    FleetExperiments,
     FleetRobot,
     FleetStatus,
 )
 from daq.contracts.service.robot import FleetStopResult
-from server.api.dependencies import IdempotencyKey, Operator, ServicesDep, Turn, Viewer
-from server.api.experiments import require_possible
-from server.api.presets import with_preset
-from server.catalogue.room import require_room
-from server.fleet.comparison import Arm
-from server.jobs.mailbox import RESULT
-from server.problems import PROBLEMS, ProblemError
-from server.services import RobotServices, Services
+from server.api.dependencies import ServicesDep, Viewer
+from server.problems import PROBLEMS
+from server.services import RobotServices
 from server.stopping.arm import together
 
 router = APIRouter(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
@@ -50,78 +39,6 @@ async def stop_fleet(services: ServicesDep, caller: Viewer) -> FleetStopResult:
     for name, result in found.items():
         services.record_event_later(name, "stop", result.text, actor=caller.name)
     return together(found)
-
-
-@router.post("/experiments", status_code=201)
-def submit_fleet_experiment(
-    body: FleetExperimentRequest,
-    services: ServicesDep,
-    caller: Operator,
-    _turn: Turn,
-    idempotency_key: IdempotencyKey = None,
-) -> FleetExperiments:
-    """Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
-
-    It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
-    gets it once.
-    """
-    rigs = _chosen(services, body.robots)
-    body = body.model_copy(update={"request": with_preset(body.request)})
-    new = [
-        rig for rig in rigs if services.experiments.made_before(rig.robot.name, body.request, idempotency_key) is None
-    ]
-    for rig in new:
-        _require_possible(services, rig, body)
-    names = [rig.robot.name for rig in rigs]
-    made = services.experiments.submit_to_each(names, body.request, services.clock.utc(), caller.name, idempotency_key)
-    for rig, (experiment, is_new) in zip(rigs, made, strict=True):  # no queue begins before every one has it
-        if is_new:
-            rig.queue.submitted(experiment, caller.name)
-    shown = [rig.queue.with_progress(experiment) for rig, (experiment, _) in zip(rigs, made, strict=True)]
-    return FleetExperiments(experiments=tuple(shown))
-
-
-@router.get("/comparison")
-def compare_fleet(
-    services: ServicesDep,
-    _: Viewer,
-    _turn: Turn,
-    experiment: Annotated[str | None, Query(max_length=400, description="Its name; else the most fitted one.")] = None,
-    days: Annotated[float, Query(ge=0, le=36500, description="Least time between the compared fits, in days.")] = 30,
-) -> FleetComparison:
-    """Compares the robots' fits to the same experiment over time, and says which numbers have changed."""
-    arms = [
-        Arm(
-            rig.robot.name,
-            partial(rig.jobs.result_file, name=RESULT),
-            partial(services.traces.get, rig.robot.name),
-        )
-        for rig in services.robots()
-    ]
-    return services.comparisons.compare(arms, experiment, days)
-
-
-def _chosen(services: Services, names: tuple[str, ...] | None) -> list[RobotServices]:
-    """Returns the robots of these names; all of them for None. Raises a 404 and a 422."""
-    if names is None:
-        return services.robots()
-    if len(set(names)) < len(names):
-        raise ProblemError(422, "not-valid", "robots: one is named twice", "name each robot once")
-    return [services.robot(name) for name in names]
-
-
-def _require_possible(services: Services, rig: RobotServices, body: FleetExperimentRequest) -> None:
-    """Raises the problem of one robot, which its name begins."""
-    try:
-        require_possible(services, rig, body.request.spec)
-        require_room(rig.catalogue.folder)
-    except SpecError as error:
-        raise SpecError(f"robot {rig.robot.name}: {error}; nothing was queued") from error
-    except ProblemError as problem:
-        line = f"robot {rig.robot.name}: {problem.detail}; nothing was queued"
-        raise ProblemError(
-            problem.status, problem.kind, line, problem.advice, problem.fields, problem.headers
-        ) from problem
 
 
 def _at_a_glance(rig: RobotServices) -> FleetRobot:

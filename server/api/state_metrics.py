@@ -107,11 +107,6 @@ class StateMetrics(Collector):
         written.add_metric((), writer.written)
         yield written
         yield GaugeMetricFamily("daq_audit_waiting", "Rows of the audit log not written yet.", value=writer.waiting)
-        waiting = GaugeMetricFamily("daq_notifications_waiting", "Notifications that wait.", labels=("destination",))
-        with suppress(SQLAlchemyError, DamagedError):
-            for destination, count in self._services.notifier.waiting().items():
-                waiting.add_metric((destination,), count)
-        yield waiting
 
     def _of_archives(self) -> Iterable[Metric]:
         reached = GaugeMetricFamily("daq_archive_reached", "1 while the archive answers.", labels=("robot",))

@@ -121,7 +121,8 @@ def _checks(services: Services) -> dict[str, str]:
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
     checks["room"] = "; ".join(services.storage_warnings())
-    checks["notifications"] = "; ".join(services.notifier.warnings())
+    for part in services.parts:
+        checks |= part.checks()
     for rig in services.robots():
         name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
         checks[name] = _problem_of_folder(rig.catalogue.folder)

@@ -6,9 +6,11 @@ import hashlib
 import json
 from datetime import datetime
 from importlib.metadata import version
+from typing import Any
 
 from pydantic import BaseModel
 
+from daq.config.section import Section
 from daq.config.settings import Settings
 from daq.contracts.service.audit import AuditNote
 from server.audit.log import AuditLog
@@ -39,12 +41,13 @@ def _digests(settings: Settings) -> dict[str, str]:
     found = {}
     for name in type(settings).model_fields:
         value = getattr(settings, name)
-        said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
+        if isinstance(value, Section):
+            said: Any = value.digested()
+        else:
+            said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
         if name == "server":
             # Without its password, which somebody could guess and try against the digest.
             said |= {"database": masked(address_of(settings.server))}
-        if name == "notifications":
-            said |= {"hosts": {one: webhook.host for one, webhook in settings.notifications.webhooks.items()}}
         text = json.dumps(said, sort_keys=True, default=_plain)
         found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
     return found

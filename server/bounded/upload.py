@@ -10,9 +10,9 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace, TraceRecord
-from daq.traces.bag_files import kind_of
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.files import open_trace
+from daq.traces.kinds import kind_of
 from daq.traces.naming import trace_path
 from daq.traces.store import write_trace
 from daq.traces.summary import joint_figures

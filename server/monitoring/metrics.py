@@ -43,12 +43,6 @@ class Metrics:
         self._transferred = Counter(
             "daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=self.registry
         )
-        self._notifications = Counter(
-            "daq_notifications",
-            "Notifications sent, attempts that failed, and messages given up, by destination.",
-            ("destination", "result"),
-            registry=self.registry,
-        )
         refused = "Requests refused by the gate, by the kind of the problem: "
         refused += "`token-unknown` for a token that is not known or was revoked."
         self._refused = Counter("daq_refused_requests", refused, ("reason",), registry=self.registry)
@@ -84,10 +78,6 @@ class Metrics:
         """Counts a trace that was sent to the archive, or fetched from it, or the attempt."""
         self._transfers.labels(robot, direction, result).inc()
         self._transferred.labels(robot, direction).inc(size)
-
-    def count_notification(self, destination: str, result: str) -> None:
-        """Counts a notification that was sent or given up, or an attempt that failed."""
-        self._notifications.labels(destination, result).inc()
 
     def count_refusal(self, reason: str) -> None:
         """Counts a request or WebSocket that the gate has refused."""

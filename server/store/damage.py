@@ -37,7 +37,7 @@ def _require_whole(connection: Connection, place: str) -> None:
 
 
 def _require_schema(connection: Connection, place: str) -> None:
-    wrong = difference(schema_of(connection.exec_driver_sql), expected_schema("head"))
+    wrong = difference(schema_of(connection.exec_driver_sql), expected_schema())
     if wrong is not None:
         raise DamagedError(f"database {place}: {wrong}; {BRING_BACK}")
 

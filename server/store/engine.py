@@ -34,9 +34,6 @@ MAPPED = 256 << 20
 """Number of bytes of the file that are memory-mapped: a search through 100 000 traces takes a fifth less time."""
 
 
-__all__ = ["Store", "StoreError", "migrations"]
-
-
 class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
@@ -71,9 +68,9 @@ class Store:
         """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version."""
         try:
             with self.engine.connect() as connection:
-                config = migrations()
-                config.attributes["connection"] = connection
-                command.upgrade(config, "head")
+                for config in migrations().values():
+                    config.attributes["connection"] = connection
+                    command.upgrade(config, "head")
                 connection.commit()
         except OperationalError as error:
             line = f"database {self.place}: cannot be opened: {line_of(error)}"

@@ -11,28 +11,54 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import create_engine
 
+from daq.plugins import plugins
+
 Schema = Mapping[tuple[str, str], tuple[frozenset[str], str]]
 """The columns and the form of each object, by its kind (`table`, `index`, `trigger`, `view`) and name. The form is the
 text of a trigger, the table of an index, and whether a table is virtual."""
 Execute = Callable[[str], Iterable[Sequence[Any]]]
+VERSION = "alembic_version"
+"""The table with the revision of the core's tables."""
 ORDER = ("trigger", "view", "index", "table")
 """The order in which objects can be removed."""
 
 
-def migrations() -> Config:
-    """Returns Alembic's configuration for the migrations of this package."""
-    config = Config()
-    config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
-    return config
+def migrations() -> dict[str, Config]:
+    """Returns Alembic's configurations by the table in which each keeps its revision: those of this package first, then
+    those of plug-ins. Each goes its own way, so that a plug-in can be taken away."""
+    home = resources.files("server.store") / "migrations"
+    places = {VERSION: str(home / "versions")}
+    for plugin in plugins():
+        places |= {f"{name}_version": str(resources.files(package)) for name, package in plugin.migrations.items()}
+    found = {}
+    for table, place in places.items():
+        config = found[table] = Config()
+        config.set_main_option("script_location", str(home))
+        config.set_main_option("path_separator", "newline")
+        config.set_main_option("version_locations", place)
+        config.attributes["version_table"] = table
+    return found
+
+
+def revisions_of(execute: Execute) -> dict[str, str]:
+    """Returns the revisions that the SQLite database has on which `execute` carries out statements, by their tables."""
+    there = {row[0] for row in execute("SELECT name FROM sqlite_master")}
+    kept = [table for table in migrations() if table in there]
+    return {table: str(row[0]) for table in kept for row in execute(f"SELECT version_num FROM {table}")}
+
+
+def expected_schema(revisions: Mapping[str, str] | None = None) -> Schema:
+    """Returns the schema of a SQLite database with tables of these revisions; without any, of the newest of all."""
+    return _made(frozenset((dict.fromkeys(migrations(), "head") if revisions is None else revisions).items()))
 
 
 @cache
-def expected_schema(revision: str) -> Schema:
-    """Returns the schema of a SQLite database whose tables are of this revision."""
+def _made(revisions: frozenset[tuple[str, str]]) -> Schema:
     with create_engine("sqlite://").connect() as connection:
-        config = migrations()
-        config.attributes["connection"] = connection
-        command.upgrade(config, revision)
+        for table, config in migrations().items():
+            if (revision := dict(revisions).get(table)) is not None:
+                config.attributes["connection"] = connection
+                command.upgrade(config, revision)
         return schema_of(connection.exec_driver_sql)
 
 

@@ -323,23 +323,3 @@ class AuditRow(Table):
     count: Mapped[int]
     previous: Mapped[str] = mapped_column(String(64))
     digest: Mapped[str] = mapped_column(String(64))
-
-
-class OutboxRow(Table):
-    """A notification for one destination."""
-
-    __tablename__ = "outbox"
-    __table_args__ = (Index("outbox_by_destination", "destination", "state", "next_attempt"),)
-
-    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
-    id: Mapped[str] = mapped_column(String(40))
-    """The number of the message, which is the same for all its destinations."""
-    destination: Mapped[str] = mapped_column(String(48))
-    payload: Mapped[str] = mapped_column(Text)
-    created: Mapped[datetime]
-    attempts: Mapped[int] = mapped_column(default=0)
-    next_attempt: Mapped[datetime]
-    state: Mapped[str] = mapped_column(String(16))
-    """`waiting`, `sent` or `given-up`."""
-    problem: Mapped[str] = mapped_column(Text, default="")
-    ended: Mapped[datetime | None]

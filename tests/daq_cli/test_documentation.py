@@ -14,10 +14,12 @@ import typer.main
 import daq
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
-from daq_cli.app.lazy import SUBCOMMANDS
+from daq_cli.app.subcommands import subcommands
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "command-line.md").read_text("utf-8")
-EXAMPLES = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
+SHOWN = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
+EXAMPLES = [words for words in SHOWN if words[0] in subcommands()]
+"""Of what is installed: the page also shows what is optional."""
 
 
 def commands() -> dict[tuple[str, ...], Any]:
@@ -30,8 +32,8 @@ def commands() -> dict[tuple[str, ...], Any]:
             yield words, command
 
     found: dict[tuple[str, ...], Any] = {}
-    for name, (module, _) in SUBCOMMANDS.items():
-        found |= dict(below((name,), typer.main.get_command(importlib.import_module(module).app)))
+    for name, known in subcommands().items():
+        found |= dict(below((name,), typer.main.get_command(importlib.import_module(known.module).app)))
     return found
 
 

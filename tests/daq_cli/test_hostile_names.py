@@ -3,12 +3,10 @@
 import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from email import message_from_bytes, policy
 from pathlib import Path
 
 import pytest
 
-from daq.config.notifications import EmailSettings, SmtpSettings
 from daq.contracts.notebook_figure import drawable
 from daq.progress_bar import in_notebook
 from daq.traces.plot import html_page, picture
@@ -104,25 +102,6 @@ def test_in_the_bar_of_a_notebook(name: str) -> None:
     with in_notebook(name, shown.write) as told:
         told(0.5, name)
     assert "<script>" not in shown.getvalue()
-
-
-@NAMES
-def test_in_an_e_mail(name: str) -> None:
-    from datetime import UTC, datetime
-
-    from daq.contracts.service.notifications import Notification
-    from server.notifications.mail import Mail
-    from server.notifications.service import message_of
-
-    now = datetime(2026, 3, 1, 8, tzinfo=UTC)
-    told = Notification(kind="fault", topic="arm.fault", at=now, text=name, robot=name)
-    mail = Mail(EmailSettings(to="anna@lab.example"), SmtpSettings(host="localhost", port=25, sender="daq@lab.example"))
-    written = mail._written(message_of(told))
-    read = message_from_bytes(written.as_bytes(policy=policy.SMTP), policy=policy.default)
-    assert read["Bcc"] is None
-    assert str(read["Subject"]).endswith(": FAULT (arm.fault)")
-    assert read.get_content().splitlines()[: name.count("\n") + 1] == name.splitlines()
-    assert read.get_content_type() == "text/plain"
 
 
 @NAMES

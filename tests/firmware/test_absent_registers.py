@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from daq.commissioning.memory.map_text import memory_map_text
 from daq.contracts.errors import SafetyError
 from daq.driver import Controller
 from daq.link import RequestRefusedError
 from firmware_protocol.errors import MemoryMapError
-from firmware_protocol.memory_map import GAIN_REGISTERS, default_memory_map, parse_memory_map
+from firmware_protocol.memory_map import GAIN_REGISTERS, default_memory_map, memory_map_text, parse_memory_map
 from mock_controller.hidden.memory import draw_memory
 from tests.control_port import told_by
 from tests.daq.runner.rig import SHORT, rig

@@ -25,7 +25,7 @@ def python(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_every_public_name_is_there_and_has_a_docstring() -> None:
-    for name in _HOME:
+    for name in ma2000.__all__:
         found = getattr(ma2000, name)
         assert found.__doc__, name
         assert name in dir(ma2000)

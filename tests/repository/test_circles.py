@@ -6,9 +6,10 @@ from pathlib import Path
 
 import grimp
 
-PACKAGES = tomllib.loads(Path(__file__).parents[2].joinpath("pyproject.toml").read_text("utf-8"))["tool"][
-    "importlinter"
-]["root_packages"]
+NAMES = tomllib.loads(Path(__file__).parents[2].joinpath("pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+    "root_packages"
+]
+PACKAGES = [name for name in NAMES if Path(__file__).parents[2].joinpath(name).is_dir()]
 
 
 def circles(graph: grimp.ImportGraph) -> Iterator[set[str]]:

@@ -18,9 +18,7 @@ from daq.contracts.extras import CONTAINS, EXTRA_OF, Extra, MissingExtraError, m
 from daq.executors import open_workers
 from daq.transport import MockPort
 from daq.transport.mock_process import start_mock
-from daq_cli.app.lazy import SUBCOMMANDS
-from daq_cli.app.needed import called, extra_of
-from ma2000 import _HOME
+from daq_cli.app.subcommands import called, extra_of, subcommands
 from tests.repository.tracked import ROOT
 from tests.repository.without_extras import packages_beyond, run_without
 
@@ -101,7 +99,7 @@ def test_each_public_name_works_for_a_client_or_says_which_extra_it_needs(tmp_pa
         assert re.fullmatch(line, said)
     assert not {"Client", "read_trace", "read_traces", "write_trace", "load_machine"} & set(found["said"])
     only_when_called = {"plot", "batch", "write_urdf", "write_mjcf"}
-    assert set(found["offered"]) == {*_HOME, "__version__"} - set(found["said"]) - only_when_called
+    assert set(found["offered"]) == set(ma2000.__all__) - set(found["said"]) - only_when_called
 
 
 @pytest.mark.slow
@@ -113,9 +111,9 @@ def test_with_a_robot_only_what_needs_models_is_missing(tmp_path: Path) -> None:
 
 
 def test_each_command_says_to_a_client_which_extra_it_needs(tmp_path: Path) -> None:
-    words = [[], ["--help"], ["--version"], *([name] for name in SUBCOMMANDS)]
+    words = [[], ["--help"], ["--version"], *([name] for name in subcommands())]
     said = run_without(packages_beyond(), f"WORDS = {json.dumps(words)!r}\n{COMMANDS}", tmp_path)
-    for name in SUBCOMMANDS:
+    for name in subcommands():
         line = f"daq: daq {name} needs the package typer: pip install 'ma2000-daq[{extra_of(name)}]'\n"
         nothing = "NOTHING WAS STOPPED: no program here moves a robot\n" if name == "stop" else ""
         assert said[name] == [2, line, nothing]

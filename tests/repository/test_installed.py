@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 import ma2000
-from daq_cli.app.needed import MODEL, SERVER
+from daq_cli.app.subcommands import subcommands
 from tests.repository.fresh import Distributions, build, installed, pythons, run, unpacked
 from tests.repository.tracked import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
+MODEL = {name for name, command in subcommands().items() if command.needs == "model"}
+SERVER = {name for name, command in subcommands().items() if command.needs == "server"}
 PYTHONS = dict(pythons())
 WORDS = {
     "batch": "fit {folder} --out batch",

@@ -2,11 +2,12 @@
 
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import httpx
@@ -15,9 +16,9 @@ import uvicorn
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.config.archive import ArchiveSettings
-from daq.config.notifications import NotificationSettings
+from daq.config.section import Section
 from daq.config.service import ServiceSettings
-from daq.config.settings import RobotSettings, Settings, TraceSettings
+from daq.config.settings import RobotSettings, TraceSettings, settings_type
 from server.access.gate import Gate
 from server.access.tokens import KnownTokens
 from server.app import make_app
@@ -62,18 +63,18 @@ def service_inside(
     monkeypatch: pytest.MonkeyPatch,
     database: str | None = None,
     archive: ArchiveSettings | None = None,
-    notifications: NotificationSettings | None = None,
+    sections: Mapping[str, Section] = MappingProxyType({}),
     **robot: Any,
 ) -> Iterator[httpx.Client]:
     """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, in
-    `database`, and in `archive`. robot: more of its section of the configuration."""
+    `database`, and in `archive`. robot: more of its section of the configuration; sections: those of plug-ins."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder / "run"))
-    settings = Settings(
+    settings = settings_type()(
         robot=RobotSettings(**{"port": MOCK} | robot),
         traces=TraceSettings(folder=folder / "traces"),
         server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
         archive=archive or ArchiveSettings(),
-        notifications=notifications or NotificationSettings(),
+        **sections,
     )
     if database is None:
         place_database(folder / "service" / "service.sqlite")

@@ -14,7 +14,6 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.queue import ControlRequest, QueueResume
 from daq.contracts.service.robot import GripperRequest, ResetRequest
 from daq.contracts.service.teaching import JogRequest, StepRequest
-from daq_cli.commands.commission import by_command
 from daq_cli.robot.local import LocalRobot
 from server.access.caller import LOCAL
 from server.api import controller, robots, teaching
@@ -164,30 +163,28 @@ def _moving(seed: int) -> Scene:
 
 
 @contextmanager
-def _at_the_port(scene: Scene) -> Iterator[Any]:
+def at_the_port(scene: Scene) -> Iterator[Any]:
+    """The scene's controller, to commands."""
     yield scene.controller
 
 
-def _command_line(seed: int) -> Scene:
-    """Commands at the port itself, which others stop meanwhile: both resets, the step of `commission`, a run."""
+def command_line(seed: int) -> Scene:
+    """Commands at the port itself, which others stop meanwhile: both resets, a run."""
     scene = Scene(seed, stopped=True)
     scene.inbox.closing.set()  # no service owns this port
     people, local = People(scene), LocalRobot(cast(Any, None))
-    local._connected = lambda: _at_the_port(scene)  # type: ignore[method-assign]
-    consent = SimpleNamespace(require=lambda *_: scene.world.step())
-    bench: Any = SimpleNamespace(consent=consent, call=SimpleNamespace(port="wire"), scene=scene)
+    local._connected = lambda: at_the_port(scene)  # type: ignore[method-assign]
     people.does("reset", lambda: local.reset(adopt_posture=False))
     people.does("reset here", lambda: local.reset(adopt_posture=True))
-    people.does("commission", lambda: by_command.stop(bench))
     people.does("another computer", scene.stop_elsewhere)
     people.does("run", lambda: scene.controller.set_points({1: 1}), lambda: scene.controller.set_points({1: 2}))
     return scene
 
 
-SCENES = [_stale_reset, _queue, _here, _moving, _command_line]
+SCENES = [_stale_reset, _queue, _here, _moving, command_line]
 
 
-def _checked(begin: Callable[[int], Scene], seeds: int) -> tuple[int, int]:
+def checked(begin: Callable[[int], Scene], seeds: int) -> tuple[int, int]:
     """How many different interleavings there were, and how many set points in them. No fault in any."""
     found, motions = set(), 0
     for seed in range(seeds):
@@ -199,18 +196,11 @@ def _checked(begin: Callable[[int], Scene], seeds: int) -> tuple[int, int]:
     return len(found), motions
 
 
-@pytest.fixture(autouse=True)
-def port(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`daq commission` finds the scene's controller at its port."""
-    monkeypatch.setattr(by_command, "connected", lambda bench: _at_the_port(bench.scene))
-    monkeypatch.setattr(by_command, "replace", lambda consent, **_: consent)
-
-
 @pytest.mark.parametrize("begin", SCENES)
 @pytest.mark.parametrize("seeds", [SOON, pytest.param(ALL, marks=pytest.mark.slow)])
 def test_nothing_moves_after_a_confirmed_stop_unless_an_order_of_after_it_names_it(
     begin: Callable[[int], Scene], seeds: int
 ) -> None:
-    interleavings, motions = _checked(begin, seeds)
+    interleavings, motions = checked(begin, seeds)
     assert interleavings > 0.9 * seeds  # the scene has many of them
     assert motions > 0  # and in some the arm moves

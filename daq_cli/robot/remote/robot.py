@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from daq.contracts.errors import SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import BagChoice, ImportedTrace, ResetDone, RobotState
+from daq_cli.robot.answers import ImportChoice, ImportedTrace, ResetDone, RobotState
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class RemoteRobot:
 
         return fetched_trace(self.call, folder, wanted)
 
-    def import_trace(self, file: Path, folder: Path | None, choice: BagChoice) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: ImportChoice) -> ImportedTrace:
         """Uploads the file to the service, which has a folder of its own; of a bag, the trace that is made of it."""
         from daq_cli.robot.imports import to_upload
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from alembic import context
 from sqlalchemy import Connection, create_engine
 
+from server.store.schema import VERSION
 from server.store.tables import Table
 
 
 def _run(connection: Connection) -> None:
-    context.configure(connection=connection, target_metadata=Table.metadata, render_as_batch=True)
+    table = context.config.attributes.get("version_table", VERSION)
+    context.configure(connection=connection, target_metadata=Table.metadata, render_as_batch=True, version_table=table)
     with context.begin_transaction():
         context.run_migrations()
 

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from daq.link import dialects
 from daq.link.dialects import dialect_of
+from daq.plugins import Plugin
 from daq.transport import MockPort, SerialPort, parse_port_url
 from daq.transport.url import PortUrlError
 from firmware_protocol.dialect import FramedDialect
@@ -43,12 +45,9 @@ def test_a_mock_of_servos_is_given_its_options() -> None:
 
 def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     (folder / "mine_of_a_lab.py").write_text(text)
-    information = folder / "mine_of_a_lab-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: mine-of-a-lab\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text("[ma2000_daq.dialects]\nmine = mine_of_a_lab:Mine\n")
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.delitem(sys.modules, "mine_of_a_lab", raising=False)
+    monkeypatch.setattr(dialects, "plugins", lambda: (Plugin(dialects={"mine": "mine_of_a_lab:Mine"}),))
 
 
 def test_another_package_brings_its_own_dialect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,13 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from mcap.writer import Writer
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
-
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import load_settings
 from daq.contracts.documents import read_document
@@ -28,12 +21,9 @@ from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import TraceLimits
 from daq.teaching.program import load_program
-from daq.traces.bag_storage import JOINT_STATE
 from daq.traces.csv_table import import_csv
-from daq.traces.ros_bag import BagChoice, import_bag
 from model.machine_model.model import base_model
 from model.machine_model.model_file import load_model, save_model
-from model.robot_files.urdf_reader import read_urdf
 from tests.daq.traces.damaged_traces import AT_RANDOM
 
 CASES = 60_000
@@ -121,48 +111,6 @@ DAMAGES: dict[str, Damage] = {
 # ---- files
 
 
-def _bag(folder: Path, kind: str) -> Path:
-    """A bag of joint states of two joints that move, written by its own library."""
-    store: Any = get_typestore(Stores.ROS1_NOETIC if kind == "ROS 1" else Stores.ROS2_JAZZY)
-    types = store.types
-    messages = []
-    for number in range(ROWS):
-        moment = 1_700_000_000 * 10**9 + number * 10**7
-        stamp = types["builtin_interfaces/msg/Time"](sec=moment // 10**9, nanosec=moment % 10**9)
-        own = {"seq": number} if kind == "ROS 1" else {}
-        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **own)
-        values = {name: np.array([0.1 * number, -0.2 * number]) for name in ("position", "velocity", "effort")}
-        message = types[JOINT_STATE](header=header, name=["pan", "lift"], **values)
-        write = store.serialize_ros1 if kind == "ROS 1" else store.serialize_cdr
-        messages.append((moment, bytes(write(message, JOINT_STATE))))
-    if kind == "ROS 1":
-        with Writer1(folder / "a.bag") as old:
-            connection = old.add_connection("/joint_states", JOINT_STATE, typestore=store)
-            for moment, data in messages:
-                old.write(connection, moment, data)
-        return folder / "a.bag"
-    if kind == "MCAP":
-        with (folder / "a.mcap").open("wb") as stream:
-            writer = Writer(stream, chunk_size=2000, enable_data_crcs=True)
-            writer.start("ros2", "fuzz")
-            channel = writer.register_channel(
-                "/joint_states", "cdr", writer.register_schema(JOINT_STATE, "ros2msg", b"")
-            )
-            for moment, data in messages:
-                writer.add_message(channel, moment, data, moment)
-            writer.finish()  # type: ignore[no-untyped-call]
-        return folder / "a.mcap"
-    with Writer2(folder / "a", version=9, storage_plugin=StoragePlugin.SQLITE3) as new:
-        connection2 = new.add_connection("/joint_states", JOINT_STATE, typestore=store)
-        for moment, data in messages:
-            new.write(connection2, moment, data)
-    return folder / "a"
-
-
-def _read_bag(path: Path) -> Trace:
-    return import_bag(path, LIMITS, BagChoice(drive_unit="N·m"))
-
-
 def _texts(folder: Path) -> dict[str, tuple[bytes, Read]]:
     """Content and reader of each kind of text."""
     rows = b"".join(b"%.2f,0.5,%.6f,%.3f\n" % (0.01 * k, 0.01 * k, k - 30) for k in range(ROWS))
@@ -184,7 +132,6 @@ def _texts(folder: Path) -> dict[str, tuple[bytes, Read]]:
         "map.toml": ((HOME / "firmware_protocol/memory_map.toml").read_bytes(), load_memory_map),
         "spec.json": (ExperimentSpec().model_dump_json(indent=1).encode(), spec),
         "spec.toml": (b'joints = [1, 2]\n[trajectory]\nkind = "ramp"\n', spec),
-        "arm.urdf": ((HOME / "examples/reach_arm.urdf").read_bytes(), read_urdf),
         "model.json": (model.read_bytes(), load_model),
     }
 
@@ -197,16 +144,6 @@ def kinds(folder: Path) -> list[Kind]:
         own.mkdir()
         (own / name).write_bytes(data)
         found.append(Kind(name, own / name, own / name, read, data))
-    for name, kind, inside in (
-        ("bag of ROS 1", "ROS 1", ""),
-        ("bag of MCAP", "MCAP", ""),
-        ("bag of SQLite", "SQLite", "a.db3"),
-        ("metadata of a bag", "SQLite", "metadata.yaml"),
-    ):
-        (folder / name).mkdir()
-        bag = _bag(folder / name, kind)
-        changed = bag / inside if inside else bag
-        found.append(Kind(name, bag, changed, _read_bag, changed.read_bytes()))
     return found
 
 
@@ -216,8 +153,8 @@ def kinds(folder: Path) -> list[Kind]:
 class Campaign:
     """Damaged files, one after the other."""
 
-    def __init__(self, folder: Path) -> None:
-        self.kinds = kinds(folder)
+    def __init__(self, kinds: list[Kind]) -> None:
+        self.kinds = kinds
         self.tally = Tally()
         self._sound = {kind.name: kind.read(kind.opened) for kind in self.kinds}
 
@@ -266,7 +203,7 @@ def damaged(chosen: list[Kind], rng: random.Random) -> Iterator[tuple[Kind, str,
                 yield kind, way, damage(rng, kind.data)
 
 
-def campaign(cases: int, seed: int, folder: Path) -> Tally:
+def campaign(cases: int, seed: int, kinds: list[Kind]) -> Tally:
     """So many damaged files."""
-    running = Campaign(folder)
+    running = Campaign(kinds)
     return running.run(itertools.islice(damaged(running.kinds, random.Random(seed)), cases))

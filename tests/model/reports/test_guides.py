@@ -9,7 +9,7 @@ import typer.main
 
 from daq.contracts.effects import effect_names
 from daq.contracts.machine import load_machine, parse_machine
-from daq_cli.app.lazy import SUBCOMMANDS
+from daq_cli.app.subcommands import subcommands
 from docs.extensions.machine_file import PARTS
 
 ROOT = Path(__file__).parents[3]
@@ -29,7 +29,7 @@ def test_every_option_of_a_shown_command_exists(page: Path) -> None:
     commands = shown_commands(page)
     assert commands
     for name, *words in commands:
-        command = typer.main.get_command(import_module(SUBCOMMANDS[name][0]).app)
+        command = typer.main.get_command(import_module(subcommands()[name].module).app)
         if (inner := getattr(command, "commands", None)) is not None:
             command = inner[words[0]]
         known = {option for parameter in command.params for option in parameter.opts}

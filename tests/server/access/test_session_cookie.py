@@ -14,9 +14,9 @@ from server.access.session_cookie import session_cookie, session_of, sign_in_coo
 from server.access.sign_in import GOOD_FOR, SignIns
 from server.api.login import _set_cookie
 from server.problems import ProblemError
+from tests.server.authority import Authority
 from tests.server.clocks import HandClock
 from tests.server.dashboard.browser import WITHOUT_3D, chromium, playwright
-from tests.server.notifications.receivers import Authority
 
 
 @pytest.mark.parametrize(

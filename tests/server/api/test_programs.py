@@ -10,7 +10,6 @@ from sqlalchemy import text
 
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Wait, load_program
-from server.backup.database import copy_database
 from server.database_errors import DamagedError
 from server.problems import ProblemError
 from server.store.engine import Store
@@ -60,15 +59,6 @@ def test_a_program_is_there_after_a_restart(programs: ProgramStore, address: str
     again = Store(address)
     assert ProgramStore(again).get(ROBOT, "pick").program == _program()
     again.close()
-
-
-def test_a_backup_holds_the_programs(programs: ProgramStore, clock: HandClock, tmp_path: Path) -> None:
-    _put(programs, clock, _program())
-    copy_database(tmp_path / "service.sqlite", tmp_path / "copy.sqlite")
-    restored = Store(f"sqlite:///{tmp_path / 'copy.sqlite'}")
-    restored.migrate()
-    assert ProgramStore(restored).get(ROBOT, "pick").program == _program()
-    restored.close()
 
 
 def test_a_change_names_the_revision_that_it_changes(programs: ProgramStore, clock: HandClock) -> None:

@@ -1,0 +1,114 @@
+"""What a plug-in adds to the core, and where plug-ins are found.
+
+A plug-in is an object `Plugin`, named by an entry point of the group `ma2000_daq.plugins`:
+
+    [project.entry-points."ma2000_daq.plugins"]
+    gripper = "gripper_plugin:PLUGIN"
+
+It is a description: names, one-line helps, and references like "module:object", which are imported when they are used.
+So the module that describes it imports nothing but this one, and `daq --help` stays fast. The core has the same
+description of its own commands. docs/plugins.md shows a whole plug-in.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Literal
+
+from daq.contracts.extras import Extra
+
+GROUP = "ma2000_daq.plugins"
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A subcommand of `daq`."""
+
+    name: str
+    line: str
+    """One line of help."""
+    module: str
+    """The module with the command: a Typer named `app`."""
+    about: Literal["robot", "computer", "service"] = "robot"
+    """What it is about: a robot, here or at a server; this computer alone, so that `--server` is refused; everything
+    that one service has, so that `--robot` is refused, too."""
+    needs: Extra = "robot"
+    """The extra whose packages it needs here."""
+
+
+@dataclass(frozen=True)
+class Name:
+    """A name of the Python package `ma2000`."""
+
+    name: str
+    module: str
+    needs: Extra | None = None
+    """The extra whose packages it needs; none beside those that a client has."""
+
+
+@dataclass(frozen=True)
+class Importer:
+    """Makes traces of recordings of others, for `daq traces import`."""
+
+    what: str
+    """What it makes a trace of: "the joint states in a bag"."""
+    claims: str
+    """"module:function" of a path and its first 16 bytes: whether the file is one for it."""
+    read: str
+    """"module:function" of a path, `TraceLimits` and `daq.traces.kinds.Choice`: returns a `Trace`."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """What a plug-in adds."""
+
+    commands: tuple[Command, ...] = ()
+    names: tuple[Name, ...] = ()
+    importers: tuple[Importer, ...] = ()
+    dialects: Mapping[str, str] = field(default_factory=dict)
+    """Line protocols by the name that a port's URL has: "module:function" of the joints' numbers on the bus, which
+    makes a `firmware_protocol.dialect.LinkDialect`."""
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Sections of daq.toml by name: classes `daq.config.section.Section`, as "module:Class"."""
+    migrations: Mapping[str, str] = field(default_factory=dict)
+    """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
+    database, each named so that it begins with this name."""
+    parts: tuple[str, ...] = ()
+    """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
+    routes: tuple[str, ...] = ()
+    """Routers of FastAPI below /api/v1, as "module:router"."""
+
+
+@cache
+def plugins() -> tuple[Plugin, ...]:
+    """Returns the plug-ins that are installed, by their names. One that cannot be loaded is left out with a warning: a
+    robot must be stopped all the same."""
+    found = (_loaded(entry) for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
+    return tuple(plugin for plugin in found if plugin is not None)
+
+
+def named(reference: str) -> Any:
+    """Returns the object "module:object"."""
+    module, _, name = reference.partition(":")
+    return getattr(import_module(module), name)
+
+
+def _loaded(entry: EntryPoint) -> Plugin | None:
+    try:
+        plugin = entry.load()
+    except ModuleNotFoundError as error:
+        if error.name is not None and f"{entry.module}.".startswith(f"{error.name}."):
+            return None  # its own package was taken away, as `extras/` may be
+        plugin = error
+    except Exception as error:  # noqa: BLE001 - somebody else's module may raise anything
+        plugin = error
+    if isinstance(plugin, Plugin):
+        return plugin
+    log.warning("plug-in %s (%s) is left out: %s", entry.name, entry.value, plugin)
+    return None

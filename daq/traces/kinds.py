@@ -1,0 +1,69 @@
+"""Which file is what, by its content: a trace, a table, or a recording that a plug-in reads."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from mcap.writer import MCAP0_MAGIC
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.plugins import Importer, named, plugins
+from daq.traces import disk, layout
+from daq.traces.description import DriveUnit
+from daq.traces.ends import first_metadata
+
+Kind = Literal["trace", "csv"] | Importer
+"""What reads a file: the reader of traces, `import_csv`, or an importer."""
+FIRST = 16
+"""Number of bytes at a file's beginning by which importers know theirs."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is taken from a recording of many things; it goes before the TOML beside it.
+
+    topic:      of the joint states; needed where several topics have some
+    joints:     names of the joints to take, in the order of the trace's joints; samples without them are left out
+    times:      `received` takes the times at which samples were received, in place of their own
+    drive_unit: of the drive; `none` leaves the drive out
+    numbering:  names of a machine's joints 1, 2 …, for a recording that names no machine
+    """
+
+    topic: str | None = None
+    joints: tuple[str, ...] | None = None
+    times: Literal["stamped", "received"] | None = None
+    drive_unit: DriveUnit | Literal["none"] | None = None
+    numbering: tuple[str, ...] = ()
+
+
+def kind_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Kind:
+    """What a file is by its first bytes; by its name where these say nothing, as those of a damaged or absent file."""
+    first = first_bytes(path)
+    if first.startswith(MCAP0_MAGIC) and is_trace(path, limits):
+        return "trace"
+    for plugin in plugins():
+        for importer in plugin.importers:
+            if named(importer.claims)(path, first):
+                return importer
+    like_a_trace = first.startswith(MCAP0_MAGIC) or path.suffix.lower() == layout.SUFFIX
+    return "trace" if like_a_trace or path.name.endswith(layout.PART_SUFFIX) else "csv"
+
+
+def first_bytes(path: Path) -> bytes:
+    """The first bytes of a file; none of one that cannot be read."""
+    with suppress(OSError), disk.open_regular(path) as stream:
+        return stream.read(FIRST)
+    return b""
+
+
+def is_trace(file: Path, limits: TraceLimits) -> bool:
+    """Whether a file begins as a trace of this project. Raises OSError."""
+    try:
+        with disk.open_regular(file) as stream:
+            return first_metadata(stream, limits, str(file))[0] == layout.START_METADATA
+    except TraceError:
+        return False

@@ -1,0 +1,158 @@
+"""The subcommands, the core's and those of plug-ins: read before typer is imported, which may be what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from daq.contracts.extras import Extra
+from daq.plugins import Command, plugins
+
+CORE = {
+    command.name: command
+    for command in (
+        Command("run", "Run an experiment and record its trace.", "daq_cli.commands.run"),
+        Command("stop", "Stop every moving robot, at once.", "daq_cli.commands.stop"),
+        Command("reset", "End the freeze of a stop; nothing moves.", "daq_cli.commands.reset"),
+        Command("status", "Show posture, state and link of the robot.", "daq_cli.commands.status"),
+        Command("ports", "List serial ports that may lead to a robot.", "daq_cli.commands.ports", about="computer"),
+        Command("gains", "Show or set the controller's PID gains.", "daq_cli.commands.gains"),
+        Command("io", "Show and switch process signals, and the gripper.", "daq_cli.commands.process_io"),
+        Command("teach", "Jog the arm, lead it, make steps, and play back.", "daq_cli.commands.teach.motion"),
+        Command(
+            "robot",
+            "Check what a controller promises; nothing moves.",
+            "daq_cli.commands.robot_check",
+            about="computer",
+        ),
+        Command("calibrate", "Measure what the machine really does.", "daq_cli.commands.calibrate"),
+        Command(
+            "serve",
+            "Serve experiments and traces to people and programs.",
+            "daq_cli.commands.serve",
+            about="service",
+            needs="server",
+        ),
+        Command("queue", "Show, pause and resume the queue of a server's robot.", "daq_cli.commands.queue"),
+        Command(
+            "token",
+            "Make, list and revoke tokens of the service.",
+            "daq_cli.commands.token",
+            about="service",
+            needs="server",
+        ),
+        Command(
+            "audit",
+            "Show who asked the service for what; check the log of it.",
+            "daq_cli.commands.audit",
+            about="service",
+            needs="server",
+        ),
+        Command("traces", "List, show, plot, convert and verify traces.", "daq_cli.commands.traces"),
+        Command("config", "Show and check the configuration.", "daq_cli.commands.config", about="computer"),
+        Command(
+            "mock", "Start a mock controller that others can connect to.", "daq_cli.commands.mock", about="computer"
+        ),
+        Command(
+            "check",
+            "Check records before anything is computed from them.",
+            "daq_cli.commands.check",
+            about="computer",
+            needs="model",
+        ),
+        Command("fit", "Fit a model's parameters to traces.", "daq_cli.commands.fit", needs="model"),
+        Command(
+            "profile",
+            "Show what traces bound: profile likelihoods of parameters.",
+            "daq_cli.commands.profile",
+            about="computer",
+            needs="model",
+        ),
+        Command("validate", "Validate a model against traces (Σλ²).", "daq_cli.commands.validate", needs="model"),
+        Command(
+            "sensitivity",
+            "Show which parameter moves which joint, and when.",
+            "daq_cli.commands.sensitivity",
+            about="computer",
+            needs="model",
+        ),
+        Command(
+            "simulate",
+            "Simulate recorded traces with a model.",
+            "daq_cli.commands.simulate",
+            about="computer",
+            needs="model",
+        ),
+        Command("compare", "Compare models on the same traces.", "daq_cli.commands.compare", needs="model"),
+        Command(
+            "diagnose",
+            "Name the effect that a model lacks, add it, show the gap shrink.",
+            "daq_cli.commands.diagnose",
+            needs="model",
+        ),
+        Command(
+            "batch",
+            "Fit, validate, simulate or diagnose many traces, on many cores.",
+            "daq_cli.commands.batch",
+            needs="model",
+        ),
+        Command(
+            "design",
+            "Propose experiments that determine parameters best.",
+            "daq_cli.commands.design",
+            about="computer",
+            needs="model",
+        ),
+        Command(
+            "thesis",
+            "Reproduce the 1991 source beside its published results.",
+            "daq_cli.commands.thesis",
+            about="computer",
+            needs="model",
+        ),
+        Command(
+            "blind",
+            "Hide effects in the mock, diagnose blindly, and score.",
+            "daq_cli.commands.blind",
+            about="computer",
+            needs="model",
+        ),
+        Command("docs", "Open the documents in the browser.", "daq_cli.commands.docs", about="computer"),
+        Command(
+            "demo", "Run the ramp step on the mock, from command to plot.", "daq_cli.commands.demo", about="computer"
+        ),
+    )
+}
+"""The core's, by name, in the order of the help."""
+WITH_A_VALUE = frozenset(["--config", "--port", "--robot", "--server"])
+"""Options before the subcommand that are followed by their value."""
+
+
+def subcommands() -> dict[str, Command]:
+    """All of them, by name: the core's first, which no plug-in replaces."""
+    return {**CORE, **{name: command for name, command in _added().items() if name not in CORE}}
+
+
+def subcommand(name: str) -> Command | None:
+    """The one of a name. Plug-ins are looked for only where the core has none."""
+    return CORE.get(name) or _added().get(name)
+
+
+def _added() -> dict[str, Command]:
+    return {command.name: command for plugin in plugins() for command in plugin.commands}
+
+
+def called(arguments: Sequence[str]) -> str:
+    """The subcommand that is called; empty where there is none."""
+    left = iter(arguments)
+    for word in left:
+        if word in WITH_A_VALUE:
+            next(left, None)
+        elif not word.startswith("-"):
+            return word
+    return ""
+
+
+def extra_of(name: str) -> Extra:
+    """The extra that a subcommand needs here. With `--server`, `robot` suffices for those of models."""
+    found = subcommand(name)
+    return "robot" if found is None else found.needs

@@ -1,0 +1,126 @@
+"""What the steps of a commissioning share: the folder, the port, the person, and how registers are read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError
+from daq_cli.app.consent import ConsentPrompt
+from daq_cli.app.context import Invocation
+from extras.commissioning.command.record import Record
+from extras.commissioning.memory.procedure import Operator
+
+if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
+    from daq.driver import Controller
+    from firmware_protocol.memory_map import MemoryMap
+
+CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings.json", "machine.toml"
+
+
+class NotCommissionedError(DaqError):
+    """A step whose result does not permit the next one."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+class Commissioner(Operator, Protocol):
+    """The person at the arm, who also reads a protractor."""
+
+    def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
+        """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
+
+    def read_angle(
+        self, joint: int, number: int, wait: Callable[[float], None]
+    ) -> float | Literal["taken back"] | None:
+        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more, and
+        "taken back" where the posture before was read wrongly.
+        `wait` lets time (s) pass."""
+
+
+@dataclass
+class Bench:
+    """What the steps share: the folder of the arm, the port, the person, and what has been found."""
+
+    call: Invocation
+    folder: Path
+    operator: Commissioner
+    consent: ConsentPrompt
+    record: Record
+    joints: tuple[int, ...] = (1, 2, 3)
+    postures: int = 6
+
+    @property
+    def configured(self) -> Invocation:
+        """An invocation that uses the files which the steps have written."""
+        return Invocation(config_file=self.folder / CONFIG, port_option=self.call.port)
+
+    def adapter(self) -> str | None:
+        """Serial number of the USB adapter at the port; None where it has none, or the port is no serial one."""
+        from daq.transport.discovery import ports
+
+        device = self.call.port.partition("?")[0]
+        return next((one.serial_number for one in ports() if one.url == device), None)
+
+    def memory_map(self) -> MemoryMap:
+        """The memory map that was found, or the configured one."""
+        from daq.config.robot_files import load_memory_map
+
+        path = self.folder / MAP
+        return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
+
+    def machine_text(self) -> str:
+        """The machine file as it stands: this arm's, or the configured one before anything was measured."""
+        from extras.commissioning.command.machine_text import machine_file_text
+
+        own = self.folder / MACHINE
+        return machine_file_text(str(own) if own.exists() else self.call.settings.robot.machine)
+
+    def machine(self) -> Machine:
+        """The same, loaded."""
+        from daq.contracts.machine import parse_machine
+
+        return parse_machine(self.machine_text(), MACHINE)
+
+    def write_machine(self, text: str) -> None:
+        """Writes this arm's machine file, and daq.toml that names it."""
+        from daq_cli.app.output_file import replacing
+
+        with replacing(self.folder / MACHINE) as part:
+            part.write_text(text, "utf-8")
+        self.configure()
+
+    def basis(self) -> dict[str, str]:
+        """What a result rests on: the port, and the memory map and machine file that there are."""
+        files = {"memory_map": self.folder / MAP, "machine": self.folder / MACHINE}
+        return {"port": self.call.port} | {
+            name: sha256(path.read_bytes()).hexdigest()[:16] if path.exists() else "none"
+            for name, path in files.items()
+        }
+
+    def configure(self) -> None:
+        """Writes daq.toml with the files that there are."""
+        from daq.config.toml_text import settings_text
+        from daq_cli.app.output_file import replacing
+
+        settings = self.call.settings
+        changes: dict[str, Any] = {"port": self.call.port}
+        if (self.folder / MAP).exists():
+            changes["memory_map"] = (self.folder / MAP).absolute()
+        if (self.folder / MACHINE).exists():
+            changes["machine"] = str((self.folder / MACHINE).absolute())
+        robot = settings.robot.model_copy(update=changes)
+        traces = settings.traces.model_copy(update={"folder": (self.folder / "traces").absolute()})
+        with replacing(self.folder / CONFIG) as part:
+            part.write_text(settings_text(settings.model_copy(update={"robot": robot, "traces": traces})), "utf-8")
+
+
+def connected(bench: Bench) -> Controller:
+    from daq.driver import Controller
+
+    return Controller.connect(bench.call.port, bench.memory_map())

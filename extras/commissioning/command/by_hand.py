@@ -1,0 +1,196 @@
+"""Steps in which a person moves the arm by hand while the emergency stop is pressed: sensors, and the stop itself."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from daq.contracts.errors import SafetyError, SpecError
+from extras.commissioning.command.bench import MACHINE, MAP, Bench, NotCommissionedError
+from extras.commissioning.end_stops import EndStops, end_stops_of
+from extras.commissioning.memory.procedure import Task
+from extras.commissioning.person.safe_release import give_power_back, release_after_interruption, typical
+from firmware_protocol.units import counts_to_posture
+
+if TYPE_CHECKING:
+    from extras.commissioning.person.memory_page import LinkPage
+    from extras.commissioning.person.pressed import EmergencyStop
+    from extras.commissioning.potentiometer import Potentiometer
+    from firmware_protocol.memory_map import MemoryMap
+
+AVERAGED = 12
+"""Number of readings of which the median is taken at each posture of a protractor."""
+LEAST_MOVED = 40
+"""ADC counts by which a joint is at least moved from one posture to the next, some 3° of a major axis."""
+ATTEMPTS = 3
+"""How often the postures of one joint are asked for."""
+PUSHED, STAYS = 25, 5
+"""ADC counts by which a joint is to be pushed off its set point, and by which it may still move then."""
+
+
+def potentiometers(bench: Bench) -> dict[str, Any]:
+    """Direction, zero, range and bend of the sensors, by a protractor."""
+    from extras.commissioning.command.machine_text import with_sensors
+    from extras.commissioning.person.memory_page import open_page
+
+    memory_map = bench.memory_map()
+    sensors: list[Potentiometer] = []
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
+        for joint in bench.joints:
+            sensors.append(_sensor(bench, page, memory_map, joint))
+            bench.operator.show(sensor_line(sensors[-1]))
+        give_power_back(page, bench.operator, memory_map)
+        stop.tell(False)
+    bench.write_machine(with_sensors(bench.machine_text(), sensors))  # not before: what there was stays if it fails
+    return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
+
+
+def _sensor(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> Potentiometer:
+    """The sensor of one joint. Postures that say too little are asked for again, `ATTEMPTS` times in all. Raises
+    SpecError."""
+    from extras.commissioning.potentiometer import calibrate_potentiometer
+
+    for attempt in range(1, ATTEMPTS + 1):
+        try:
+            return calibrate_potentiometer(joint, *_postures(bench, page, memory_map, joint))
+        except SpecError as error:
+            if attempt == ATTEMPTS:
+                raise
+            bench.operator.show(f"{error}. Once more from posture 1.")
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _postures(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> tuple[list[float], list[float]]:
+    """Readings (ADC counts) and angles (rad) of a joint at postures to which a person has moved it."""
+    from extras.commissioning.potentiometer import FEWEST
+
+    counts: list[float] = []
+    angles: list[float] = []
+    while len(counts) < bench.postures:
+        angle = bench.operator.read_angle(joint, len(counts) + 1, page.wait)
+        if angle == "taken back":
+            del counts[-1:], angles[-1:]
+            continue
+        if angle is None:
+            if len(counts) >= FEWEST:
+                break
+            bench.operator.show(f"joint {joint}: {len(counts)} postures, at least {FEWEST} are needed")
+            continue
+        reading = typical(page, memory_map, "position", AVERAGED)[joint]
+        if counts and abs(reading - counts[-1]) < LEAST_MOVED:
+            bench.operator.show(
+                f"joint {joint} has moved by {abs(reading - counts[-1]):.0f} counts since posture {len(counts)}, at "
+                f"least {LEAST_MOVED} are needed: not counted; move it further"
+            )
+            continue
+        counts.append(reading)
+        angles.append(math.radians(angle))
+    return counts, angles
+
+
+def sensor_line(found: Potentiometer) -> str:
+    """One sensor for people."""
+    degrees = math.degrees
+    return (
+        f"joint {found.joint}: reading {'rises' if found.direction > 0 else 'falls'} with the angle, range "
+        f"{degrees(found.range.value):.2f}° ± {degrees(found.range.half_width):.2f}°, "
+        f"zero {degrees(found.at_zero.value):.2f}° ± {degrees(found.at_zero.half_width):.2f}°, "
+        f"bend {100 * found.bend.value:.2f} % ± {100 * found.bend.half_width:.2f} %"
+    )
+
+
+def _sensor_data(found: Potentiometer) -> dict[str, Any]:
+    degrees = math.degrees
+    return {
+        "direction": found.direction,
+        "range_deg": [round(degrees(found.range.value), 3), round(degrees(found.range.half_width), 3)],
+        "at_zero_deg": [round(degrees(found.at_zero.value), 3), round(degrees(found.at_zero.half_width), 3)],
+        "bend_percent": [round(100 * found.bend.value, 3), round(100 * found.bend.half_width, 3)],
+        "counts": [round(value, 1) for value in found.counts],
+        "angles_deg": [round(degrees(value), 3) for value in found.angles],
+        "residuals_deg": [round(degrees(value), 3) for value in found.residuals],
+    }
+
+
+def end_stops(bench: Bench) -> dict[str, Any]:
+    """Where each joint meets its end stops, led there by hand; the limits in the machine file keep clear of them."""
+    from extras.commissioning.command.machine_text import with_limits
+    from extras.commissioning.person.memory_page import open_page
+
+    memory_map, machine = bench.memory_map(), bench.machine()
+    found: dict[int, EndStops] = {}
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop must be pressed while the arm is moved by hand")
+        for joint in bench.joints:
+            ends = [_reading_at(bench, page, memory_map, Task(kind, joint)) for kind in ("end_stop", "other_end_stop")]
+            found[joint] = end_stops_of(machine.calibration(joint), *ends)
+            bench.operator.show(str(found[joint]))
+            _reading_at(bench, page, memory_map, Task("bring_back", joint))
+        give_power_back(page, bench.operator, memory_map)
+        stop.tell(False)
+    bench.write_machine(with_limits(bench.machine_text(), {joint: one.limits for joint, one in found.items()}))
+    return {"machine": MACHINE, **{f"joint_{joint}": one.as_data() for joint, one in found.items()}}
+
+
+def _reading_at(bench: Bench, page: LinkPage, memory_map: MemoryMap, task: Task) -> float:
+    """The reading (ADC counts) of the joint that a person has moved, once they say that it is there."""
+    joint = task.joint or 1
+    if not bench.operator.begin(task):
+        raise SafetyError(f"joint {joint} was not led to its end stops")
+    while not bench.operator.finished():
+        bench.operator.watch({joint: counts_to_posture(round(typical(page, memory_map, "position", 1)[joint]))})
+    return typical(page, memory_map, "position", AVERAGED)[joint]
+
+
+def emergency_stop(bench: Bench) -> dict[str, Any]:
+    """Whether the emergency stop takes the drives' power: a joint then stays off its set point, whatever its power."""
+    from extras.commissioning.person.memory_page import open_page
+
+    memory_map, joint = bench.memory_map(), bench.joints[0]
+    with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
+        stop.tell(True)
+        if not bench.operator.begin(Task("press_emergency_stop")):
+            raise SafetyError("the emergency stop was not pressed, so nothing is known about it")
+        if not bench.operator.begin(Task("push", joint=joint)):
+            raise SafetyError("no joint was pushed, so nothing is known about the emergency stop")
+        while not bench.operator.finished():
+            page.read()
+        page.wait(0.5)
+        before, error = (typical(page, memory_map, name, 5)[joint] for name in ("position", "error"))
+        page.wait(1.0)
+        after, power = (typical(page, memory_map, name, 5)[joint] for name in ("position", "power"))
+        if abs(error) < PUSHED or abs(after - before) > STAYS or abs(power) < PUSHED / 2:
+            raise NotCommissionedError(
+                f"{_why_not_stopped(joint, error, after - before)} (error {error:.0f} counts, power {power:.0f}, moved "
+                f"{after - before:.0f} counts; an arm without power stays {PUSHED} counts or more off its set point)"
+            )
+        give_power_back(page, bench.operator, memory_map)
+        stop.tell(False)
+    return {"joint": joint, "error_counts": round(error), "power": round(power), "moved_counts": round(after - before)}
+
+
+def _why_not_stopped(joint: int, error: float, moved: float) -> str:
+    """What to look at where a pushed joint was not seen to stay."""
+    if abs(moved) > STAYS:
+        return f"joint {joint} did not stay where it was put: was the emergency stop pressed, and did you let go of it?"
+    if abs(error) < PUSHED:
+        return f"joint {joint} is at its set point: was the emergency stop pressed, and did you push it by 3°?"
+    return f"joint {joint}: its power did not rise with its error: is the memory map right?"
+
+
+def release_if_pressed(bench: Bench) -> None:
+    """The safe release of an emergency stop that was pressed when the last call ended."""
+    if bench.record.stop_pressed:
+        found = (bench.folder / MAP).exists()
+        release_after_interruption(bench.call.port, bench.operator, bench.memory_map(), found, bench.record.note_stop)
+
+
+def _emergency_stop(bench: Bench) -> EmergencyStop:
+    from extras.commissioning.person.pressed import EmergencyStop
+
+    return EmergencyStop(bench.operator, bench.record.note_stop)

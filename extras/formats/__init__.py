@@ -1,0 +1,1 @@
+"""Robots, records and lines in the formats of others."""

@@ -1,0 +1,19 @@
+"""Robots in the formats of others: URDF to machine files, models to URDF and MJCF."""
+
+from daq.plugins import Command, Name, Plugin
+
+PLUGIN = Plugin(
+    commands=(
+        Command(
+            "machine",
+            "Turn URDF into machine files, and models into URDF and MJCF.",
+            "extras.formats.robot_files.machine_command",
+            about="computer",
+        ),
+    ),
+    names=(
+        Name("machine_from_urdf", "extras.formats.robot_files.machine_of_arm", "robot"),
+        Name("write_mjcf", "extras.formats.robot_files.in_python", "model"),
+        Name("write_urdf", "extras.formats.robot_files.in_python", "model"),
+    ),
+)

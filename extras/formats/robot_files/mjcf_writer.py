@@ -1,0 +1,134 @@
+"""A model as MJCF, MuJoCo's own format. MuJoCo's writer is not used: it keeps six digits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from extras.formats.robot_files.bodies_of_model import OutgoingLink, left_out, outgoing_arm
+from extras.formats.robot_files.numbers import text_of
+from model import layout as at
+from model.arrays import Floats
+from model.machine_model.model import Model
+
+HELD = frozenset((at.VISCOUS, at.COULOMB, at.SPRING, at.SPRING_REST, at.FLUX_LOSS))
+"""Numbers of effects that MJCF has a place for, beside those of the bodies."""
+LEAST_MOMENT = 1e-10
+"""Least principal moment of a body, as a share of its largest: MuJoCo refuses the 0 of a thin rod about itself."""
+SMALLEST_MOMENT = 1e-14
+"""Least principal moment of a body, kg·m²: MuJoCo takes smaller ones for 0."""
+LEAST_MASS = 1e-9
+"""Least mass (kg) of a body: MuJoCo refuses a massless one that moves."""
+
+
+def mjcf_text(model: Model) -> tuple[str, list[str]]:
+    """The model's MJCF, and what of the model it leaves out.
+
+    Every drive is an actuator whose control is the recorded drive, back-EMF included. MuJoCo's friction loss is a
+    constraint, softer than Coulomb friction here. Raises SpecError for a link that no real body can be.
+    """
+    arm = outgoing_arm(model)
+    lost = left_out(model, HELD)
+    root = Xml.Element("mujoco", model=arm.name)
+    root.append(
+        Xml.Comment(
+            f" Made from model {model.identity}. Not in it: {'; '.join(lost) or 'nothing'}. ".replace("--", "- -")
+        )
+    )
+    Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
+    Xml.SubElement(root, "option", gravity=text_of(0.0, 0.0, -arm.gravity), timestep="0.001", integrator="implicitfast")
+    roll, pitch = arm.tilt
+    turn = _product(_about("y", pitch), _about("x", roll))
+    parent = Xml.SubElement(Xml.SubElement(root, "worldbody"), "body", name="base", quat=text_of(*turn))
+    for link, end in zip(arm.links, [*(following.place for following in arm.links[1:]), arm.tool], strict=True):
+        parent = _body(parent, link, end)
+    Xml.SubElement(parent, "site", name="tool", pos=text_of(*arm.tool[:3, 3]), quat=_turn(arm.tool_angles))
+    actuators = Xml.SubElement(root, "actuator")
+    for link in arm.links:
+        _actuator(actuators, link)
+    Xml.indent(root)
+    return Xml.tostring(root, "unicode") + "\n", lost
+
+
+def _body(parent: Xml.Element, link: OutgoingLink, end: Floats) -> Xml.Element:
+    body = Xml.SubElement(parent, "body", name=link.name, pos=text_of(*link.place[:3, 3]), quat=_turn(link.angles))
+    mass, inertia = _heavy_enough(link)
+    xx, yy, zz, xy, xz, yz = (inertia[pair] for pair in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    Xml.SubElement(
+        body, "inertial", pos=text_of(*link.centre), mass=text_of(mass), fullinertia=text_of(xx, yy, zz, xy, xz, yz)
+    )
+    joint = Xml.SubElement(body, "joint", name=link.joint, type="slide" if link.slides else "hinge", axis="0 0 1")
+    if link.low is not None or link.high is not None:
+        joint.set(
+            "range", text_of(*(1e9 * sign if end is None else end for sign, end in ((-1, link.low), (1, link.high))))
+        )
+    for name, value in (
+        ("armature", link.rotor),
+        ("damping", link.viscous),
+        ("frictionloss", link.coulomb),
+        ("stiffness", link.stiffness),
+        ("springref", link.slack if link.stiffness else 0.0),
+    ):
+        if value:
+            joint.set(name, text_of(value))
+    length = float(np.linalg.norm(end[:3, 3]))
+    if length > 1e-3:  # something to look at; it has no mass and touches nothing
+        Xml.SubElement(
+            body,
+            "geom",
+            type="capsule",
+            fromto=text_of(0.0, 0.0, 0.0, *end[:3, 3]),
+            size=text_of(0.06 * length),
+            mass="0",
+            contype="0",
+            conaffinity="0",
+        )
+    return body
+
+
+def _actuator(actuators: Xml.Element, link: OutgoingLink) -> None:
+    actuator = Xml.SubElement(actuators, "general", name=f"{link.joint}_drive", joint=link.joint)
+    actuator.set("gainprm", text_of(link.gain))
+    if link.back:
+        actuator.set("biastype", "affine")
+        actuator.set("biasprm", text_of(0.0, 0.0, -link.back))
+    if link.drive_limit is not None:
+        actuator.set("ctrlrange", text_of(-link.drive_limit, link.drive_limit))
+
+
+def _heavy_enough(link: OutgoingLink) -> tuple[float, Floats]:
+    """Mass and inertia that MuJoCo accepts: a thin rod's are made larger by 1e-10 of themselves. Raises SpecError."""
+    inertia = 0.5 * (link.inertia + link.inertia.T)
+    least, middle, most = np.linalg.eigvalsh(inertia)
+    floor = max(LEAST_MOMENT * float(most), SMALLEST_MOMENT)
+    missing = max(floor - least, floor - (least + middle - most), 0.0)
+    if missing > 11.0 * floor or link.mass < 0.0:
+        shown = ", ".join(f"{moment:.4g}" for moment in (least, middle, most))
+        raise SpecError(
+            f"link of joint {link.joint}: {link.mass:.4g} kg with the principal moments {shown} kg·m²: no real body "
+            "has them, and MuJoCo takes none but real ones; a URDF can be written (daq machine to-urdf)"
+        )
+    return max(link.mass, LEAST_MASS), inertia + missing * np.eye(3)
+
+
+def _turn(angles: tuple[float, float, float]) -> str:
+    """Quaternion of roll, pitch and yaw, as text."""
+    roll, pitch, yaw = angles
+    return text_of(*_product(_about("z", yaw), _product(_about("y", pitch), _about("x", roll))))
+
+
+def _about(axis: str, angle: float) -> tuple[float, ...]:
+    vector = [math.sin(0.5 * angle) if letter == axis else 0.0 for letter in "xyz"]
+    return (math.cos(0.5 * angle), *vector)
+
+
+def _product(one: Sequence[float], other: Sequence[float]) -> tuple[float, ...]:
+    """Product of two quaternions (w, x, y, z)."""
+    a, b = np.array(one[1:]), np.array(other[1:])
+    w = one[0] * other[0] - float(a @ b)
+    x, y, z = one[0] * b + other[0] * a + np.cross(a, b)
+    return (w, float(x), float(y), float(z))

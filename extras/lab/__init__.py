@@ -1,0 +1,1 @@
+"""What a laboratory adds to one arm at one computer."""

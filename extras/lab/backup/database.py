@@ -1,0 +1,181 @@
+"""The database in a backup: copied while a service writes to it, and checked before it is restored."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Container
+from contextlib import closing, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+from sqlalchemy.exc import DatabaseError
+
+from daq.contracts.service.audit import AuditNote
+from extras.lab.backup.places import BackupError
+from server.audit.chain import Head
+from server.audit.log import AuditLog
+from server.database_errors import line_of, one_line, open_to_read
+from server.store.address import file_address
+from server.store.engine import BUSY_TIMEOUT_MS, Store
+from server.store.schema import (
+    VERSION,
+    difference,
+    expected_schema,
+    foreign,
+    migrations,
+    remove,
+    revisions_of,
+    schema_of,
+)
+
+
+def copy_database(source: Path, target: Path) -> None:
+    """Copies the database as it is at one moment, whatever is written meanwhile (SQLite's online backup).
+    Raises BackupError."""
+    if not source.is_file():
+        raise BackupError(f"database {source}: does not exist: no service has run with this configuration yet")
+    try:
+        with (
+            closing(sqlite3.connect(source, timeout=BUSY_TIMEOUT_MS / 1e3)) as here,
+            closing(sqlite3.connect(target)) as there,
+        ):
+            here.backup(there)
+            there.execute("PRAGMA journal_mode=DELETE")  # one file, without a write-ahead log beside it
+    except sqlite3.Error as error:
+        raise BackupError(f"database {source}: cannot be copied: {error}") from error
+
+
+def revision_of(database: Path) -> str | None:
+    """Returns the revision of a database's tables; None if it has none. Raises BackupError when it is damaged."""
+    try:
+        with closing(open_to_read(database)) as connection:
+            found = connection.execute("PRAGMA integrity_check").fetchone()[0]
+            if found != "ok":
+                raise BackupError(f"database {database.name}: is damaged: {str(found).splitlines()[0]}")
+            known = connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'alembic_version'").fetchone()
+            row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if known[0] else None
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+    return None if row is None else str(row[0])
+
+
+def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
+    """Removes what the migrations to this revision do not make, such as triggers, which would act with the service's
+    rights. Returns its names. Raises BackupError if something that they make is missing, or of another form."""
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            found = schema_of(connection.execute)
+            own = {} if revision is None else expected_schema(revisions_of(connection.execute))
+            wrong = difference(found, own) or ("its tables have no version" if found and not own else None)
+            if wrong is not None:
+                raise BackupError(f"database {database.name}: {wrong}: the backup is damaged")
+            strange = foreign(found, own)
+            for kind, name in strange:
+                remove(connection.execute, kind, name)
+    except CommandError as error:
+        raise BackupError(f"database {database.name}: {one_line(error)}: the backup is damaged") from error
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+    return tuple(f"{kind} {name}" for kind, name in strange)
+
+
+def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
+    """Pauses the queue of `robot` in this database, for the service that will use it. A queue that is paused already
+    keeps its reason. Raises BackupError."""
+    since = now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")  # as SQLAlchemy writes it
+    line = "INSERT INTO queues (robot, paused, reason, since) VALUES (?, 1, ?, ?) ON CONFLICT (robot) DO UPDATE"
+    changes = "SET paused = 1, reason = excluded.reason, since = excluded.since WHERE NOT paused"
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            connection.execute(f"{line} {changes}", (robot, reason, since))
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: its queue cannot be paused: {error}") from error
+
+
+_NOT_APPROVED = "approved_content = NULL, approved_by = NULL, approved_as_owner = NULL, approved = NULL"
+_FORGOTTEN = (
+    "DELETE FROM sessions",
+    f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
+    f"UPDATE schedules SET {_NOT_APPROVED}",
+)
+_GIVEN_UP = "state = 'given-up', ended = :now, problem = 'a backup was restored'"
+_NOT_SENT = f"UPDATE notifications SET {_GIVEN_UP} WHERE state = 'waiting'"
+"""What a restore ends."""
+
+
+def forget_what_may_have_ended(database: Path, now: datetime) -> None:
+    """Ends what may have been ended after the backup was made: sessions, approvals of what has not begun, and
+    notifications that wait. Raises BackupError."""
+    words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            for line in (*_FORGOTTEN, *((_NOT_SENT,) if _has_table(connection, "notifications") else ())):
+                connection.execute(line, words)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: its sessions cannot be ended: {error}") from error
+
+
+def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
+    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, as `source`
+    says. Raises BackupError."""
+    try:
+        with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
+            if not _has_table(connection, "archived_traces"):
+                return
+            connection.execute("ATTACH ? AS live", (str(source),))
+            local = connection.execute("SELECT id, file FROM traces WHERE NOT missing").fetchall()
+            gone = [(trace,) for trace, file in local if file not in packed]
+            of_archive = "FROM live.archived_traces WHERE trace = ? AND NOT deleting"
+            with connection:
+                connection.executemany(f"INSERT OR REPLACE INTO main.archived_traces SELECT * {of_archive}", gone)
+                is_gone = f"id IN (SELECT trace {of_archive})"
+                connection.executemany(f"UPDATE main.traces SET missing = 1 WHERE {is_gone}", gone)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {source}: what the archive has cannot be copied: {error}") from error
+
+
+def robots_of_traces(database: Path) -> dict[str, str]:
+    """Returns the robot of each trace. Raises BackupError."""
+    try:
+        with closing(open_to_read(database)) as connection:
+            found = connection.execute("SELECT id, robot FROM traces") if _has_table(connection, "traces") else ()
+            return dict(found)
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+
+
+def head_of_audit(database: Path) -> str:
+    """Returns the last row of a database's audit log, `NUMBER:DIGEST`; `nothing` if it has none, or is damaged."""
+    with suppress(sqlite3.Error), closing(open_to_read(database)) as connection:
+        row = connection.execute("SELECT sequence, digest FROM audit ORDER BY sequence DESC LIMIT 1").fetchone()
+        if row is not None:
+            return str(Head(*row))
+    return "nothing"
+
+
+def add_to_audit(database: Path, note: AuditNote) -> None:
+    """Adds a row to a database's audit log; one without tables stays as it is. Raises BackupError."""
+    with closing(sqlite3.connect(database)) as connection:
+        if not _has_table(connection, "audit"):
+            return
+    store = Store(file_address(database))
+    try:
+        AuditLog(store).append([note])
+    except DatabaseError as error:
+        raise BackupError(f"database {database.name}: its audit log cannot be written: {line_of(error)}") from error
+    finally:
+        store.close()
+
+
+def _has_table(connection: sqlite3.Connection, name: str) -> bool:
+    found = connection.execute("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (name,))
+    return bool(found.fetchone()[0])
+
+
+def require_known(revision: str | None) -> None:
+    """Raises BackupError for tables that no migration of this program makes."""
+    known = {script.revision for script in ScriptDirectory.from_config(migrations()[VERSION]).walk_revisions()}
+    if revision is not None and revision not in known:
+        raise BackupError(f"the backup's tables are of another version ({revision}): install that version first")

@@ -1,0 +1,19 @@
+"""Notifications: people who are elsewhere are told by webhook or by e-mail."""
+
+from daq.plugins import Command, Plugin
+
+PLUGIN = Plugin(
+    commands=(
+        Command(
+            "notify",
+            "Try the notifications of the configuration.",
+            "extras.lab.notifications.command",
+            about="service",
+            needs="server",
+        ),
+    ),
+    settings={"notifications": "extras.lab.notifications.settings:NotificationSettings"},
+    migrations={"notifications": "extras.lab.notifications.versions"},
+    parts=("extras.lab.notifications.part:Notifications",),
+    routes=("extras.lab.notifications.routes:router",),
+)

@@ -1,0 +1,19 @@
+"""The state of notifications, to be read: only the configuration says who is told."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from daq.contracts.service.notifications import NotificationStatus
+from extras.lab.notifications.part import Notifications
+from server.api.dependencies import ServicesDep, Viewer
+from server.problems import PROBLEMS
+
+router = APIRouter(tags=["system"], responses=PROBLEMS)
+
+
+@router.get("/notifications")
+def get_notifications(services: ServicesDep, _: Viewer) -> NotificationStatus:
+    """Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
+    is told; no request can add or change an address."""
+    return services.part(Notifications).notifier.status()

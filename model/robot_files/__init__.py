@@ -1,1 +1,0 @@
-"""Robots in the formats of others: URDF to machine files, models to URDF and MJCF."""

@@ -1,0 +1,139 @@
+"""The smallest steps of a set point: what is written, in what order, and when the proof ends."""
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from extras.commissioning.memory.commands import prove_by_command
+from extras.commissioning.memory.joint import JointEvidence, SetPointBytes
+from extras.commissioning.memory.procedure import may_have_power
+from extras.commissioning.memory.recording import PageReading
+from extras.commissioning.memory.relations import Pair, Place
+from firmware_protocol.units import posture_to_counts
+
+BASE = 0xFC00
+
+
+@dataclass
+class Arm:
+    """A page with one joint: position at 0 and 1, error at 2 and 3, set point at 4 and 5 (low byte first)."""
+
+    posture: int
+    sign: int = 1
+    kept: bool = True
+    base: int = BASE
+    size: int = 8
+    period_s: float = 0.02
+    writes: list[tuple[int, int]] = field(default_factory=list)
+    time: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.start = posture_to_counts(self.posture)
+
+    def bytes(self) -> bytes:
+        target = posture_to_counts(self.posture)
+        position = self.start + self.sign * (target - self.start)
+        error = (target - position) & 0xFFFF
+        return bytes(byte for value in (position, error, self.posture) for byte in (value & 0xFF, value >> 8)) + bytes(
+            2
+        )
+
+    def read(self) -> PageReading:
+        self.time += 0.02
+        return PageReading(self.time, self.bytes())
+
+    def read_byte(self, address: int) -> int:
+        return self.bytes()[address - BASE]
+
+    def write_byte(self, address: int, value: int) -> None:
+        self.writes.append((address, value))
+        if self.kept:
+            assert address == BASE + 4
+            self.posture = self.posture & 0x300 | value
+
+    def reconnect(self) -> bool:
+        return False
+
+    def wait(self, seconds: float) -> None:
+        self.time += seconds
+
+
+def evidence(*, proved: bool = True) -> JointEvidence:
+    pair = Pair(Place(0, 1), Place(2, 3), 1.0, 0.0)
+    place = SetPointBytes((4,), (5,) if proved else (5, 7), (100, 300, 500))
+    return JointEvidence(1, pair, None, place)
+
+
+def test_the_value_that_is_there_is_written_first_then_one_unit_more_and_at_last_the_old_value() -> None:
+    arm = Arm(500)
+    proof = prove_by_command(arm, [evidence()], 1)
+    assert (proof.proved, proof.sign, proof.step) == (True, 1, 1)
+    assert arm.writes == [(BASE + 4, 0xF4), (BASE + 4, 0xF5), (BASE + 4, 0xF4)]
+
+
+def test_steps_go_down_where_the_high_byte_would_change() -> None:
+    arm = Arm(510)
+    assert prove_by_command(arm, [evidence()], 1).step == -1
+
+
+def test_a_drive_of_the_wrong_sign_ends_the_proof_and_the_old_value_is_written_again() -> None:
+    arm = Arm(500, sign=-1)
+    proof = prove_by_command(arm, [evidence()], 1)
+    assert "moves away from its set point" in proof.problem
+    assert arm.writes[-1] == (BASE + 4, 0xF4)
+
+
+def test_a_byte_that_does_not_keep_what_is_written_is_no_set_point() -> None:
+    arm = Arm(500, kept=False)
+    proof = prove_by_command(arm, [evidence()], 1)
+    assert not proof.proved
+    assert "stands there" in proof.problem
+    assert len(arm.writes) <= 3
+
+
+@pytest.mark.parametrize("changed", [0x2F4, 0x177])
+def test_the_old_low_byte_is_not_written_under_another_high_byte_nor_over_a_byte_of_another(changed: int) -> None:
+    @dataclass
+    class Changing(Arm):
+        def wait(self, seconds: float) -> None:
+            super().wait(seconds)
+            self.posture = changed
+
+    arm = Changing(500)
+    proof = prove_by_command(arm, [evidence()], 1)
+    assert "press the emergency stop" in proof.problem
+    assert not proof.proved
+    assert arm.writes == [(BASE + 4, 0xF4)]
+
+
+def test_a_large_error_after_a_write_ends_the_proof() -> None:
+    @dataclass
+    class Stuck(Arm):
+        def bytes(self) -> bytes:
+            self.sign = 0
+            self.start = posture_to_counts(500) - 30
+            return super().bytes()
+
+    proof = prove_by_command(Stuck(500), [evidence()], 1)
+    assert "the error of joint 1 is 30" in proof.problem
+
+
+def test_nothing_is_written_where_the_place_of_the_set_point_is_not_proved() -> None:
+    arm = Arm(500)
+    proof = prove_by_command(arm, [evidence(proved=False)], 1)
+    assert "not proved" in proof.problem
+    assert arm.writes == []
+
+
+def test_nothing_is_written_where_the_register_does_not_hold_error_plus_position() -> None:
+    arm = Arm(500)
+    wrong = JointEvidence(1, Pair(Place(0, 1), Place(4), 1.0, 0.0), None, evidence().set_point)
+    proof = prove_by_command(arm, [wrong], 1)
+    assert proof.problem
+    assert arm.writes == []
+
+
+def test_the_drives_get_no_power_while_an_error_is_large_or_unknown() -> None:
+    assert "known" in may_have_power({1: 0})
+    assert "joint 4: 300" in may_have_power(dict.fromkeys(range(1, 7), 0) | {4: 300})
+    assert may_have_power(dict.fromkeys(range(1, 7), 3)) == ""

@@ -1,0 +1,58 @@
+"""The computing delay is bounded by what came before what, whatever the computer and the line are slow in."""
+
+import math
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.contracts.errors import SpecError
+from extras.commissioning.computing_delay import FEWEST, ComputingDelay, Effect, computing_delay
+
+PERIOD = 0.02
+
+
+def effects(delay: float, seed: int, turn: float, count: int = 36, jitter: float = 0.0) -> list[Effect]:
+    """Set points at random moments to a controller with this delay, over a line whose round trip takes `turn` s."""
+    random, found = Random(seed), []
+    for number in range(count):
+        begun = 0.3 * number + random.uniform(0.0, PERIOD)
+        reply = begun + turn * random.uniform(0.3, 1.0)
+        taken = PERIOD * math.ceil(random.uniform(begun, reply) / PERIOD)
+        stored = taken + delay + random.uniform(-jitter, jitter)
+        last, first = begun, reply
+        while first < stored:
+            last, first = first, first + turn * random.uniform(0.3, 1.0)
+        found.append(Effect((begun, reply), (last - turn if last > begun else begun, first + turn)))
+    return found
+
+
+@given(st.floats(0.0005, 0.0195), st.integers(0, 10_000), st.floats(0.0002, 0.004))
+def test_the_bounds_hold_the_delay(delay: float, seed: int, turn: float) -> None:
+    try:
+        found = computing_delay(effects(delay, seed, turn), PERIOD)
+    except SpecError as error:
+        assert "too slow" in str(error)  # noqa: PT017
+        return
+    assert found.low <= delay <= found.high
+    assert found.low < found.value < found.high
+    assert found.deviation == pytest.approx((found.high - found.low) / math.sqrt(12))
+
+
+def test_a_fast_line_says_more_than_a_slow_one() -> None:
+    widths = []
+    for turn in (0.0005, 0.001):
+        found = computing_delay(effects(0.006, 1, turn), PERIOD)
+        widths.append(found.high - found.low)
+    assert widths[0] < widths[1] < 0.005
+    assert str(ComputingDelay(0.0058, 0.0064, 20)) == "computing delay: 5.80 to 6.40 ms, by 20 set points"
+
+
+def test_too_few_effects_and_those_that_contradict_one_another_are_one_line() -> None:
+    with pytest.raises(SpecError, match=f"at least {FEWEST}"):
+        computing_delay(effects(0.006, 1, 0.001, FEWEST - 1), PERIOD)
+    with pytest.raises(SpecError, match="contradict"):
+        computing_delay([*effects(0.003, 1, 0.0005), *effects(0.012, 2, 0.0005)], PERIOD)
+    with pytest.raises(SpecError, match="too slow"):
+        computing_delay(effects(0.006, 1, 0.03), PERIOD)

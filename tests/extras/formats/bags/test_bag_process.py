@@ -1,0 +1,78 @@
+"""A bag that needs more than its limits ends a process of its own, and is told in one line."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace_limits import TraceLimits
+from daq.traces.kinds import Choice
+from extras.formats.bags.bag_process import import_bag_apart
+from extras.formats.bags.bag_storage import JOINT_STATE
+from extras.formats.bags.ros_bag import import_bag
+from tests.extras.formats.bags.test_ros_bag import bag, state
+
+MIB = 1 << 20
+SMALL = TraceLimits(file_bytes=8 * MIB, total_bytes=8 * MIB, chunk_bytes=8 * MIB)
+BOMB = bytes(256 * MIB)
+
+
+def test_a_trace_from_another_process_is_the_same_to_the_bit(tmp_path: Path) -> None:
+    path = bag(tmp_path / "ä", [{"velocity": [0.1, 0.2]}] * 5, topics=("/left", "/right"))
+    choice = Choice("/right", ("lift",), "received", "A")
+    assert import_bag_apart(path, SMALL, choice) == import_bag(path, SMALL, choice)
+
+
+def test_a_bag_whose_file_is_compressed_as_a_whole_is_read(tmp_path: Path) -> None:
+    store: Any = get_typestore(Stores.ROS2_HUMBLE)
+    writer = Writer2(tmp_path / "a", version=9)
+    writer.set_compression(CompressionMode.FILE, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/joint_states", JOINT_STATE, typestore=store)
+        for number in range(3):
+            writer.write(connection, number, store.serialize_cdr(state(store, number), JOINT_STATE))
+    assert len(import_bag_apart(tmp_path / "a", SMALL, Choice(drive_unit="none"))) == 3
+
+
+def ros_1(path: Path) -> Path:
+    store: Any = get_typestore(Stores.ROS1_NOETIC)
+    writer = Writer1(path)
+    writer.set_compression(Writer1.CompressionFormat.LZ4)
+    with writer:
+        writer.write(writer.add_connection("/joint_states", JOINT_STATE, typestore=store), 0, BOMB)
+    return path
+
+
+def messages(path: Path) -> Path:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    writer = Writer2(path, version=9)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with writer:
+        writer.write(writer.add_connection("/joint_states", JOINT_STATE, typestore=store), 0, BOMB)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "complaint"),
+    [
+        (ros_1, "a.bag", r"needs more memory than it may use \(traces\.limits"),
+        (messages, "a", "a message has more than 1048576 bytes uncompressed"),
+    ],
+)
+def test_what_uncompresses_to_more_than_the_memory_is_refused(
+    tmp_path: Path, make: Any, name: str, complaint: str
+) -> None:
+    path = make(tmp_path / name)
+    with pytest.raises(TraceError, match=complaint) as told:
+        import_bag_apart(path, SMALL)
+    assert "\n" not in str(told.value)
+
+
+def test_an_error_comes_back_in_its_own_words(tmp_path: Path) -> None:
+    with pytest.raises(TraceError, match=r"absent\.bag: cannot be read: No such file"):
+        import_bag_apart(tmp_path / "absent.bag")

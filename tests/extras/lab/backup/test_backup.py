@@ -1,0 +1,538 @@
+"""Backup and restore: true while a service writes, and nothing touched unless all of it is as it was written."""
+
+import hashlib
+import json
+import shutil
+import sqlite3
+import threading
+import zipfile
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from alembic.script import ScriptDirectory
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import select
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
+from daq.contracts.service.experiments import ExperimentRequest
+from extras.lab.backup.database import head_of_audit, revision_of
+from extras.lab.backup.manifest import MANIFEST, verify
+from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
+from extras.lab.backup.restore import restore
+from extras.lab.backup.write import back_up
+from extras.lab.notifications.tables import OutboxRow
+from server.access.sessions import Person, SessionStore
+from server.experiments.review import Given, Review
+from server.store.archived import Archived, ArchivedStore
+from server.store.engine import Store
+from server.store.experiments import ExperimentStore
+from server.store.lock import InUseError, sole_use
+from server.store.queues import QueueState, QueueStore
+from server.store.schema import VERSION, migrations
+from server.store.tables import TraceRow
+from server.store.traces import NewTrace, TraceStore
+from tests.daq_cli.invoke import CommandLine
+from tests.server.service import Service
+
+NOW = datetime(2026, 1, 1, 12, tzinfo=UTC)
+SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
+
+
+def quietly(_fraction: float, _text: str) -> None:
+    """Nobody watches."""
+
+
+def places_in(folder: Path, robot: str = "ma2000") -> Places:
+    database = folder / "service" / "service.sqlite"
+    return Places(database, {robot: folder / "traces"}, folder / "service")
+
+
+def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") -> None:
+    """As a recorded one: the file first, then its row."""
+    folder = places.traces[robot]
+    folder.mkdir(parents=True, exist_ok=True)
+    part = folder / f"{number}.mcap.part"
+    part.write_bytes(f"trace {number} ".encode() * 1000)
+    part.replace(folder / f"{number}.mcap")
+    new = NewTrace(
+        id=number,
+        robot=robot,
+        file=f"{number}.mcap",
+        created=NOW,
+        source="mock",
+        kind="ramp",
+        name=None,
+        joints=(1,),
+        outcome="complete",
+        samples=1,
+        duration=0.0,
+        size=1,
+        operator=None,
+        experiment=None,
+        notes="",
+    )
+    TraceStore(store).insert(new)
+
+
+def filled(folder: Path) -> Places:
+    """A service's folders with an experiment that waits, traces, a model and a job's result."""
+    places = places_in(folder)
+    store = Store(places.url)
+    store.migrate()
+    ExperimentStore(store).submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+    for number in ("aaa", "bbb"):
+        add_trace(store, places, number)
+    store.close()
+    (places.traces["ma2000"] / "ccc.mcap.part").write_bytes(b"is being recorded")
+    (places.service / "models").mkdir()
+    (places.service / "models" / "0123456789ab.json").write_text("{}")
+    job = places.service / "jobs" / "0123456789ab"
+    job.mkdir(parents=True)
+    (job / "result.json").write_text('{"found": 1}')
+    for name in ("rows.jsonl", "batch.json", "table.csv", "table.parquet", "answers/request.json"):
+        (job / "batch" / name).parent.mkdir(exist_ok=True, parents=True)
+        (job / "batch" / name).write_text('{"of": "a batch"}')
+    task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}, "models": {}}
+    task["continues"] = str(places.service / "jobs" / "ba9876543210")
+    (job / "request.json").write_text(json.dumps(task))
+    (job / "cancel").touch()
+    return places
+
+
+def everything(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not path.name.endswith((".lock", "-shm", "-wal"))
+    }
+
+
+def traces_in(places: Places) -> list[str]:
+    store = Store(places.url)
+    with store.reading() as session:
+        found = list(session.scalars(select(TraceRow.file).order_by(TraceRow.file)))
+    store.close()
+    return found
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.zip"
+    back_up(filled(tmp_path / "here"), path, NOW, quietly)
+    return path
+
+
+def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path) -> None:
+    places = places_in(tmp_path / "there")
+    restored = restore(archive, places, NOW, quietly)
+    assert restored.put_aside == ()
+    assert traces_in(places) == ["aaa.mcap", "bbb.mcap"]
+    before, after = everything(tmp_path / "here"), everything(tmp_path / "there")
+    assert set(before) - set(after) == {"traces/ccc.mcap.part", "service/jobs/0123456789ab/cancel"}
+    changed = {"service/service.sqlite", "service/jobs/0123456789ab/request.json"}
+    assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
+    task = json.loads(after["service/jobs/0123456789ab/request.json"])
+    assert task["traces"] == {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}
+    assert task["continues"] == str(places.service / "jobs" / "ba9876543210")
+    store = Store(places.url)
+    store.migrate()
+    assert ExperimentStore(store).count_waiting("ma2000") == 1
+    store.close()
+
+
+@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "by anna", NOW)])
+def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
+    here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
+    store = Store(here.url)
+    if before is not None:
+        QueueStore(store).set("ma2000", before)
+    store.close()
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
+    restore(tmp_path / "arm.zip", there, later, quietly)
+    store = Store(there.url)
+    line = "restored from a backup: look at the arm, then resume the queue"
+    expected = before if before is not None and before.paused else QueueState(True, line, later)
+    assert QueueStore(store).get("ma2000") == expected
+    store.close()
+
+
+def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
+    here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
+    store = Store(here.url)
+    SessionStore(store).begin(Person("https://id", "1", "anna", "owner"), NOW, timedelta(days=9))
+    experiments, review = ExperimentStore(store), Review.of("ma2000", load_machine("ma2000"), "operator")
+    made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+    content = review.content(experiments.get("ma2000", made.id).content)
+    experiments.approve("ma2000", made.id, review, Given(content, "bert", False), NOW)
+    with store.writing() as session:
+        row = {"id": "1", "destination": "x", "payload": "{}", "created": NOW, "next_attempt": NOW, "attempts": 0}
+        session.add(OutboxRow(**row, state="waiting"))
+    store.close()
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
+    restore(tmp_path / "arm.zip", there, NOW + timedelta(days=1), quietly)
+    store = Store(there.url)
+    assert SessionStore(store).callers(NOW) == {}
+    assert ExperimentStore(store).get("ma2000", made.id).approval is None
+    with store.reading() as session:
+        assert list(session.scalars(select(OutboxRow.state))) == ["given-up"]
+    store.close()
+
+
+def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
+    assert archive.stat().st_mode & 0o077 == 0
+    with pytest.raises(BackupError, match="exists already"):
+        back_up(places_in(tmp_path / "here"), archive, NOW, quietly)
+    assert verify(archive).count("traces") == 2
+
+
+def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path: Path) -> None:
+    places = filled(tmp_path / "here")
+    ended = threading.Event()
+
+    def record() -> None:
+        store = Store(places.url)
+        number = 0
+        while not ended.is_set():
+            add_trace(store, places, f"n{number:04}")
+            number += 1
+        store.close()
+
+    writer = threading.Thread(target=record)
+    writer.start()
+    try:
+        for number in range(5):
+            back_up(places, tmp_path / f"{number}.zip", NOW, quietly)
+    finally:
+        ended.set()
+        writer.join()
+    for number in range(5):
+        there = places_in(tmp_path / f"there{number}")
+        restore(tmp_path / f"{number}.zip", there, NOW, quietly)
+        named = traces_in(there)
+        assert len(named) >= 2
+        assert all((there.traces["ma2000"] / name).is_file() for name in named)
+
+
+def test_a_trace_that_is_archived_and_dropped_meanwhile_is_noted_as_archived(tmp_path: Path) -> None:
+    here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
+    store = Store(here.url)
+    made = Archived("bbb", "ma2000", "bbb-0", 9, "0" * 64, NOW, NOW)
+    told: list[str] = []
+
+    def meanwhile(_fraction: float, name: str) -> None:
+        if not told:
+            ArchivedStore(store).add(made)
+            TraceStore(store).mark_missing("ma2000", ["bbb.mcap"], missing=True)
+            (here.traces["ma2000"] / "bbb.mcap").unlink()
+        told.append(name)
+
+    manifest = back_up(here, tmp_path / "arm.zip", NOW, meanwhile)
+    store.close()
+    assert manifest.left_out == ("traces/bbb.mcap",)
+    restore(tmp_path / "arm.zip", there, NOW, quietly)
+    store = Store(there.url)
+    entries = [TraceStore(store).get("ma2000", number) for number in ("aaa", "bbb")]
+    assert ArchivedStore(store).get("bbb") == made
+    assert [(one.local, one.archived) for one in entries] == [(True, False), (False, True)]
+    store.close()
+
+
+def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archive: Path, tmp_path: Path) -> None:
+    places = filled(tmp_path / "there")
+    (places.traces["ma2000"] / "aaa.mcap").write_bytes(b"another trace of this number")
+    before = everything(tmp_path / "there")
+    with pytest.raises(BackupError, match=r"exist already .*: with --overwrite they are moved aside"):
+        restore(archive, places, NOW, quietly)
+    assert everything(tmp_path / "there") == before
+    restored = restore(archive, places, NOW, quietly, overwrite=True)
+    after = everything(tmp_path / "there")
+    assert after["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
+    assert after["traces/before-restore-2026-01-01T12-00-00Z/aaa.mcap"] == b"another trace of this number"
+    assert set(restored.put_aside) == {
+        places.traces["ma2000"] / "before-restore-2026-01-01T12-00-00Z",
+        places.service / "before-restore-2026-01-01T12-00-00Z",
+    }
+    assert sorted(before.values()) == sorted(data for name, data in after.items() if "before-restore" in name)
+
+
+def _changed(archive: Path, change: str) -> None:
+    """Writes the backup again with something wrong in it, all checksums of the ZIP file right."""
+    with zipfile.ZipFile(archive) as pack:
+        files = {name: pack.read(name) for name in pack.namelist()}
+    manifest = json.loads(files[MANIFEST])
+    match change:
+        case "a file is missing":
+            del files["traces/bbb.mcap"]
+        case "a file has other bytes":
+            files["traces/bbb.mcap"] = files["traces/bbb.mcap"].replace(b"bbb", b"xxx")
+        case "a file too many":
+            files["traces/ddd.mcap"] = b"whence?"
+        case "another robot's":
+            manifest["robot"] = "other"
+        case "a newer format":
+            manifest["format"] = 2
+        case "newer tables":
+            manifest["revision"] = "9999"
+        case "a path out of it":
+            files["../../evil.mcap"] = files.pop("traces/bbb.mcap")
+            manifest["files"][2]["name"] = "../../evil.mcap"
+        case "no list":
+            del files[MANIFEST]
+        case "no database":
+            del files[DATABASE]
+            manifest["files"] = [entry for entry in manifest["files"] if entry["name"] != DATABASE]
+    if MANIFEST in files:
+        files[MANIFEST] = json.dumps(manifest).encode()
+    with zipfile.ZipFile(archive, "w") as pack:
+        for name, data in files.items():
+            pack.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "a file is missing",
+        "a file has other bytes",
+        "a file too many",
+        "another robot's",
+        "a newer format",
+        "newer tables",
+        "a path out of it",
+        "no list",
+        "no database",
+    ],
+)
+def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_touched(
+    archive: Path, tmp_path: Path, change: str
+) -> None:
+    places = filled(tmp_path / "there")
+    before = everything(tmp_path)
+    _changed(archive, change)
+    before["arm.zip"] = archive.read_bytes()
+    with pytest.raises(BackupError) as refused:
+        restore(archive, places, NOW, quietly, overwrite=True)
+    assert "\n" not in str(refused.value)
+    assert everything(tmp_path) == before
+
+
+def _repacked(archive: Path, *statements: str, **files: bytes) -> None:
+    """Writes a whole backup anew, with another database and other requests of jobs."""
+    with zipfile.ZipFile(archive) as pack:
+        there = {name: pack.read(name) for name in pack.namelist()}
+    database = archive.with_suffix(".sqlite")
+    database.write_bytes(there[DATABASE])
+    with closing(sqlite3.connect(database)) as connection, connection:
+        connection.executescript(";".join(statements))
+    there |= {DATABASE: database.read_bytes(), **files}
+    database.unlink()
+    manifest = json.loads(there[MANIFEST])
+    for entry in manifest["files"]:
+        data = there[entry["name"]]
+        entry |= {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    there[MANIFEST] = json.dumps(manifest).encode()
+    with zipfile.ZipFile(archive, "w") as pack:
+        for name, data in there.items():
+            pack.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    ("statements", "why"),
+    [
+        (["DROP TABLE audit"], "table audit is missing"),
+        (["ALTER TABLE audit DROP COLUMN count"], "table audit has no column count"),
+        (
+            [
+                "CREATE TABLE other AS SELECT * FROM audit",
+                "DROP TABLE audit",
+                "CREATE VIEW audit AS SELECT * FROM other",
+            ],
+            "table audit is missing",
+        ),
+        (["DROP TRIGGER audit_update"], "trigger audit_update is missing"),
+        (
+            ["DROP TRIGGER audit_update", "CREATE TRIGGER audit_update BEFORE UPDATE ON audit BEGIN SELECT 1; END"],
+            "trigger audit_update is not as this program makes it",
+        ),
+    ],
+)
+def test_a_backup_whose_tables_are_not_this_programs_is_refused_and_the_log_too(
+    archive: Path, tmp_path: Path, daq: CommandLine, statements: list[str], why: str
+) -> None:
+    _repacked(archive, *statements)
+    places = places_in(tmp_path / "there")
+    with pytest.raises(BackupError, match=why):
+        restore(archive, places, NOW, quietly)
+    assert everything(tmp_path / "there") == {}
+    with zipfile.ZipFile(archive) as pack:
+        places.database.parent.mkdir(parents=True, exist_ok=True)
+        places.database.write_bytes(pack.read(DATABASE))
+    (tmp_path / "arm.toml").write_text(f'[server]\nfolder = "{places.database.parent}"\n')
+    daq("--config", str(tmp_path / "arm.toml"), "audit", "verify").complains(2, why, "daq restore")
+
+
+def test_what_a_backups_database_has_beside_this_programs_tables_is_not_brought_back(
+    archive: Path, tmp_path: Path
+) -> None:
+    spy = "CREATE TRIGGER spy AFTER UPDATE ON queues BEGIN DELETE FROM experiments; END"
+    view, table = "CREATE VIEW seen AS SELECT * FROM tokens", 'CREATE TABLE "of ""others""" (x)'
+    _repacked(archive, spy, table, view, **{"jobs/0123456789ab/request.json": b"[]"})
+    there = places_in(tmp_path / "there")
+    done = restore(archive, there, NOW, quietly)
+    assert done.removed == ("trigger spy", "view seen", 'table of "others"')
+    store = Store(there.url)
+    store.require_sound()
+    assert ExperimentStore(store).count_waiting("ma2000") == 1, "the trigger did not act while the queue was paused"
+    store.close()
+    assert (there.service / "jobs" / "0123456789ab" / "request.json").read_text() == "[]", "no worker accepts it"
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), cut=st.booleans())
+def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
+    archive: Path, tmp_path: Path, place: float, bit: int, cut: bool
+) -> None:
+    data = bytearray(archive.read_bytes())
+    at = int(place * len(data))
+    if cut:
+        del data[at:]
+    else:
+        data[at] ^= 1 << bit
+    damaged = tmp_path / "damaged.zip"
+    damaged.write_bytes(data)
+    there = tmp_path / "there"
+    shutil.rmtree(there, ignore_errors=True)
+    try:
+        restore(damaged, places_in(there), NOW, quietly)
+    except BackupError:
+        assert everything(there) == {}
+    else:
+        assert traces_in(places_in(there)) == ["aaa.mcap", "bbb.mcap"]
+        assert everything(there)["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
+
+
+def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path) -> None:
+    places = filled(tmp_path / "there")
+    before = everything(tmp_path / "there")
+    with sole_use(places.url), pytest.raises(InUseError, match="a service uses it; end that one first"):
+        restore(archive, places, NOW, quietly, overwrite=True)
+    assert everything(tmp_path / "there") == before
+    with sole_use(places.url):
+        pass
+
+
+def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(archive: Path, tmp_path: Path) -> None:
+    with pytest.raises(BackupError, match="are free, a backup needs"):
+        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly, reserve=1 << 60)
+    with pytest.raises(BackupError, match="are needed"):
+        restore(archive, places_in(tmp_path / "there"), NOW, quietly, reserve=1 << 60)
+    assert not (tmp_path / "second.zip").exists()
+    assert everything(tmp_path / "there") == {}
+    assert {path.name for path in tmp_path.iterdir()} == {"here", "there", "arm.zip"}
+
+
+# ---- as a person does it
+
+
+@pytest.fixture
+def daq(
+    service: Service, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> CommandLine:
+    """The command, with the running service's configuration."""
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(service.folder)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
+    return CommandLine(capsys)
+
+
+def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
+    daq: CommandLine, service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = SPEC.model_dump(mode="json") | {"hold": 0.1}
+    done = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
+    trace = service.end_of(done)["trace"]
+    long = service.robot.post("/experiments", json={"spec": spec | {"hold": 600}}).json()["id"]
+    waits = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
+    service.until_recording(long)
+    said = daq("backup", str(tmp_path / "arm.zip"))
+    assert said.code == 0, said.err
+    daq("restore", str(tmp_path / "arm.zip"), "--overwrite").complains(3, "a service uses it; end that one first")
+    service.robot.post(f"/experiments/{waits}/cancel")
+    service.robot.post(f"/experiments/{long}/cancel")
+    service.end_of(long)
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert "is as it was written" in daq("restore", "../arm.zip", "--check").out
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+    said = daq("restore", "../arm.zip")
+    assert said.code == 0, said.err
+    assert f"{trace[:8]}" in daq("traces", "ls").out
+    daq("restore", "../arm.zip").complains(2, "exist already")
+    store = Store(f"sqlite:///{tmp_path / 'elsewhere' / 'service' / 'service.sqlite'}")
+    experiments = ExperimentStore(store)
+    assert experiments.get("ma2000", done).state == "done"
+    assert experiments.get("ma2000", waits).state == "queued"
+    assert [one.id for one in experiments.settle_after_restart("ma2000", NOW)] == [long]
+    store.close()
+
+
+def test_what_cannot_be_backed_up_or_restored_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
+    daq("restore", str(tmp_path / "none.zip")).complains(2, "none.zip", "cannot be read")
+    (tmp_path / "no.zip").write_text("no")
+    daq("restore", str(tmp_path / "no.zip"), "--check").complains(2, "is damaged, or not a backup")
+    daq("backup", str(tmp_path / "no" / "folder.zip")).complains(2, "cannot be written")
+
+
+def test_the_configured_places(tmp_path: Path) -> None:
+    from daq.config.service import ServiceSettings
+    from daq.config.settings import Settings
+
+    places = places_of(Settings(server=ServiceSettings(folder=tmp_path)))
+    assert places.target(DATABASE) == tmp_path / "service.sqlite"
+    assert places.target("jobs/0123456789ab/result.json") == tmp_path / "jobs" / "0123456789ab" / "result.json"
+    with pytest.raises(BackupError, match="is not a file"):
+        places_of(Settings(server=ServiceSettings(database="postgresql://x/y")))
+
+
+def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> None:
+    def places_of_two(folder: Path) -> Places:
+        database = folder / "service" / "service.sqlite"
+        traces = {name: folder / "traces" / name for name in ("left", "right")}
+        return Places(database, traces, folder / "service")
+
+    here, there = places_of_two(tmp_path / "here"), places_of_two(tmp_path / "there")
+    store = Store(here.url)
+    store.migrate()
+    for number, robot in (("aaa", "left"), ("bbb", "right"), ("ccc", "right")):
+        add_trace(store, here, number, robot)
+    store.close()
+    (here.traces["right"] / "ccc.mcap").unlink()  # only the archive has it
+    job = here.service / "jobs" / "0123456789ab"
+    job.mkdir(parents=True)
+    files = {number: str(here.traces["right"] / f"{number}.mcap") for number in ("bbb", "ccc")}
+    task = {"request": {"kind": "fit"}, "traces": files, "models": {}}
+    (job / "request.json").write_text(json.dumps(task))
+    back_up(here, tmp_path / "arms.zip", NOW, quietly)
+    with pytest.raises(BackupError, match="is of robot 'left, right'; this configuration is for 'ma2000'"):
+        restore(tmp_path / "arms.zip", places_in(tmp_path / "one"), NOW, quietly)
+    restore(tmp_path / "arms.zip", there, NOW, quietly)
+    assert [path.name for path in there.traces["left"].glob("*.mcap")] == ["aaa.mcap"]
+    assert [path.name for path in there.traces["right"].glob("*.mcap")] == ["bbb.mcap"]
+    found = json.loads((there.service / "jobs" / "0123456789ab" / "request.json").read_text())
+    assert found["traces"] == {number: str(there.traces["right"] / f"{number}.mcap") for number in ("bbb", "ccc")}
+    store = Store(there.url)
+    states = [QueueStore(store).get(robot) for robot in ("left", "right")]
+    store.close()
+    assert all(state is not None and state.paused for state in states)
+
+
+@pytest.mark.parametrize("name", ["why?", "a%41b", "50%", "a#b", "x?mode=memory&y", "ü :@"])
+def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: str) -> None:
+    places = places_in(tmp_path / name)
+    store = Store(places.url)
+    store.migrate()
+    store.close()
+    assert revision_of(places.database) == ScriptDirectory.from_config(migrations()[VERSION]).get_current_head()
+    assert head_of_audit(places.database) == "nothing"
