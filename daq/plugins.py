@@ -76,6 +76,9 @@ class Plugin:
     makes a `firmware_protocol.dialect.LinkDialect`."""
     settings: Mapping[str, str] = field(default_factory=dict)
     """Sections of daq.toml by name: classes `daq.config.section.Section`, as "module:Class"."""
+    checks: tuple[str, ...] = ()
+    """Functions of the `Settings`, as "module:function", that `daq config check` calls: each raises SpecError for what
+    cannot be used."""
     migrations: Mapping[str, str] = field(default_factory=dict)
     """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
     database, each named so that it begins with this name."""
