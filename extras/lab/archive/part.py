@@ -43,8 +43,9 @@ class Archives(Part, Collector):
 
     def robots_made(self, robots: Sequence[RobotServices]) -> None:
         """Puts an archive behind the folder of each robot."""
-        for rig in robots if self._bucket is not None else ():
-            rig.catalogue.archive = self._of[rig.robot.name] = self._made(rig, self._bucket)
+        if self._bucket is not None:
+            for rig in robots:
+                rig.catalogue.archive = self._of[rig.robot.name] = self._made(rig, self._bucket)
 
     def start(self) -> None:
         """Begins to send what waits."""
