@@ -17,7 +17,6 @@ from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
-    archive,
     audit,
     controller,
     description,
@@ -108,7 +107,6 @@ def bare_app(services: Services | None) -> FastAPI:
         presets,
         queue,
         traces,
-        archive,
         jobs,
         audit,
         live,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from daq.contracts.service.experiments import ExperimentState
 from daq.contracts.service.jobs import Job
@@ -20,10 +22,14 @@ class Attention:
 
 class Part:
     """A part of the service that a plug-in adds: `Plugin.parts` names the class. It is made with the `Services`, before
-    they start, and found again as `services.part(Class)`. It overrides what it needs of the following."""
+    they start, and found again as `services.part(Class)`. It overrides what it needs of the following. The name of its
+    log begins with `server.`, so that it is written as the others are."""
+
+    def robots_made(self, robots: Sequence[Any]) -> None:
+        """Is given the `RobotServices` of every robot, before anything starts."""
 
     def start(self) -> None:
-        """Begins; the database is up to date, and the robots are there."""
+        """Begins: the robots have started."""
 
     def close(self, seconds: float) -> None:
         """Ends within this time. Nothing else of the service runs any more but the log and the database."""

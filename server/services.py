@@ -34,8 +34,6 @@ from server.access.sessions import SessionStore
 from server.access.sign_in import SignIns
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
-from server.archive.bucket import Bucket, open_bucket
-from server.archive.service import ArchiveContext, ArchiveService
 from server.audit.configuration import begun
 from server.audit.log import AuditLog
 from server.audit.request import Audit
@@ -43,7 +41,7 @@ from server.audit.writer import AuditWriter
 from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
-from server.catalogue.room import of_robots, storage_warnings
+from server.catalogue.room import storage_warnings
 from server.clock import Clock, SystemClock
 from server.experiments.review import Given
 from server.jobs.models import Models
@@ -65,7 +63,6 @@ from server.robot.status import status_of
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService, Word
 from server.store.address import address_of
-from server.store.archived import ArchivedStore
 from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
@@ -108,7 +105,6 @@ class RobotServices:
     jobs: JobService
     models: Models
     unattended: bool
-    archive: ArchiveService | None
     audit: Audit
     owners: tuple[str, ...] = ()
     """Names of this robot's owners; empty: every owner."""
@@ -161,7 +157,6 @@ class Services:
         self.settings = settings
         self.clock = clock or SystemClock()
         parse_service_address(settings.server.executor)
-        bucket = open_bucket(settings.archive)
         self.closed = False
         """Whether `close` has done everything."""
         self.store = Store(address_of(settings.server))
@@ -200,7 +195,9 @@ class Services:
         self._robots: dict[str, RobotServices] = {}
         self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
-        self._robots = {own.robot.name: self._make_robot(own, bucket) for own in settings.each_robot()}
+        self._robots = {own.robot.name: self._make_robot(own) for own in settings.each_robot()}
+        for part in self.parts:
+            part.robots_made(self.robots())
         self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
@@ -219,8 +216,6 @@ class Services:
 
     def start(self) -> None:
         """Updates the catalogue, connects the robots and starts the queues."""
-        for part in self.parts:
-            part.start()
         for rig in self.robots():
             try:
                 found = rig.catalogue.bring_up_to_date()
@@ -233,9 +228,9 @@ class Services:
                 log.error("catalogue of %s: %s", rig.robot.name, error)  # noqa: TRY400 - the line says it all
             rig.queue.start()
             rig.jobs.start()
-            if rig.archive is not None:
-                rig.archive.start()
             rig.keeper.start(connect=self.settings.server.connect_at_start)
+        for part in self.parts:
+            part.start()
 
     def close(self) -> None:
         """Freezes arms, closes traces, ends threads and processes, within SHUTDOWN + TIDYING s. Anything left then ends
@@ -244,9 +239,8 @@ class Services:
         every = self.robots()
         for rig in every:
             rig.queue.begin_no_more()  # first, or the end of the connection would pause the queue
-        archives = [rig.archive.close for rig in every if rig.archive is not None]
         ends = [end for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)]
-        _all_within(SHUTDOWN, [partial(end, SHUTDOWN) for end in (*ends, *archives)])
+        _all_within(SHUTDOWN, [partial(end, SHUTDOWN) for end in ends])
         self.workers.abandon()
         _all_within(
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
@@ -263,7 +257,7 @@ class Services:
         self.uploads.close()
         self.motions.close()
 
-    def _make_robot(self, settings: Settings, bucket: Bucket | None) -> RobotServices:
+    def _make_robot(self, settings: Settings) -> RobotServices:
         robot = Robot(_place(settings), self.clock)
         name, folder = robot.place.name, robot.place.folder
         control = ControlService(
@@ -311,38 +305,14 @@ class Services:
             hub=hub,
             jobs=jobs,
             models=models,
-            archive=None if bucket is None else self._make_archive(bucket, catalogue, name, jobs),
             unattended=settings.server.unattended,
             audit=self.audit,
             owners=settings.robot.owners,
         )
 
-    def _make_archive(self, bucket: Bucket, catalogue: Catalogue, name: str, jobs: JobService) -> ArchiveService:
-        """Returns the archive of a robot, behind its folder of traces."""
-        archive = ArchiveService(
-            ArchiveContext(
-                robot=name,
-                settings=self.settings.archive,
-                bucket=bucket,
-                catalogue=catalogue,
-                archived=ArchivedStore(self.store),
-                clock=self.clock,
-                tell=lambda line: self.record_event(name, "archive", line),
-                fetched=jobs.look,
-                count=lambda *moved: self.metrics.count_transfer(name, *moved),
-            )
-        )
-        catalogue.archive = archive
-        return archive
-
     def warnings(self) -> list[str]:
         """Returns what will need somebody soon, one line each."""
-        warn_at, rigs = self.settings.traces.warn_at, self.robots()
-        found = self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
-        for rig in rigs:
-            lines = [] if rig.archive is None else rig.archive.warnings(warn_at)
-            found += [of_robots([rig.robot.name], line, among=len(rigs)) for line in lines]
-        return found
+        return self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
 
     def _tell(self, news: Callable[[Part], None]) -> None:
         for part in self.parts:
@@ -355,8 +325,6 @@ class Services:
             found["storage"] = Attention("storage.warning", "; ".join(lines))
         for rig in self.robots():
             name, queue = rig.robot.name, rig.queue.status()
-            if rig.archive is not None and (problem := rig.archive.status().problem):
-                found[f"archive {name}"] = Attention("archive.away", f"{name}: {problem}", name)
             if queue.waiting_for:
                 line = f"{name}: {queue.queued} experiments wait: {queue.waiting_for}"
                 found[f"held {name}"] = Attention("queue.held", line, name)

@@ -13,9 +13,6 @@ class Section(FrozenRecord):
     SHOWN: ClassVar[frozenset[str]] = frozenset()
     """Keys whose wrong values an error shows. Those of any other key may be secrets."""
 
-    def check(self) -> None:
-        """Raises SpecError for a file or a value that cannot be used, which `daq config check` tells."""
-
     def digested(self) -> dict[str, Any]:
         """Returns what the audit log computes a digest of: it changes with the section."""
         return self.model_dump(mode="json")

@@ -18,7 +18,6 @@ from pydantic_settings import (
     SettingsError,
 )
 
-from daq.config.archive import ArchiveSettings
 from daq.config.limits import merged_limits
 from daq.config.oidc import OidcSettings
 from daq.config.section import Section
@@ -126,7 +125,6 @@ class Settings(BaseSettings):
     """Several robots, by name, in place of `robot`. `of_robot` has the settings of one of them."""
     traces: TraceSettings = TraceSettings()
     server: ServiceSettings = ServiceSettings()
-    archive: ArchiveSettings = ArchiveSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
     """Who runs the experiments; recorded in every trace."""
 
@@ -298,9 +296,7 @@ def _is_secret(where: tuple[int | str, ...]) -> bool:
         return where[-1] not in OidcSettings.model_fields
     field = settings_type().model_fields.get(str(where[0])) if where else None
     kind = None if field is None else field.annotation
-    if isinstance(kind, type) and issubclass(kind, Section):
-        return where[-1] not in kind.SHOWN
-    return where[:1] == ("archive",) and where[-1] not in ArchiveSettings.model_fields.keys() - {"endpoint"}
+    return isinstance(kind, type) and issubclass(kind, Section) and where[-1] not in kind.SHOWN
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from daq.contracts.extras import require_extra
-from daq.executors.address import Address, parse_address
+from daq.executors.address import Address, executors, parse_address
 from daq.executors.local import LocalWorkers, cores
 from daq.executors.workers import Workers
-
-NEEDED = {"dask": "distributed", "dask+tls": "distributed", "slurm": "dask_jobqueue"}
-"""The module without which an executor cannot be opened."""
+from daq.plugins import named
 
 
 def open_workers(url: str, initializer: Callable[[], None] | None = None, patience: float | None = None) -> Workers:
@@ -28,17 +26,12 @@ def open_workers(url: str, initializer: Callable[[], None] | None = None, patien
     if address.kind == "local":
         return LocalWorkers(address.workers or cores(), initializer)
     require_installed(address)
-    if address.kind == "slurm":
-        from daq.executors.slurm import slurm_workers
-
-        return slurm_workers(address)
-    from daq.executors.dask import dask_workers
-
-    return dask_workers(address) if patience is None else dask_workers(address, patience)
+    workers: Workers = named(executors()[address.kind].opened)(address, patience)
+    return workers
 
 
 def require_installed(address: Address) -> None:
     """Raises MissingExtraError where the executor's package is missing."""
-    module = NEEDED.get(address.kind)
-    if module is not None:
-        require_extra("cluster", f"executor {address.url}", module)
+    if address.kind != "local":
+        extra, module = executors()[address.kind].needs
+        require_extra(extra, f"executor {address.url}", module)

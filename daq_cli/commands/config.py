@@ -103,6 +103,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     from daq.config.settings import load_settings
     from daq.executors.address import parse_service_address
     from daq.link.dialects import dialect_of
+    from daq.plugins import named, plugins
     from daq.safety import unchecked
     from daq.transport import parse_port_url
     from daq.transport.url import FRAMED
@@ -114,12 +115,9 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
 
         parse_address(settings.server.database)
     parse_service_address(settings.server.executor)
-    for section in settings.sections():
-        section.check()
-    if settings.archive.bucket is not None:
-        from server.archive.bucket import open_bucket
-
-        open_bucket(settings.archive)
+    for plugin in plugins():
+        for reference in plugin.checks:
+            named(reference)(settings)
     found: dict[str, dict[str, Any]] = {}
     titles: dict[str, str] = {}
     for own in settings.each_robot() if call.robot_option is None else (settings.of_robot(call.robot_option),):

@@ -36,7 +36,6 @@ class StateMetrics(Collector):
         yield from self._of_experiments()
         yield from self._of_jobs()
         yield from self._of_disks()
-        yield from self._of_archives()
         yield from self._of_records()
 
     def _of_robots(self) -> Iterable[Metric]:
@@ -107,19 +106,3 @@ class StateMetrics(Collector):
         written.add_metric((), writer.written)
         yield written
         yield GaugeMetricFamily("daq_audit_waiting", "Rows of the audit log not written yet.", value=writer.waiting)
-
-    def _of_archives(self) -> Iterable[Metric]:
-        reached = GaugeMetricFamily("daq_archive_reached", "1 while the archive answers.", labels=("robot",))
-        traces = GaugeMetricFamily("daq_archive_traces", "Traces of the archive.", labels=("robot",))
-        waiting = GaugeMetricFamily("daq_archive_waiting", "Traces that wait.", labels=("robot", "direction"))
-        local = GaugeMetricFamily("daq_local_traces_bytes", "Size of the traces of the folder.", labels=("robot",))
-        for rig in self._services.robots():
-            if rig.archive is None:
-                continue
-            name, status = rig.robot.name, rig.archive.status()
-            reached.add_metric((name,), status.state == "ok")
-            traces.add_metric((name,), status.archived)
-            waiting.add_metric((name, "send"), status.waiting)
-            waiting.add_metric((name, "fetch"), status.fetching)
-            local.add_metric((name,), status.local_bytes)
-        yield from (reached, traces, waiting, local)

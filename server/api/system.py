@@ -126,8 +126,6 @@ def _checks(services: Services) -> dict[str, str]:
     for rig in services.robots():
         name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
         checks[name] = _problem_of_folder(rig.catalogue.folder)
-        if rig.archive is not None:
-            checks[f"archive of {rig.robot.name}"] = "; ".join(rig.archive.warnings(services.settings.traces.warn_at))
         arm = rig.robot.arm
         checks[f"robot {rig.robot.name}"] = rig.robot.problem if arm is None else arm.unheard
     return checks

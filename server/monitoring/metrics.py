@@ -34,15 +34,6 @@ class Metrics:
             "daq_job_seconds", "Time for which a job was computed.", ("robot", "kind"), JOB_BUCKETS
         )
         self._stops = Counter("daq_stops", "Stops requested.", ("robot",), registry=self.registry)
-        self._transfers = Counter(
-            "daq_archive_transfers",
-            "Traces sent to the archive or fetched from it, and attempts that failed.",
-            ("robot", "direction", "result"),
-            registry=self.registry,
-        )
-        self._transferred = Counter(
-            "daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=self.registry
-        )
         refused = "Requests refused by the gate, by the kind of the problem: "
         refused += "`token-unknown` for a token that is not known or was revoked."
         self._refused = Counter("daq_refused_requests", refused, ("reason",), registry=self.registry)
@@ -73,11 +64,6 @@ class Metrics:
         if job.started is not None and job.ended is not None:
             seconds = max(0.0, (job.ended - job.started).total_seconds())
             self._job_times.labels(job.robot, job.request.kind).observe(seconds)
-
-    def count_transfer(self, robot: str, direction: str, result: str, size: int) -> None:
-        """Counts a trace that was sent to the archive, or fetched from it, or the attempt."""
-        self._transfers.labels(robot, direction, result).inc()
-        self._transferred.labels(robot, direction).inc(size)
 
     def count_refusal(self, reason: str) -> None:
         """Counts a request or WebSocket that the gate has refused."""

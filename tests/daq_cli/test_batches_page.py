@@ -8,17 +8,11 @@ from pathlib import Path
 import pytest
 
 import ma2000
-from daq.executors.address import parse_address
 from tests.daq_cli.invoke import CommandLine
 from tests.server.batches.traces import folder_of_traces
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "batches.md").read_text("utf-8")
 COMMANDS = re.findall(r"^\$ daq (.+)$", PAGE, re.MULTILINE)
-
-
-def test_every_executor_of_the_page_is_understood() -> None:
-    urls = re.findall(r"`((?:local|dask|dask\+tls|slurm)://[^`]*)`", PAGE)
-    assert {parse_address(url).kind for url in urls} == {"local", "dask", "dask+tls", "slurm"}
 
 
 @pytest.mark.slow

@@ -19,8 +19,8 @@ from typing import Any
 import httpx
 import yaml
 
+from tests.extras.lab.archive.store import ObjectStore, running_store
 from tests.repository.tracked import ROOT
-from tests.server.archive.store import ObjectStore, running_store
 from tests.server.postgresql import programs, running_postgresql
 
 FILE = ROOT / "deploy" / "compose.yaml"

@@ -15,7 +15,6 @@ from packaging.requirements import Requirement
 import ma2000
 from daq.client.websocket import WebSocket
 from daq.contracts.extras import CONTAINS, EXTRA_OF, Extra, MissingExtraError, missing_extras_named
-from daq.executors import open_workers
 from daq.transport import MockPort
 from daq.transport.mock_process import start_mock
 from daq_cli.app.subcommands import called, extra_of, subcommands
@@ -171,7 +170,6 @@ def test_a_failed_import_of_anything_else_stays_what_it_is(name: str) -> None:
         ("websockets", lambda: WebSocket("ws://127.0.0.1:9", None, 1.0, 1, None), "live stream .*websockets.*[live]"),
         ("mujoco", lambda: start_mock(MockPort()), "the mock controller .*mujoco.*[robot]"),
         ("matplotlib", lambda: ma2000.plot(NO_TRACE), "ma2000.plot .*matplotlib.*[robot]"),
-        ("distributed", lambda: open_workers("dask://127.0.0.1:9"), "executor dask://.*distributed.*[cluster]"),
     ],
 )
 def test_what_needs_a_package_only_when_it_is_called_says_so_then(

@@ -15,7 +15,6 @@ import pytest
 import uvicorn
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
-from daq.config.archive import ArchiveSettings
 from daq.config.section import Section
 from daq.config.service import ServiceSettings
 from daq.config.settings import RobotSettings, TraceSettings, settings_type
@@ -62,18 +61,16 @@ def service_inside(
     clock: SystemClock,
     monkeypatch: pytest.MonkeyPatch,
     database: str | None = None,
-    archive: ArchiveSettings | None = None,
     sections: Mapping[str, Section] = MappingProxyType({}),
     **robot: Any,
 ) -> Iterator[httpx.Client]:
     """The robot's API of a service that is not connected, on a mock in lock-step. All that it keeps is in `folder`, in
-    `database`, and in `archive`. robot: more of its section of the configuration; sections: those of plug-ins."""
+    and in `database`. robot: more of its section of the configuration; sections: those of plug-ins."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder / "run"))
     settings = settings_type()(
         robot=RobotSettings(**{"port": MOCK} | robot),
         traces=TraceSettings(folder=folder / "traces"),
         server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
-        archive=archive or ArchiveSettings(),
         **sections,
     )
     if database is None:

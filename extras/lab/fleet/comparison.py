@@ -31,7 +31,7 @@ from server.store.jobs import traces_of
 
 MOST_FITS = 100
 """Number of the newest fits of a robot that are compared."""
-log = logging.getLogger(__name__)
+log = logging.getLogger("server.fleet")
 
 
 @dataclass(frozen=True)

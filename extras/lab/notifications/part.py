@@ -25,7 +25,7 @@ from server.owner.messages import Report
 from server.parts import Part
 from server.services import Services
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("server.notifications")
 
 
 class Notifications(Part, Collector):

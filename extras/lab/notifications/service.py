@@ -28,7 +28,7 @@ AGAIN_AFTER = 1.0
 """Time (s) after which the database is tried again."""
 CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
 """Errors of a database that cannot be read or written now."""
-log = logging.getLogger("extras.lab.notifications")
+log = logging.getLogger("server.notifications")
 
 
 @dataclass

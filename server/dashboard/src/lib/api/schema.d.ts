@@ -210,49 +210,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/fleet/experiments": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Submit Fleet Experiment
-         * @description Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
-         *
-         *     It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
-         *     gets it once.
-         */
-        post: operations["submit_fleet_experiment"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/fleet/comparison": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Compare Fleet
-         * @description Compares the robots' fits to the same experiment over time, and says which numbers have changed.
-         */
-        get: operations["compare_fleet"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/robots/{robot}/gains": {
         parameters: {
             query?: never;
@@ -1053,70 +1010,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/robots/{robot}/archive": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Archive
-         * @description Returns whether the archive answers, and what waits for it.
-         */
-        get: operations["get_archive"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/archive": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Trace Archive
-         * @description Returns where a trace is, and how far it is on its way.
-         */
-        get: operations["get_trace_archive"];
-        put?: never;
-        /**
-         * Archive Trace
-         * @description Sends a trace to the archive now; with `drop`, its local copy goes when it is there.
-         */
-        post: operations["archive_trace"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/fetch": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Fetch Trace
-         * @description Fetches a trace that only the archive has, as opening it does; returns how far this is.
-         */
-        post: operations["fetch_trace"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/robots/{robot}/jobs": {
         parameters: {
             query?: never;
@@ -1424,27 +1317,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/notifications": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Notifications
-         * @description Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
-         *     is told; no request can add or change an address.
-         */
-        get: operations["get_notifications"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/robots/{robot}/live/frame": {
         parameters: {
             query?: never;
@@ -1557,6 +1429,134 @@ export interface paths {
          * @description Returns version, uptime, storage and live clients of the service.
          */
         get: operations["get_system"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/archive": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Archive
+         * @description Returns whether the archive answers, and what waits for it.
+         */
+        get: operations["get_archive"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/traces/{trace}/archive": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Trace Archive
+         * @description Returns where a trace is, and how far it is on its way.
+         */
+        get: operations["get_trace_archive"];
+        put?: never;
+        /**
+         * Archive Trace
+         * @description Sends a trace to the archive now; with `drop`, its local copy goes when it is there.
+         */
+        post: operations["archive_trace"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/traces/{trace}/fetch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Fetch Trace
+         * @description Fetches a trace that only the archive has, as opening it does; returns how far this is.
+         */
+        post: operations["fetch_trace"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/fleet/experiments": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Submit Fleet Experiment
+         * @description Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
+         *
+         *     It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
+         *     gets it once.
+         */
+        post: operations["submit_fleet_experiment"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/fleet/comparison": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Fleet
+         * @description Compares the robots' fits to the same experiment over time, and says which numbers have changed.
+         */
+        get: operations["compare_fleet"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/notifications": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Notifications
+         * @description Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
+         *     is told; no request can add or change an address.
+         */
+        get: operations["get_notifications"];
         put?: never;
         post?: never;
         delete?: never;
@@ -7160,58 +7160,6 @@ export interface operations {
             };
         };
     };
-    submit_fleet_experiment: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description A request sent again with the same key is carried out once. */
-                "idempotency-key"?: string | null;
-            };
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["FleetExperimentRequest"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            201: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["FleetExperiments"];
-                };
-            };
-        };
-    };
-    compare_fleet: {
-        parameters: {
-            query?: {
-                /** @description Its name; else the most fitted one. */
-                experiment?: string | null;
-                /** @description Least time between the compared fits, in days. */
-                days?: number;
-            };
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["FleetComparison"];
-                };
-            };
-        };
-    };
     get_gains: {
         parameters: {
             query?: never;
@@ -8607,105 +8555,6 @@ export interface operations {
             };
         };
     };
-    get_archive: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ArchiveStatus"];
-                };
-            };
-        };
-    };
-    get_trace_archive: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
-    archive_trace: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: {
-            content: {
-                "application/json": components["schemas"]["ArchiveOrder"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
-    fetch_trace: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
     list_jobs: {
         parameters: {
             query?: {
@@ -9217,26 +9066,6 @@ export interface operations {
             };
         };
     };
-    get_notifications: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["NotificationStatus"];
-                };
-            };
-        };
-    };
     get_live_frame: {
         parameters: {
             query?: {
@@ -9358,6 +9187,177 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["SystemStatus"];
+                };
+            };
+        };
+    };
+    get_archive: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArchiveStatus"];
+                };
+            };
+        };
+    };
+    get_trace_archive: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                trace: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceArchive"];
+                };
+            };
+        };
+    };
+    archive_trace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                trace: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["ArchiveOrder"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceArchive"];
+                };
+            };
+        };
+    };
+    fetch_trace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                trace: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceArchive"];
+                };
+            };
+        };
+    };
+    submit_fleet_experiment: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description A request sent again with the same key is carried out once. */
+                "idempotency-key"?: string | null;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FleetExperimentRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetExperiments"];
+                };
+            };
+        };
+    };
+    compare_fleet: {
+        parameters: {
+            query?: {
+                /** @description Its name; else the most fitted one. */
+                experiment?: string | null;
+                /** @description Least time between the compared fits, in days. */
+                days?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetComparison"];
+                };
+            };
+        };
+    };
+    get_notifications: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NotificationStatus"];
                 };
             };
         };

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.archive.bucket import ArchiveError
+from extras.lab.archive.bucket import ArchiveError
 
 IN_A_ROW = 2
 """Number of failures in a row after which a step of a round ends: one object may be at fault, but a store that is away

@@ -10,7 +10,7 @@ import pytest
 from daq.client import Client
 from daq.contracts.service.archive import Transfer
 from tests.daq_cli.invoke import CommandLine
-from tests.server.archive.store import ACCESS, SECRET, FaultyStore, ObjectStore, settings_of
+from tests.extras.lab.archive.store import ACCESS, SECRET, FaultyStore, ObjectStore, settings_of
 from tests.server.inside import WrongClock, service_inside
 from tests.server.polling import until
 
@@ -25,7 +25,7 @@ def api(
     key = tmp_path / "key.toml"
     key.write_text(f'access_key = "{ACCESS}"\nsecret_key = "{SECRET}"\n', "utf-8")
     settings = settings_of(store.bucket(), proxy.url, credentials=key)
-    with service_inside(tmp_path, WrongClock(), monkeypatch, archive=settings) as client:
+    with service_inside(tmp_path, WrongClock(), monkeypatch, sections={"archive": settings}) as client:
         yield client
 
 

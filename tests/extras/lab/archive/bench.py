@@ -9,14 +9,14 @@ from typing import Any
 from daq.traces.csv_table import import_csv
 from daq.traces.naming import trace_path
 from daq.traces.store import write_trace
-from server.archive.bucket import Bucket
-from server.archive.service import ArchiveContext, ArchiveService
+from extras.lab.archive.bucket import Bucket
+from extras.lab.archive.service import ArchiveContext, ArchiveService
 from server.catalogue.catalogue import Catalogue
 from server.clock import SystemClock
 from server.store.archived import ArchivedStore
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
-from tests.server.archive.store import CREDENTIALS, settings_of
+from tests.extras.lab.archive.store import CREDENTIALS, settings_of
 from tests.server.migrated import migrated_store
 
 ROBOT = "ma2000"

@@ -11,10 +11,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from daq.config.archive import ArchiveSettings
+from daq.config.settings import Settings
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
-from server.archive.credentials import Credentials, load_credentials
+from extras.lab.archive.credentials import Credentials, load_credentials
+from extras.lab.archive.settings import ArchiveSettings
 
 if TYPE_CHECKING:
     from obstore.store import S3Config, S3Store
@@ -175,6 +176,11 @@ def open_bucket(settings: ArchiveSettings) -> Bucket | None:
         raise
     except Exception as error:  # noqa: BLE001, whatever it is, its words may repeat the credentials
         raise SpecError(f"archive {settings.place}: cannot be used: {type(error).__name__}") from None
+
+
+def check(settings: Settings) -> None:
+    """Raises SpecError where the configured archive cannot be used."""
+    open_bucket(settings.section(ArchiveSettings))
 
 
 def _reason(error: Exception) -> tuple[type[ArchiveError], str]:

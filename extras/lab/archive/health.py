@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
-from server.archive.bucket import ArchiveError, RefusedError
+from extras.lab.archive.bucket import ArchiveError, RefusedError
 from server.clock import Clock
 
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 60.0

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.server.archive.store import FaultyStore, ObjectStore, faulty, running_store
+from tests.extras.lab.archive.store import FaultyStore, ObjectStore, faulty, running_store
 
 
 @pytest.fixture(scope="package")

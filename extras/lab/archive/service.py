@@ -20,16 +20,16 @@ from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from daq.config.archive import ArchiveSettings
 from daq.contracts.errors import DaqError
 from daq.contracts.service.archive import ArchiveStatus, TraceArchive, Transfer
 from daq.traces import disk
 from daq.traces.room import RESERVE
-from server.archive.attempts import Attempts
-from server.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError
-from server.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Health
-from server.archive.names import object_name
-from server.archive.transfers import Transfers
+from extras.lab.archive.attempts import Attempts
+from extras.lab.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError
+from extras.lab.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Health
+from extras.lab.archive.names import object_name
+from extras.lab.archive.settings import ArchiveSettings
+from extras.lab.archive.transfers import Transfers
 from server.catalogue.catalogue import UPLOAD, Catalogue
 from server.clock import Clock
 from server.problems import ProblemError

@@ -9,14 +9,16 @@ from urllib.parse import urlsplit
 
 from pydantic import Field, field_validator
 
-from daq.contracts.frozen import FrozenRecord
+from daq.config.section import Section
 
 BUCKET = r"^[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]$"
 """Names of buckets, as S3 allows them."""
 
 
-class ArchiveSettings(FrozenRecord):
+class ArchiveSettings(Section):
     """Section `[archive]`. Without a bucket there is no archive."""
+
+    SHOWN = frozenset(["bucket", "region", "prefix", "credentials", "keep_days", "keep_size", "keep_used", "timeout"])
 
     bucket: Annotated[str, Field(pattern=BUCKET)] | None = None
     """Name of the bucket, which must exist."""

@@ -7,24 +7,23 @@ from typing import Annotated
 from fastapi import APIRouter, Body
 
 from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive
+from extras.lab.archive.part import Archives
 from server.api.dependencies import Identity, Operator, RobotDep, ServicesDep, Viewer
-from server.archive.service import ArchiveService
-from server.problems import PROBLEMS, conflict
-from server.services import RobotServices
+from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", tags=["traces"], responses=PROBLEMS)
 
 
 @router.get("/archive")
-def get_archive(rig: RobotDep, _: Viewer) -> ArchiveStatus:
+def get_archive(rig: RobotDep, services: ServicesDep, _: Viewer) -> ArchiveStatus:
     """Returns whether the archive answers, and what waits for it."""
-    return _archive(rig).status()
+    return services.part(Archives).of(rig.robot.name).status()
 
 
 @router.get("/traces/{trace}/archive")
-def get_trace_archive(trace: Identity, rig: RobotDep, _: Viewer) -> TraceArchive:
+def get_trace_archive(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer) -> TraceArchive:
     """Returns where a trace is, and how far it is on its way."""
-    return _archive(rig).of(trace)
+    return services.part(Archives).of(rig.robot.name).of(trace)
 
 
 @router.post("/traces/{trace}/archive", status_code=202)
@@ -37,7 +36,7 @@ def archive_trace(
 ) -> TraceArchive:
     """Sends a trace to the archive now; with `drop`, its local copy goes when it is there."""
     services.traces.file_of(rig.robot.name, trace)  # raises a 404 for a trace that there is not
-    archive = _archive(rig)
+    archive = services.part(Archives).of(rig.robot.name)
     archive.send_and_drop(trace, drop=order.drop)
     if order.drop:
         line = f"trace {trace}: its local copy goes when the archive has it"
@@ -46,15 +45,9 @@ def archive_trace(
 
 
 @router.post("/traces/{trace}/fetch", status_code=202)
-def fetch_trace(trace: Identity, rig: RobotDep, _: Viewer) -> TraceArchive:
+def fetch_trace(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer) -> TraceArchive:
     """Fetches a trace that only the archive has, as opening it does; returns how far this is."""
-    archive = _archive(rig)
+    archive = services.part(Archives).of(rig.robot.name)
     if not archive.of(trace).local:
         archive.fetch_now(trace)
     return archive.of(trace)
-
-
-def _archive(rig: RobotServices) -> ArchiveService:
-    if rig.archive is None:
-        raise conflict("no-archive", "this service has no archive", "set [archive] in its daq.toml (docs/archive.md)")
-    return rig.archive

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.batches.dask_processes import cluster
+from tests.extras.lab.cluster.dask_processes import cluster
 from tests.server.batches.traces import folder_of_traces, number
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
@@ -74,7 +74,7 @@ def test_a_worker_of_another_version_is_refused_by_name(tmp_path: Path) -> None:
     other = tmp_path / "other" / "ma2000_daq-0.0.9.dist-info"
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: ma2000-daq\nVersion: 0.0.9\n")
-    here = str(Path(__file__).parents[3])
+    here = str(Path(__file__).parents[4])
     with cluster(1, {"PYTHONPATH": f"{other.parent}:{here}"}) as made:
         done = daq("batch", "simulate", traces, "--out", out, "--executor", made.url)
     assert (done.returncode, done.stdout) == (4, "")

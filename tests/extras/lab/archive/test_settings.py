@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from daq.config.archive import ArchiveSettings
 from daq.config.settings import load_settings
 from daq.contracts.errors import SpecError
-from server.archive.credentials import load_credentials
-from server.archive.health import pause_after
-from server.archive.names import object_name
-from tests.server.archive.store import ACCESS, SECRET
+from extras.lab.archive.credentials import load_credentials
+from extras.lab.archive.health import pause_after
+from extras.lab.archive.names import object_name
+from extras.lab.archive.settings import ArchiveSettings
+from tests.extras.lab.archive.store import ACCESS, SECRET
 
 
 def _config(folder: Path, *lines: str) -> Path:
@@ -23,13 +23,13 @@ def _config(folder: Path, *lines: str) -> Path:
 
 
 def test_the_guides_configuration_can_be_said_and_says_everything(tmp_path: Path) -> None:
-    guide = Path(__file__).parents[3].joinpath("docs", "archive.md").read_text("utf-8")
+    guide = Path(__file__).parents[4].joinpath("docs", "archive.md").read_text("utf-8")
     (block,) = (
         text for text in re.findall(r"^```toml\n(.*?)^```", guide, re.MULTILINE | re.DOTALL) if "[archive]" in text
     )
     path = tmp_path / "daq.toml"
     path.write_text(block, "utf-8")
-    found = load_settings(path)[0].archive
+    found = load_settings(path)[0].section(ArchiveSettings)
     assert found.model_fields_set == set(ArchiveSettings.model_fields)
     assert found.place == "arm-traces at https://s3.lab:9000"
 
@@ -114,8 +114,8 @@ def test_without_obstore_one_line_says_what_to_install() -> None:
         "import sys; sys.modules['obstore'] = None\n"
         "import importlib.util as u; was = u.find_spec\n"
         "u.find_spec = lambda name, *rest: None if name == 'obstore' else was(name, *rest)\n"
-        "from daq.config.archive import ArchiveSettings\n"
-        "from server.archive.bucket import open_bucket\n"
+        "from extras.lab.archive.settings import ArchiveSettings\n"
+        "from extras.lab.archive.bucket import open_bucket\n"
         "try: open_bucket(ArchiveSettings(bucket='traces'))\n"
         "except Exception as error: print(error)\n"
     )

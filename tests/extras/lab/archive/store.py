@@ -13,9 +13,9 @@ from urllib.parse import urlsplit
 
 import boto3
 
-from daq.config.archive import ArchiveSettings
-from server.archive.bucket import Bucket
-from server.archive.credentials import Credentials
+from extras.lab.archive.bucket import Bucket
+from extras.lab.archive.credentials import Credentials
+from extras.lab.archive.settings import ArchiveSettings
 
 STORE = """
 import sys

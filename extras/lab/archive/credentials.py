@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 from pydantic import SecretStr, ValidationError
 
-from daq.config.archive import ArchiveSettings
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
+from extras.lab.archive.settings import ArchiveSettings
 
 ACCESS_KEY, SECRET_KEY, SESSION_TOKEN = "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN"
 """Environment variables that every client of S3 knows."""

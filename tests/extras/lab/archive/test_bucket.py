@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.errors import SpecError
-from server.archive.bucket import PIECE, ArchiveError, Content, DamagedError, RefusedError, open_bucket
-from tests.server.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore, bucket_of, settings_of
+from extras.lab.archive.bucket import PIECE, ArchiveError, Content, DamagedError, RefusedError, open_bucket
+from tests.extras.lab.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore, bucket_of, settings_of
 
 TEXT = b"a trace " * 4096
 

@@ -10,8 +10,8 @@ import pytest
 
 from server.problems import ProblemError
 from server.store.models import ModelStore, NewModel
-from tests.server.archive.bench import ROBOT, Bench
-from tests.server.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore
+from tests.extras.lab.archive.bench import ROBOT, Bench
+from tests.extras.lab.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore
 
 Make = Callable[..., Bench]
 UNREADABLE = Path("/proc/self/mem")
@@ -272,7 +272,7 @@ def test_a_fetch_without_room_says_so(bench: Bench, monkeypatch: pytest.MonkeyPa
     trace = bench.trace()
     bench.service.start()
     _drop(bench, trace)
-    monkeypatch.setattr("server.archive.service.RESERVE", 1 << 60)
+    monkeypatch.setattr("extras.lab.archive.service.RESERVE", 1 << 60)
     bench.service.fetch(trace)
     bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
     transfer = bench.service.of(trace).transfer
@@ -371,7 +371,7 @@ def test_what_failed_before_somebody_asked_is_fetched_again(bench: Bench, monkey
     _drop(bench, trace)
     full = bench.clock.monotonic()
     with monkeypatch.context() as disk:
-        disk.setattr("server.archive.service.RESERVE", 1 << 60)
+        disk.setattr("extras.lab.archive.service.RESERVE", 1 << 60)
         bench.service.fetch_now(trace)
         bench.until(lambda: bench.counted.count(("fetch", "failed", 0)) == 1)
         assert bench.service.bring([trace], full).state == "failed"

@@ -100,11 +100,11 @@ def _pass_on(future: Future[Any], given: Future[Any]) -> None:
         future.set_result(given.result())
 
 
-def dask_workers(address: Address, patience: float = PATIENCE) -> DaskWorkers:
+def dask_workers(address: Address, patience: float | None = None) -> DaskWorkers:
     """Connects to a scheduler, or starts a cluster on this computer. Raises ReachError, OtherVersionError."""
     if address.place:
         scheme = "tls" if address.kind == "dask+tls" else "tcp"
-        return connected(address.url, f"{scheme}://{address.place}", patience=patience)
+        return connected(address.url, f"{scheme}://{address.place}", patience=patience or PATIENCE)
     with dask.config.set(CONFIGURATION):
         cluster = LocalCluster(
             n_workers=address.workers or cores(),

@@ -1,0 +1,10 @@
+"""The archive: traces in storage that speaks S3, behind the folder of traces."""
+
+from daq.plugins import Plugin
+
+PLUGIN = Plugin(
+    settings={"archive": "extras.lab.archive.settings:ArchiveSettings"},
+    checks=("extras.lab.archive.bucket:check",),
+    parts=("extras.lab.archive.part:Archives",),
+    routes=("extras.lab.archive.routes:router",),
+)

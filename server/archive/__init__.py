@@ -1,1 +1,0 @@
-"""The archive: traces in storage that speaks S3, behind the folder of traces."""
