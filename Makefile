@@ -8,9 +8,15 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# What stays with one worker, and in which order it runs, is in tests/order.py. Three workers, because many tests wait for
-# processes in real time. For one process: make test WORKERS=
-WORKERS ?= -n 3 --dist loadfile --no-loadscope-reorder
+# Three workers (tests/workers.py), because many tests wait for processes in real time. The checks run beside them.
+# For one thing after the other, in one process: make test WORKERS=
+WORKERS ?= 3
+PYTEST = $(BIN)/python -m pytest -q $(if $(WORKERS),--workers $(WORKERS))
+CHECKS = $(MAKE) --no-print-directory checks
+WITH_CHECKS = $(if $(WORKERS), \
+	$(CHECKS) >.venv/checks.log 2>&1 & checks=$$!; trap 'kill $$checks' INT TERM; \
+	$(1); code=$$?; wait $$checks || { cat .venv/checks.log; code=1; }; exit $$code, \
+	$(CHECKS) && $(1))
 
 # Python keeps what it has compiled, whatever the environment says: the tests start hundreds of processes, and each would
 # compile all of its sources again.
@@ -39,17 +45,15 @@ docs: $(FOR_DEVELOPMENT) ## build the documents' site into docs/_site, strictly;
 page: | $(FOR_USE) ## build the dashboard's page where it is out of date
 	@$(BIN)/python hatch_build.py
 
-test: checks ## lint, types, import contracts, then the quick tests and one path through every door
-	@echo "== tests"
-	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow" --part quick
+test: $(FOR_DEVELOPMENT) page ## lint, types, import contracts, the quick tests and one path through every door
+	@$(call WITH_CHECKS,$(PYTEST) -m "not slow" --part quick)
 
 test-thorough: compiled ## all other tests, but for the slow ones
 	@echo "== thorough tests"
-	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow" --part thorough
+	@$(PYTEST) -m "not slow" --part thorough
 
-test-all: checks compiled ## every test, the slow ones too
-	@echo "== every test"
-	@$(BIN)/python -m pytest -q $(WORKERS)
+test-all: compiled ## every test, the slow ones too
+	@$(call WITH_CHECKS,$(PYTEST))
 
 checks: $(FOR_DEVELOPMENT) page ## lint and the tests of the page
 	@$(MAKE) --no-print-directory lint page-tests

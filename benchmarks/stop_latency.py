@@ -80,7 +80,7 @@ def _host(url: str, parent: Connection) -> None:
         with Guardian(listener, None, freeze):
             parent.send(controller.link.control)
             while (told := parent.recv()) != "end":
-                controller.release()
+                controller.release(controller.status().stop)
                 asked: list[tuple[float, bool]] = []
                 stopper = threading.Thread(target=_stop_later, args=(controller, told, asked))
                 if told != "run":

@@ -122,7 +122,8 @@ def bare_app(services: Services | None) -> FastAPI:
     app.include_router(page_router())
     serve_site(app, site_index())
     description.install(app)
-    described = description.serve(app, f"{API}/openapi.json")
+    kept = None if services is None else services.folder / description.KEPT
+    described = description.serve(app, f"{API}/openapi.json", kept)
     return app
 
 

@@ -44,7 +44,7 @@ def table_of(statement: str | None) -> str:
 def line_of(error: DatabaseError) -> str:
     """Returns the table and the database's message in one line."""
     table = table_of(error.statement)
-    return f"{f'table {table}: ' if table else ''}{one_line(error.orig or error)}"
+    return f"{f'table {table}: ' if table else ''}{one_line(error)}"
 
 
 def advice_of(error: DatabaseError) -> str:
@@ -69,11 +69,19 @@ def is_value(error: DatabaseError) -> bool:
     return isinstance(error, DataError)
 
 
-def _result_code(error: DatabaseError) -> int | None:
+def _result_code(error: object) -> int | None:
     """SQLite's primary result code; None from another database. The higher bits tell the reason more exactly."""
-    return error.orig.sqlite_errorcode & 0xFF if isinstance(error.orig, sqlite3.Error) else None
+    code = getattr(getattr(error, "orig", error), "sqlite_errorcode", None)
+    return code & 0xFF if isinstance(code, int) else None
+
+
+def is_locked(error: object) -> bool:
+    """Whether another program holds SQLite's database."""
+    return _result_code(error) == sqlite3.SQLITE_BUSY
 
 
 def one_line(error: object) -> str:
-    """Returns the beginning of an error's text, in one line."""
-    return " ".join(str(error).split())[:_LONGEST]
+    """Returns the beginning of an error's text in one line: of the database's own, without the statement."""
+    if is_locked(error):
+        return "locked by another program"
+    return " ".join(str(getattr(error, "orig", None) or error).split())[:_LONGEST]

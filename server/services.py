@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -71,6 +72,7 @@ from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
+from server.store.waiting_events import WaitingEvents
 
 if TYPE_CHECKING:
     from server.access.openid import Provider
@@ -168,6 +170,7 @@ class Services:
         self.programs = ProgramStore(self.store)
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
+        self._recorded = WaitingEvents(self.events, self._publish)
         self.audit_log = AuditLog(self.store)
         self.audit = Audit(AuditWriter(self.audit_log, self.folder / AUDIT_KEPT), self.clock.utc)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
@@ -243,7 +246,8 @@ class Services:
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
         last = [partial(part.close, ENDING) for part in self.parts]
-        _all_within(ENDING, [*last, partial(self.audit.writer.close, ENDING - KEEPING)])
+        last += [partial(self._recorded.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)]
+        _all_within(ENDING, last)
         self.store.close()
         self.closed = True
 
@@ -367,24 +371,31 @@ class Services:
         return queue
 
     def record_event(
-        self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
+        self,
+        robot: str,
+        kind: str,
+        text: str,
+        *,
+        actor: str | None = None,
+        experiment: str | None = None,
+        at: datetime | None = None,
     ) -> None:
         """Records an event in the log and the database, and publishes it to live clients.
 
-        Never raises, even if the database fails: the request that caused the event has already been carried out.
+        `at`: when it happened; now by default. Never raises, even if the database fails: the request that caused the
+        event has already been carried out. Its row is written as soon as the database can be.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
         self.metrics.count_event(robot, kind)
-        event: ServiceEvent | None = None
-        try:
-            event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
-        except Exception:  # only the log has it: without its row it has no number, by which pages tell events apart
-            log.exception("%s: %s: could not be written", robot, kind)
+        self._recorded.add(robot, kind, text, at or self.clock.utc(), actor, experiment)
         rig = self._robots.get(robot)
         if rig is not None:
-            if event is not None:
-                rig.hub.publish("events", EventMessage(event=event))
             rig.hub.look()
+
+    def _publish(self, robot: str, event: ServiceEvent) -> None:
+        rig = self._robots.get(robot)
+        if rig is not None:
+            rig.hub.publish("events", EventMessage(event=event))
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
         self.metrics.count_job(job)
@@ -393,7 +404,7 @@ class Services:
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
         """Does the same as `record_event` on a thread, for callers that must not wait for the disk."""
-        self._later.submit(self.record_event, robot, kind, text, actor=actor)
+        self._later.submit(self.record_event, robot, kind, text, actor=actor, at=self.clock.utc())
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
         """Handles a lapsed lease: the arm holds, and the queue is paused until a person resumes it."""

@@ -4,8 +4,6 @@ Bytecode of the tests with their assertions rewritten, and the machine code of t
 first test that needs it compiles.
 """
 
-from __future__ import annotations
-
 import sys
 from contextlib import redirect_stdout
 from io import StringIO

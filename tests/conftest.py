@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from xdist.remote import Producer
 
 from tests.left_running import Running, mark_this_process
-from tests.order import UnitScheduling, alternate, is_against_the_clock, is_thorough
+from tests.order import alternate, is_against_the_clock, is_thorough
+from tests.workers import run_tests
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
@@ -41,6 +41,7 @@ MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--port", metavar="URL", help="run the hardware tests on the real controller at this port")
+    parser.addoption("--workers", type=int, default=1, metavar="N", help="run the tests in so many processes")
     parser.addoption(
         "--part",
         choices=("quick", "thorough"),
@@ -88,9 +89,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     alternate(items)
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> UnitScheduling | None:
-    return UnitScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> bool | None:
+    """On several processes; one that a person debugs in, or that only collects, is one."""
+    option = session.config.option
+    if option.workers < 2 or option.collectonly or option.usepdb or session.testsfailed:
+        return None
+    return run_tests(session, option.workers)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -102,9 +107,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item,
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield
     may_skip = any(item.get_closest_marker(mark) for mark in MAY_ALWAYS_SKIP)
     if SKIPS_ARE_ERRORS and report.skipped and not may_skip and not hasattr(report, "wasxfail"):

@@ -1,7 +1,5 @@
 """The mock's control port, for tests: what the board itself says, and what is done to it behind a host's back."""
 
-from __future__ import annotations
-
 import json
 import socket
 from typing import Any

@@ -52,7 +52,7 @@ class Running:
         for thread in self.threads:
             thread.join(max(0.0, deadline - time.monotonic()))
         for process in self.processes:
-            _wait_for_end(process, max(0.0, deadline - time.monotonic()))
+            wait_for_end(process, max(0.0, deadline - time.monotonic()))
         running = {process for process in self.processes if _is_of_this_run(process)}  # one that has ended has no mark
         return Running(self.threads & frozenset(threading.enumerate()), frozenset(running))
 
@@ -119,7 +119,8 @@ def _command_line(process: int | str) -> str:
         return "(ended)"
 
 
-def _wait_for_end(process: int, timeout_s: float) -> None:
+def wait_for_end(process: int, timeout_s: float) -> None:
+    """Of a process that may have ended, and need not be a child."""
     try:
         handle = os.pidfd_open(process)
     except ProcessLookupError:

@@ -4,8 +4,6 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from xdist.remote import Producer
-from xdist.scheduler import LoadScopeScheduling
 
 TESTS = Path(__file__).parent
 AGAINST_THE_CLOCK = (
@@ -68,30 +66,34 @@ def unit_of(path: Path) -> str:
     return path.relative_to(TESTS).as_posix()
 
 
-def alternate(items: list[pytest.Item]) -> None:
-    """Put units that wait for processes in real time between units that compute, the largest first: run one kind after
-    the other, the cores would be idle during the first and short during the second."""
+def units_of(items: list[pytest.Item]) -> list[list[pytest.Item]]:
+    """The tests by their units of work, in the order of `items`."""
     units: dict[str, list[pytest.Item]] = {}
     for item in items:
         unit = unit_of(item.path) if item.path.is_relative_to(TESTS) else str(item.path)
         units.setdefault(unit, []).append(item)
-    waiting = [unit for unit, tests in units.items() if is_against_the_clock(tests[0])]
-    waiting.sort(key=lambda unit: (unit not in ONE_WORKER, -len(units[unit]) if unit in ONE_WORKER else 0))
-    computing = [unit for unit in units if unit not in waiting]
-    mixed = sorted(_places(waiting) + _places(computing))
-    items[:] = [item for _, unit in mixed for item in units[unit]]
+    return list(units.values())
 
 
-def _places(units: list[str]) -> list[tuple[float, str]]:
-    """Each unit with its place between 0 (first) and 1 (last) of its kind."""
-    return [((number + 0.5) / len(units), unit) for number, unit in enumerate(units)]
+def alternate(items: list[pytest.Item]) -> None:
+    """Put units that wait for processes in real time between units that compute, folders and doors first: they are the
+    largest. Run one kind after the other, the cores would be idle during the first and short during the second."""
+    kinds: dict[bool, list[list[pytest.Item]]] = {True: [], False: []}
+    for unit in units_of(items):
+        kinds[is_against_the_clock(unit[0])].append(unit)
+    mixed: list[tuple[float, list[pytest.Item]]] = []
+    for units in kinds.values():
+        units.sort(key=_heaviness)
+        mixed += [((number + 0.5) / len(units), unit) for number, unit in enumerate(units)]
+    mixed.sort(key=lambda placed: placed[0])
+    items[:] = [item for _, unit in mixed for item in unit]
 
 
-class UnitScheduling(LoadScopeScheduling):
-    """Hands whole units of work to the workers of pytest-xdist, in the order of the collected tests."""
-
-    def __init__(self, config: pytest.Config, log: Producer | None = None) -> None:
-        super().__init__(config, log)
-
-    def _split_scope(self, nodeid: str) -> str:
-        return unit_of(TESTS.parent / nodeid.split("::", 1)[0])
+def _heaviness(unit: list[pytest.Item]) -> int:
+    """Small for what must begin early: else one process would have it left when all others have ended."""
+    path = unit[0].path
+    if not path.is_relative_to(TESTS):
+        return 0
+    if unit_of(path) in ONE_WORKER:
+        return -len(unit)
+    return -1 if path.relative_to(TESTS).as_posix() in DOORS else 0

@@ -1,7 +1,5 @@
 """The MA2000 with other signs: sensors that count down, gears that turn the motion round, the arm in a mirror."""
 
-from __future__ import annotations
-
 import math
 
 from daq.contracts.machine import DcMotor, Joint, Machine

@@ -17,6 +17,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -185,10 +186,13 @@ def main() -> int:
     parser.add_argument("--sharpness", action="store_true", help="also which laws the records can tell apart")
     parser.add_argument("--reporting", action="store_true", help="kinds for reports may be looked at")
     asked = parser.parse_args()
-    chosen = {"tuning": list(TUNING), "reporting": list(REPORTING)}.get(asked.kinds) or asked.kinds.split(",")
+    groups = {"tuning": list(TUNING), "reporting": list(REPORTING)}
+    named = [*groups, *KINDS]
+    chosen = groups.get(asked.kinds) or asked.kinds.split(",")
     unknown = [kind for kind in chosen if kind not in KINDS]
     if unknown:
-        parser.error(f"kinds {', '.join(unknown)}: there are {', '.join(KINDS)}")
+        near = get_close_matches(unknown[0], named, n=5, cutoff=0.0)
+        parser.error(f"--kinds {unknown[0]}: there is none of that name; the nearest are {', '.join(near)}")
     if not asked.reporting and any(kind in REPORTING for kind in chosen):
         parser.error("a kind for reports is not looked at while anything is tuned; say --reporting if this is a report")
     folder = asked.folder or Path(tempfile.mkdtemp(prefix="rigs-"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Self
@@ -22,6 +23,7 @@ class Freezer:
         self._port = port
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="stop")
         self._under_way: Future[StopAnswer] | None = None
+        self._lock = threading.Lock()
 
     def __enter__(self) -> Self:
         # The thread is made now: the moment of a stop is no moment to ask the operating system for one.
@@ -34,14 +36,16 @@ class Freezer:
         self._thread.shutdown(wait=True)
 
     def freeze(self, cause: str) -> StopAnswer:
-        """Stops the arm; says within ANSWER_WITHIN what is known. From one thread at a time."""
+        """Stops the arm; says within ANSWER_WITHIN what is known. For any thread."""
         control = self.control
         if control is None:
             return self._answer(text="the run has not reached its robot yet; it ends before anything moves")
-        if self._under_way is None or self._under_way.done():
-            self._under_way = self._thread.submit(self._stop, control, cause)
+        with self._lock:
+            if self._under_way is None or self._under_way.done():
+                self._under_way = self._thread.submit(self._stop, control, cause)
+            under_way = self._under_way
         try:
-            return self._under_way.result(ANSWER_WITHIN)
+            return under_way.result(ANSWER_WITHIN)
         except TimeoutError:
             # Writing takes half a second at most, or has failed by now: the stop is on the line, unconfirmed.
             return self._answer(delivered=True, text=f"no confirmation within {ANSWER_WITHIN} s; it is being repeated")

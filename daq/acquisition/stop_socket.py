@@ -13,8 +13,8 @@ import json
 import os
 import socket
 import stat
-import tempfile
 import time
+import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -52,11 +52,15 @@ class StopAnswer:
     @classmethod
     def from_json(cls, line: bytes) -> Self:
         """Raises ValueError for anything but what `to_json` makes."""
-        data = json.loads(line)
+        return cls.from_data(json.loads(line))
+
+    @classmethod
+    def from_data(cls, data: dict[str, Any]) -> Self:
+        """Raises ValueError for anything but what `as_data` makes."""
         try:
             return cls(**(data | {"postures": tuple(data["postures"])}))
         except (TypeError, KeyError) as error:
-            raise ValueError(f"not the answer to a stop: {line[:80]!r}") from error
+            raise ValueError(f"not the answer to a stop: {data!r:.80}") from error
 
 
 @dataclass(frozen=True)
@@ -74,47 +78,101 @@ class StopAttempt:
 
 
 def runtime_folders() -> list[Path]:
-    """Where stop sockets may lie, the first being where they are made: DAQ_RUNTIME_FOLDER alone where it is set; else
-    the session's own folder, else one of this user's among the temporary files.
+    """Where stop sockets may lie, the first being where they are made: DAQ_RUNTIME_FOLDER where it is set; else the
+    session's own folder, else one of this user's among the temporary files.
 
-    A terminal may lack what another one has in its environment, so whoever stops looks into all of them.
+    A terminal may lack what another one has in its environment, and a folder may be removed for good while a robot
+    moves, so whoever stops looks into all of them. The second folder of DAQ_RUNTIME_FOLDER belongs to it alone.
     """
-    if FOLDER_VARIABLE in os.environ:
-        return [Path(os.environ[FOLDER_VARIABLE])]
+    # Not by `tempfile`, which writes a file first: a stop needs no room on a disk.
+    temporary = Path(os.environ.get("TMPDIR") or "/tmp") / f"{APP}-{os.getuid()}"
+    if own := os.environ.get(FOLDER_VARIABLE):
+        return [Path(own), temporary.with_name(f"{temporary.name}-{zlib.crc32(os.path.abspath(own).encode()):08x}")]
     sessions = [Path("/run/user") / str(os.getuid())]
     if session := os.environ.get("XDG_RUNTIME_DIR"):
         sessions.insert(0, Path(session))
-    folders = [session / APP for session in sessions if session.is_dir() and os.access(session, os.W_OK | os.X_OK)]
-    folders.append(Path(tempfile.gettempdir()) / f"{APP}-{os.getuid()}")
-    return list(dict.fromkeys(folders))
+    # `os.path.isdir`, since that of `Path` raises an error for what may not be looked at.
+    usable = [one for one in sessions if os.path.isdir(one) and os.access(one, os.W_OK | os.X_OK)]
+    folders = [session / APP for session in usable]
+    return list(dict.fromkeys([*folders, temporary]))
+
+
+class StopSocket:
+    """A listening, non-blocking socket for stop requests of one robot. Its file may be removed by whatever tidies the
+    folder up; `renew` then makes another one."""
+
+    def __init__(self, robot: str) -> None:
+        """Raises ReachError when it cannot be made."""
+        self._name = f"{robot}-{os.getpid()}.sock"
+        self.problem = ""
+        """Why there is no file at which this robot can be stopped; empty where there is one."""
+        self.socket, self.path, self._file = self._made(runtime_folders()[0])
+
+    def fileno(self) -> int:
+        """Descriptor, for `select`; -1 once it is closed."""
+        return self.socket.fileno()
+
+    def is_there(self) -> bool:
+        """Whether the file is still this socket's."""
+        return _file_at(self.path) == self._file
+
+    def renew(self) -> socket.socket | None:
+        """Makes another socket if the file is gone, in the first folder in which that works. Returns the one before,
+        for whoever has connected to it; None if nothing has changed."""
+        if self.is_there():
+            self.problem = ""
+            return None
+        for folder in runtime_folders():
+            try:
+                made = self._made(folder)
+            except ReachError as error:
+                self.problem = str(error)
+            else:
+                before = self.socket
+                self.socket, self.path, self._file = made
+                self.problem = ""
+                return before
+        return None
+
+    def close(self) -> None:
+        """Removes the file, unless another one lies there by now."""
+        if self.is_there():
+            self.path.unlink(missing_ok=True)
+        self.socket.close()
+
+    def _made(self, folder: Path) -> tuple[socket.socket, Path, tuple[int, int] | None]:
+        """A socket in a folder, its path, and its file as `_file_at` tells. Raises ReachError."""
+        path = folder / self._name
+        # Nobody finds the file before it listens: who is refused there takes it for that of a dead process.
+        beside = path.with_suffix(".new")
+        made: socket.socket | None = None
+        try:
+            made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            _require_own(folder)
+            beside.unlink(missing_ok=True)
+            made.bind(str(beside))
+            made.listen(BACKLOG)
+            made.setblocking(False)
+            beside.rename(path)
+        except (OSError, ReachError) as error:
+            if made is not None:
+                made.close()
+            if isinstance(error, ReachError):
+                raise
+            reason = error.strerror or str(error)
+            raise ReachError(f"stop socket {path}: cannot be made: {reason}; set {FOLDER_VARIABLE}") from error
+        return made, path, _file_at(path)
 
 
 @contextlib.contextmanager
-def stop_listener(robot: str) -> Iterator[socket.socket]:
-    """A listening, non-blocking socket for stop requests of one robot, removed at the end.
+def stop_listener(robot: str) -> Iterator[StopSocket]:
+    """The stop socket of one robot, removed at the end.
 
     Raises ReachError when it cannot be made: a robot that cannot be stopped from outside is not moved.
     """
-    folder = runtime_folders()[0]
-    path = folder / f"{robot}-{os.getpid()}.sock"
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            _require_own(folder)
-            path.unlink(missing_ok=True)
-            listener.bind(str(path))
-            listener.listen(BACKLOG)
-            listener.setblocking(False)
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise ReachError(f"stop socket {path}: cannot be made: {reason}; set {FOLDER_VARIABLE}") from error
-        try:
-            yield listener
-        finally:
-            path.unlink(missing_ok=True)
-    finally:
-        listener.close()
+    with contextlib.closing(StopSocket(robot)) as listener:
+        yield listener
 
 
 def request_stop(robot: str | None = None, process: int | None = None) -> list[StopAttempt]:
@@ -138,6 +196,15 @@ def request_stop(robot: str | None = None, process: int | None = None) -> list[S
         if not gone:
             attempts.append(StopAttempt(path, answer, time.monotonic() - begun))
     return attempts
+
+
+def _file_at(path: Path) -> tuple[int, int] | None:
+    """Device and number of a file; None if there is none."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _require_own(folder: Path) -> None:

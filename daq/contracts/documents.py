@@ -27,6 +27,7 @@ _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_
 """Matches only where a key can begin, so that the search takes time in proportion to the text."""
 
 
+_ENCODING = re.compile(rb"""\s*<\?xml[^>]{0,100}?\sencoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
 
@@ -58,10 +59,10 @@ def shown(value: object) -> str:
     return " ".join(_short.repr(value).split())
 
 
-def read_text(path: Path, what: str) -> str:
-    """The text of a file that `what` names in errors.
+def read_text(path: Path, what: str, *, xml: bool = False) -> str:
+    """The text of a file that `what` names in errors. xml: in the encoding that its first line declares.
 
-    Raises SpecError in one line when it cannot be read, has more than LARGEST bytes, or is not UTF-8.
+    Raises SpecError in one line when it cannot be read, has more than LARGEST bytes, or is in another encoding.
     """
     try:
         with path.open("rb") as stream:
@@ -72,12 +73,16 @@ def read_text(path: Path, what: str) -> str:
         raise SpecError(f"{what}: cannot be read: {error}") from error
     if len(content) > LARGEST:
         raise SpecError(f"{what}: cannot be read: it is larger than {LARGEST >> 20} MiB")
+    declared = _ENCODING.match(content) if xml else None
+    encoding = "UTF-8" if declared is None else declared[1].decode("ascii")
     try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise SpecError(
-            f"{what}: cannot be read: it is not UTF-8 text (byte {content[error.start]:#04x} at {error.start})"
-        ) from error
+        return content.decode("utf-8-sig" if encoding.lower() == "utf-8" else encoding)
+    except LookupError as error:
+        raise SpecError(f"{what}: cannot be read: it declares encoding {shown(encoding)}, which is unknown") from error
+    except UnicodeError as error:
+        at = error.start if isinstance(error, UnicodeDecodeError) else 0
+        line = f"it is not {shown(encoding)[1:-1]} text (byte {content[at]:#04x} at {at})"
+        raise SpecError(f"{what}: cannot be read: {line}") from error
 
 
 def parse_json(text: str, what: str) -> Any:

@@ -14,7 +14,7 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord, SpokenRecord
 from daq.contracts.in_unit import InUnit
-from firmware_protocol.invalid import first_invalid
+from firmware_protocol.invalid import first_invalid, invalid_of
 
 JOINTS = 6
 GAIN_PLACE = 3
@@ -47,7 +47,16 @@ Amplitude = Angle | dict[JointNumber, Angle]
 """One value for all joints of the experiment, or one per joint."""
 
 
-class Ramp(FrozenRecord):
+class _Spoken(SpokenRecord):
+    """A part of an experiment, which people make in their programs as well."""
+
+    @classmethod
+    def words_of(cls, error: ValidationError) -> str:
+        """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
+        return _one_line(error)
+
+
+class Ramp(_Spoken):
     """Constant speed through `amplitude` in `duration`; all joints arrive together."""
 
     kind: Literal["ramp"] = "ramp"
@@ -55,14 +64,14 @@ class Ramp(FrozenRecord):
     duration: Duration = DEFAULT_RAMP_TIME
 
 
-class Step(FrozenRecord):
+class Step(_Spoken):
     """The whole `amplitude` at once, in one set point."""
 
     kind: Literal["step"] = "step"
     amplitude: Amplitude = math.radians(5.4)
 
 
-class Staircase(FrozenRecord):
+class Staircase(_Spoken):
     """`steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each."""
 
     kind: Literal["staircase"] = "staircase"
@@ -72,7 +81,7 @@ class Staircase(FrozenRecord):
     back: StrictBool = True
 
 
-class SlowRamp(FrozenRecord):
+class SlowRamp(_Spoken):
     """Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction."""
 
     kind: Literal["slow_ramp"] = "slow_ramp"
@@ -81,7 +90,7 @@ class SlowRamp(FrozenRecord):
     reversals: Annotated[int, Field(ge=0, le=200)] = 3
 
 
-class Sine(FrozenRecord):
+class Sine(_Spoken):
     """`cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it."""
 
     kind: Literal["sine"] = "sine"
@@ -91,7 +100,7 @@ class Sine(FrozenRecord):
     phase: Angle = 0.0
 
 
-class Multisine(FrozenRecord):
+class Multisine(_Spoken):
     """Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out."""
 
     kind: Literal["multisine"] = "multisine"
@@ -109,7 +118,7 @@ class Multisine(FrozenRecord):
         return self
 
 
-class Cubic(FrozenRecord):
+class Cubic(_Spoken):
     """Cubic in time through `amplitude` in `duration`, at rest at both ends."""
 
     kind: Literal["cubic"] = "cubic"
@@ -117,7 +126,7 @@ class Cubic(FrozenRecord):
     duration: Duration = 1.0
 
 
-class Via(FrozenRecord):
+class Via(_Spoken):
     """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
 
     `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
@@ -137,7 +146,7 @@ class Via(FrozenRecord):
         return self
 
 
-class PickAndPlace(FrozenRecord):
+class PickAndPlace(_Spoken):
     """Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
 
     The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
@@ -152,7 +161,7 @@ class PickAndPlace(FrozenRecord):
     place: Duration = 1.0
 
 
-class Path(FrozenRecord):
+class Path(_Spoken):
     """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
 
     The first point is the start: the arm is brought there by a slow move.
@@ -172,7 +181,7 @@ class Path(FrozenRecord):
         return self
 
 
-class Pause(FrozenRecord):
+class Pause(_Spoken):
     """No motion for `duration`: a piece of a sequence."""
 
     kind: Literal["pause"] = "pause"
@@ -184,14 +193,14 @@ Simple = Annotated[
 ]
 
 
-class Segment(FrozenRecord):
+class Segment(_Spoken):
     """One piece of a sequence, on its own joints (all of the experiment's when None)."""
 
     move: Simple
     joints: tuple[JointNumber, ...] | None = None
 
 
-class Sequence(FrozenRecord):
+class Sequence(_Spoken):
     """Pieces one after the other, each from where the one before ended."""
 
     kind: Literal["sequence"] = "sequence"
@@ -204,7 +213,7 @@ Trajectory = Annotated[
 ]
 
 
-class PlainExperiment(SpokenRecord):
+class PlainExperiment(_Spoken):
     """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
 
     trajectory: Trajectory = Ramp()
@@ -218,11 +227,6 @@ class PlainExperiment(SpokenRecord):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")] | None = None
     operator: Annotated[str, Field(max_length=100)] | None = None
     notes: Annotated[str, Field(max_length=10000)] = ""
-
-    @classmethod
-    def words_of(cls, error: ValidationError) -> str:
-        """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-        return _one_line(error)
 
     @model_validator(mode="after")
     def _joints_agree(self) -> Self:
@@ -317,13 +321,15 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 def _one_line(error: ValidationError) -> str:
     """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-    first = first_invalid(error)
+    # What is given joint by joint is not told that it is no single number.
+    told = [one for one in error.errors() if one["type"] != "float_type" or not isinstance(one["input"], dict)]
+    first = invalid_of(told[0]) if told else first_invalid(error)
     where, value, message = [str(part) for part in first.place], first.value, first.message
     # Pydantic's names for the branches of a union mean nothing to a user.
     where = [
         part
         for i, part in enumerate(where)
-        if not part.startswith(("constrained-", "function-")) and (i != 1 or where[0] != "trajectory")
+        if not part.startswith(("constrained-", "function-", "dict[")) and (i != 1 or where[0] != "trajectory")
     ]
     if "gains" in where[:1] and len(where) == GAIN_PLACE:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]

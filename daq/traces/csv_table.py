@@ -10,8 +10,9 @@ import re
 from array import array
 from collections.abc import Iterable
 from datetime import UTC
+from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -35,6 +36,12 @@ INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 FILE_TIME = "Its date is the last change of its file."
 """Note in a trace whose description states no `created`."""
 
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
+SLOWEST = 1.0
+"""Time from row to row (s) from which times may be in ms: a moving joint is sampled more often."""
+EPOCH = 1e8
+"""First time (s) from which times count from 1970: as a float64 they would have steps of 0.2 µs."""
+
 SHOWN = 20
 """Number of columns that an error lists."""
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
@@ -45,6 +52,8 @@ class CsvDescription(Description):
 
     joints: tuple[Annotated[int, Field(ge=1, le=99)], ...] | None = None
     """Joints to take from the columns; all of them when None."""
+    time_unit: Literal["s", "ms", "µs", "us"] | None = None
+    """Unit of the column `time`; s when None."""
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
@@ -84,9 +93,14 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
     data = read_file(path, limits.file_bytes, "file_bytes")
     description, described = CsvDescription.read(path, limits)
     whole, said = _whole_rows(data)
-    header, table, rows = _read_table(path, whole, limits)
+    header, table, rows, begins = _read_table(path, whole, limits)
     if said and not len(table):
         raise TraceError(f"{path}: {' '.join(said)} No row is left")
+    unit = description.time_unit or "s"
+    table[:, 0] *= TIME_UNITS[unit]
+    said += [f"Its times count from its first row, which is at {begins} {unit}."] if begins else []
+    if description.time_unit is None and description.period is None:
+        said += _looks_like_ms(table[:, 0])
     joints = _joints(path, header, description)
     _check_bounds(path, header, table, rows)
     description.check_period(table[:, 0], str(path))
@@ -125,6 +139,12 @@ def _whole_rows(data: bytes) -> tuple[bytes, list[str]]:
     return rows, said
 
 
+def _looks_like_ms(time: Floats) -> list[str]:
+    usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    advice = 'Are its times in ms? Then write time_unit = "ms" in the TOML beside it.'
+    return [f"Its rows are {usual:g} s apart. {advice}"] if usual >= SLOWEST else []
+
+
 def _integrate(time: Floats, velocity: Floats) -> Floats:
     """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
     steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
@@ -147,8 +167,9 @@ def _listed(header: list[str]) -> str:
     return ", ".join(shown(name).strip("'") for name in header[:SHOWN]) + (" …" if len(header) > SHOWN else "")
 
 
-def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int]]:
-    """Header, numbers (rows, columns), all finite, and the row of the file that each stands in. Raises TraceError."""
+def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int], Decimal]:
+    """Header, numbers (rows, columns), all finite, the row of the file that each stands in, and the time from which
+    times count. Raises TraceError."""
     try:
         rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
         header = [name.strip() for name in next(rows, [])]
@@ -177,12 +198,13 @@ def _check_header(path: Path, header: list[str]) -> None:
 
 def _numbers(
     path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits
-) -> tuple[Floats, array[int]]:
-    """The numbers (rows, columns), all finite, and the row of the file of each; blank rows are left out.
+) -> tuple[Floats, array[int], Decimal]:
+    """The numbers (rows, columns), all finite, and the row of the file of each; blank rows are left out. Times since
+    1970 count from the first row: the time there, else 0.
 
     Raises TraceError.
     """
-    found, places = array("d"), array("q")
+    found, places, begins = array("d"), array("q"), Decimal()
     most = limits.records // _records_of_a_row(header)
     for number, row in enumerate(rows, start=2):
         if not row:
@@ -195,11 +217,15 @@ def _numbers(
             values = [math.nan]
         if not math.isfinite(sum(values)) or "_" in "".join(row):
             _refuse_value(path, number, header, row)
+        if not places and values[0] >= EPOCH:
+            begins = Decimal(row[0])
+        if begins:
+            values[0] = float(Decimal(row[0]) - begins)  # before a float64 rounds it
         found.extend(values)
         places.append(number)
         if len(found) > most * len(header):
             raise TraceError(f"{path}: row {number}: up to {most} samples are read (traces.limits.records)")
-    return np.frombuffer(found, dtype=np.float64).reshape(-1, len(header)), places
+    return np.frombuffer(found, dtype=np.float64).reshape(-1, len(header)), places, begins
 
 
 def _records_of_a_row(header: list[str]) -> int:

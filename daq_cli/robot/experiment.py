@@ -98,7 +98,10 @@ def _schedule(robot: RobotAccess, spec: ExperimentSpec, cron: str, *, as_json: b
         print_json(made.model_dump(mode="json"))
         return
     first = "" if made.next is None else f"; first on {made.next.astimezone():%Y-%m-%d at %H:%M %Z}"
-    print(f"schedule {made.id}: {made.cron} ({made.zone}){first}. `daq queue schedules` lists, `unschedule` cancels")
+    _, _, day, _, weekday = cron.split()
+    either = "" if "*" in (day[0], weekday[0]) else f", on days {day} of the month and on every weekday {weekday}"
+    when = f"{made.cron} ({made.zone}){either}{first}"
+    print(f"schedule {made.id}: {when}. `daq queue schedules` lists, `unschedule` cancels")
 
 
 def acquire_complete(

@@ -17,7 +17,10 @@ from model.record_check.finding import RecordFinding
 ANSWER_FORMAT = 1
 """Version of the answer; a reader refuses newer ones."""
 
-Verdict = Literal["nothing-significant", "named", "ambiguous", "suspected", "unknown-effect", "check-the-record"]
+Verdict = Literal[
+    "nothing-significant", "named", "ambiguous", "partly", "suspected", "unknown-effect", "check-the-record"
+]
+"""`partly`: effects are named, alone or in groups, and far more than noise is left on their joints."""
 Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
 AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
 UNWRITTEN = ""

@@ -16,7 +16,7 @@ GROWN = 1.1
 """Ratio of a joint's mean square errors on held-out traces, above which a fit has made them worse beyond noise."""
 
 
-def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False) -> Verdict:
+def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False, partly: bool = False) -> Verdict:
     """The verdict of either method.
 
     Args:
@@ -25,11 +25,14 @@ def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False
             any joint above its line; by inverse dynamics, where no step was adopted, a shape in the remaining torque,
             or a torque that is slow and far above noise.
         suspected: whether an effect lacks nothing but evidence, and has some.
+        partly: whether far more than noise is left beside the effects that were adopted.
     """
     if suspected and not any(s.adopted for s in steps):
         return "suspected"
     if unexplained:
         return "unknown-effect"
+    if partly and any(s.adopted for s in steps):
+        return "partly"
     if any(s.adopted and s.group for s in steps):
         return "ambiguous"
     return "named" if any(s.adopted for s in steps) else "nothing-significant"

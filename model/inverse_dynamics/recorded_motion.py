@@ -266,6 +266,12 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
     )
 
 
+def turns_round(records: Sequence[RecordedMotion], machine: Machine) -> Mask:
+    """Joints (n,) that turn by more than a whole turn in any record: after a turn they are where they were."""
+    revolute = np.array([machine.joint(j).kind == "revolute" for j in machine.modelled_joints])
+    return revolute & np.any([np.ptp(r.position, axis=0) > 2 * np.pi for r in records], axis=0)
+
+
 def holds_drive_between_samples(machine: Machine) -> bool:
     """Whether a recorded drive is that of a controller, which holds it for a period after its sample."""
     return not isinstance(machine.controller, NoController)

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from daq.contracts.trace import Trace
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.inverse_dynamics.readings import torque_noise
-from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, turns_round
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
@@ -42,21 +42,24 @@ def noise_left(model: Model, traces: Sequence[Trace], balance: TorqueBalance, cu
     """
     torques = np.concatenate(balance.supplied_by_drive())
     digits = LEAST_OF_TORQUE * np.sqrt(np.mean(torques**2, axis=0))
-    repeated = repeated_noise(balance.records, balance.residual({}))
+    repeated = repeated_noise(balance.records, balance.residual({}), turns_round(balance.records, model.machine))
     return np.asarray(np.maximum(np.maximum(torque_noise(model, traces, cutoff), repeated), digits))
 
 
-def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats]) -> Floats:
+def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats], round_: Mask) -> Floats:
     """Standard deviation (n,), N·m or N, of what differs between passages of the same motion; 0 on a joint whose motion
-    does not recur. A bound from above: passages are never quite alike. residual: (m, n) a record, at its compared
-    samples."""
+    does not recur. A bound from above: passages are never quite alike.
+
+    Args:
+        residual: (m, n) a record, at its compared samples. round_: (n,) joints that are where they were after a turn.
+    """
     joints = records[0].moving.shape[1]
-    return np.array([_of_joint(records, residual, j) for j in range(joints)])
+    return np.array([_of_joint(records, residual, j, round_) for j in range(joints)])
 
 
-def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joint: int) -> float:
+def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joint: int, round_: Mask) -> float:
     moving = [r.moving[:, joint] for r in records]
-    state = np.concatenate([_state(r)[m] for r, m in zip(records, moving, strict=True)])
+    state = np.concatenate([_state(r, round_)[m] for r, m in zip(records, moving, strict=True)])
     torque = np.concatenate([x[m, joint] for x, m in zip(residual, moving, strict=True)])
     when = np.concatenate([1e6 * i + r.time[r.rows][m] for i, (r, m) in enumerate(zip(records, moving, strict=True))])
     if len(state) < FEWEST:
@@ -73,7 +76,9 @@ def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joi
     return float(np.sqrt(0.5 * np.mean((torque[nearest] - torque[found]) ** 2)))
 
 
-def _state(record: RecordedMotion) -> Floats:
-    """Position, speed and acceleration of all joints (m, 3 n) at the compared samples."""
-    parts = [signal[record.rows] for signal in (record.position, record.speed, record.acceleration)]
-    return np.concatenate(parts, axis=1)
+def _state(record: RecordedMotion, round_: Mask) -> Floats:
+    """Position, speed and acceleration of all joints (m, 3 n) at the compared samples; of joints that turn `round_`,
+    cosine and sine in place of the position."""
+    place = record.position[record.rows]
+    turned = (np.cos(place[:, round_]), np.sin(place[:, round_]), place[:, ~round_])
+    return np.concatenate([*turned, record.speed[record.rows], record.acceleration[record.rows]], axis=1)

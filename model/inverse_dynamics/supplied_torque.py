@@ -70,8 +70,11 @@ def gravity_along(chain: ChainArrays, position: NDArray[Any], out: NDArray[Any])
 
 
 @compiled
-def supplied_torque(motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[Any], other: NDArray[Any]) -> None:
-    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `other` of friction and other effects."""
+def supplied_torque(
+    motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[Any], other: NDArray[Any], rise: NDArray[Any]
+) -> None:
+    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `other` of friction and other effects; and
+    the relative rise (k, n) of the windings' resistance."""
     joints, time = numbers.joints, motion.time
     n = joints.shape[0]
     modes = extra_flags(joints, numbers.flags)
@@ -81,7 +84,7 @@ def supplied_torque(motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[
         for j in range(n):
             joint, q, v, w = joints[j], motion.position[k, j], motion.speed[k, j], motion.rotor_speed[k, j]
             z, u = motion.contact[k, j], motion.volts[k, j]
-            motor[k, j] = _motor_torque(joint, modes[j], state[j], u, w, h, time[k] - time[0])
+            motor[k, j], rise[k, j] = _motor_torque(joint, modes[j], state[j], u, w, h, time[k] - time[0])
             torque = -joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * w - z * motion.level[k, j]
             if modes[j] != 0:
                 torque += extra_torque(joint, modes[j], time[k], q, v, z, 0.0, 0.0)
@@ -94,8 +97,8 @@ def supplied_torque(motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[
 def _motor_torque(
     joint: NDArray[Any], flags: int, state: NDArray[Any], volts: float, speed: float, h: float, since: float
 ) -> Any:
-    """Torque of a motor at its joint; warms its winding, and advances its current where that lags. since: the record's
-    start, s.
+    """Torque of a motor at its joint, and the relative rise of its winding's resistance; warms the winding, and
+    advances its current where that lags. since: the record's start, s.
 
     The settled current of a sample is held for the interval before it, and the interval's mean current is given: of a
     settled current that rises evenly it lags behind by the winding's time constant.
@@ -111,4 +114,4 @@ def _motor_torque(
         excess = state[CURRENT] - current
         state[CURRENT] = current + excess * (1.0 - turns * share)
         current += excess * share
-    return joint[at.GEAR] * torque_constant(joint) * current
+    return joint[at.GEAR] * torque_constant(joint) * current, rise

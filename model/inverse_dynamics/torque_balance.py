@@ -67,7 +67,8 @@ class TorqueBalance:
 
         It is the drive that is predicted from the motion, and not the motion from the drive: an effect that makes the
         drive act less would otherwise make the residual smaller by itself. For the same reason it is told as a torque
-        of the drive that the machine file states, whatever the fitted resistance, magnet and gear ratio make of a volt.
+        of the drive that the machine file states, whatever the fitted resistance, its warming, magnet and gear ratio
+        make of a volt.
 
         values: of the model's parameters, and of `drive_timing.timing_unknowns`, by name.
         """
@@ -98,9 +99,10 @@ class TorqueBalance:
                 levels[i],
                 gravity[i],
             )
-            torque = self._missing(driven, motion.acceleration, needed[i], joints)
+            torque, rise = self._missing(driven, motion.acceleration, needed[i], joints)
             torque = subtract_held(torque, friction_at_rest(levels[i], motion, joints), record)
-            result.append(record.subtract_unknown(record.compared(torque * self._told_per_torque(joints))))
+            told = torque * (1.0 + rise) * self._told_per_torque(joints)
+            result.append(record.subtract_unknown(record.compared(told)))
         return result
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:
@@ -175,12 +177,15 @@ class TorqueBalance:
             ),
         )[index]
 
-    def _missing(self, driven: kernel.DrivenMotion, acceleration: Floats, needed: Floats, joints: Floats) -> Floats:
-        """Torque needed of the motors less torque that they were driven with (k, n)."""
+    def _missing(
+        self, driven: kernel.DrivenMotion, acceleration: Floats, needed: Floats, joints: Floats
+    ) -> tuple[Floats, Floats]:
+        """Torque needed of the motors less torque that they were driven with (k, n), and the relative rise (k, n) of
+        their windings' resistance."""
         flags, speed, time = self.model.flags, driven.speed, driven.time
         numbers = kernel.JointNumbers(joints, flags, self._own)
-        motor, other = np.empty_like(needed), np.empty_like(needed)
-        kernel.supplied_torque(driven, numbers, motor, other)
+        motor, other, rise = (np.empty_like(needed) for _ in range(3))
+        kernel.supplied_torque(driven, numbers, motor, other, rise)
         asked = needed - other
         if flexible := [j for j in range(len(flags)) if flags[j] & at.HAS_FLEXIBILITY]:
             rotor_speed, needed = speed.copy(), needed.copy()
@@ -189,10 +194,10 @@ class TorqueBalance:
                 rotor_speed[:, j] += extra
                 inertia = joints[j, at.ROTOR_INERTIA] * joints[j, at.GEAR] ** 2
                 needed[:, j] += inertia * (acceleration[:, j] + derivative(extra, time[1] - time[0]))
-            kernel.supplied_torque(driven._replace(rotor_speed=rotor_speed), numbers, motor, other)
+            kernel.supplied_torque(driven._replace(rotor_speed=rotor_speed), numbers, motor, other, rise)
             asked = needed - other
         asked = _before_losses(asked, driven.contact, joints)
-        return asked - motor + _lost_in_dead_zone(asked, speed, joints)
+        return asked - motor + _lost_in_dead_zone(asked, speed, joints), rise
 
 
 def levels_along(model: Model, record: RecordedMotion) -> Floats:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.signal import savgol_coeffs, savgol_filter
 
@@ -52,8 +53,8 @@ LEAST_REMOVED = 0.5
 LEAST_TORQUE = 0.1
 """Least torque of gravity on any joint, as a share of the drive's, from which records tell its direction."""
 OUT_OF_SCALE = 100.0
-"""Ratio of the torque that a drive gives to that which its motion needs, or its inverse, from which it is of another
-unit: mA for A make it a thousand, and sound rigs 0.6 to 4.6 times what is needed."""
+"""Factor of what the bodies need, or its inverse, from which a drive is of another unit: mA for A make it a thousand,
+and sound rigs 0.2 to 13."""
 
 
 @dataclass(frozen=True)
@@ -130,9 +131,20 @@ def balance(model: Model, motion: Motion) -> Balance | None:
 
 
 @dataclass(frozen=True)
+class Factors:
+    """What the drive gives of a joint's torque, in times of what the machine file's bodies need: of all of it, of what
+    accelerates them, and of their weight; and of the motor's braking, with friction. None where it is not clear."""
+
+    whole: float | None = None
+    inertia: float | None = None
+    weight: float | None = None
+    braking: float | None = None
+
+
+@dataclass(frozen=True)
 class _Torques:
     """Torques (k, n) along a motion: given by the drive, needed without and with back-EMF, that of weight, the change
-    of the given one in a sample; and speeds."""
+    of the given one in a sample; speeds and positions."""
 
     given: Floats
     needed: Floats
@@ -140,6 +152,7 @@ class _Torques:
     weight: Floats
     rate: Floats
     speed: Floats
+    position: Floats
 
 
 def _torques(model: Model, motion: Motion, width: int) -> _Torques:
@@ -159,74 +172,85 @@ def _torques(model: Model, motion: Motion, width: int) -> _Torques:
     needed = inverse_dynamics_along(chain, position, speed, acceleration)
     braked = needed + gain * joints[:, at.GEAR] * joints[:, at.BACK_EMF] * speed
     rate = smooth(motion.drive, 1) * gain * motion.period
-    return _Torques(given, needed, braked, gravity_along(chain, position), rate, speed)
+    return _Torques(given, needed, braked, gravity_along(chain, position), rate, speed, position)
 
 
-def time_ratios(model: Model, motion: Motion) -> list[float | None]:
-    """Of each joint, how many times too long times are for drive and motion to belong together; None where that is not
-    clear. It is told by what accelerates the bodies: weight has a factor of its own, and friction of any size, back-EMF
-    and a constant are free.
+def factors(model: Model, motion: Motion) -> list[Factors]:
+    """How many times the torques of the machine file's bodies the drive gives, by joint.
 
-    Times that are r times too long make accelerations r² times too small (r times, where speeds are measured).
+    Friction of any size, back-EMF, a spring and a constant are free: a large part of the torque may be theirs, and says
+    nothing of units.
     """
     width = _width(motion)
     if width is None:
-        return [None] * motion.position.shape[1]
+        return [Factors()] * motion.position.shape[1]
     torques = _torques(model, motion, width)
-    inertial = torques.needed - torques.weight
-    power = 0.5 if motion.speed is None else 1.0
-    factors = [
-        _factor(torques.given[:, j], inertial[:, j], torques.weight[:, j], torques.speed[:, j], width)
-        for j in range(inertial.shape[1])
-    ]
-    return [None if factor is None else factor**power for factor in factors]
+    return [_factors_of(torques, j, width) for j in range(motion.position.shape[1])]
 
 
-def _factor(given: Floats, inertial: Floats, weight: Floats, speed: Floats, width: int) -> float | None:
+def _factors_of(torques: _Torques, joint: int, width: int) -> Factors:
+    given, needed, weight = (part[:, joint] for part in (torques.given, torques.needed, torques.weight))
+    speed, position = torques.speed[:, joint], torques.position[:, joint]
     size = float(np.sqrt(np.mean(speed**2)))
-    scale = float(np.sqrt(np.mean((inertial - inertial.mean()) ** 2)))
-    if size == 0.0 or scale == 0.0:
-        return None
-    columns = [inertial / scale, np.tanh(speed / size / 0.05), speed / size]
-    columns += [weight] if np.ptp(weight) > 0.0 else []
-    table = np.column_stack([column - column.mean() for column in columns])
-    level = given - given.mean()
-    line, _, rank, _ = np.linalg.lstsq(table, level, rcond=None)
+    if size == 0.0:
+        return Factors()
+    braking = torques.braked[:, joint] - needed
+    told = {"inertia": needed - weight, "weight": weight, "braking": braking}
+    told = {name: part for name, part in told.items() if name == "inertia" or np.ptp(part) > 0.0}
+    free = [np.tanh(speed / size / 0.05)] + ([position] if np.ptp(position) > 0.0 else [])
+    (whole,) = _clear(given, [needed], [*free, speed], width)
+    free += [] if "braking" in told else [speed]
+    return Factors(whole, **dict(zip(told, _clear(given, [*told.values()], free, width), strict=True)))
+
+
+def _clear(given: Floats, parts: list[Floats], free: list[Floats], width: int) -> list[float | None]:
+    """The factor of each part in a torque (k,) beside free ones; None where it is not clear."""
+    level = [column - column.mean() for column in (*parts, *free)]
+    scales = [float(np.sqrt(np.mean(column**2))) for column in level]
+    if 0.0 in scales:
+        return [None] * len(parts)
+    table = np.column_stack([column / scale for column, scale in zip(level, scales, strict=True)])
+    line, _, rank, _ = np.linalg.lstsq(table, given - given.mean(), rcond=None)
     if rank < table.shape[1]:
-        return None
-    spread = float(np.mean((level - table @ line) ** 2)) * width
-    deviation = float(np.sqrt(spread * np.linalg.inv(table.T @ table)[0, 0]))
-    return float(line[0]) / scale if line[0] > CLEAR * deviation else None
+        return [None] * len(parts)
+    spread = float(np.mean((given - given.mean() - table @ line) ** 2)) * width
+    deviations = np.sqrt(spread * np.diag(np.linalg.inv(table.T @ table)))
+    return [float(line[k]) / scales[k] if line[k] > CLEAR * deviations[k] else None for k in range(len(parts))]
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:
     """The one of `ways` (keys of WAYS) to read the columns of a joint (its place; None: of all) that explains most of a
-    balance which does not hold as recorded; None where it holds, or none explains it."""
+    balance which does not hold as recorded; None where it holds, or none explains it.
+
+    No joint whose drive and motion belong together as recorded may lose that: its torque depends on how the others
+    move, and times are those of all.
+    """
     found = balance(model, motion)
     if found is None:
         return None
     whole = _total(found, joint)
     if not whole > UNLIKE**2:
         return None
-    left = {way: _believable(balance(model, changed), joint) for way, changed in _changed(motion, joint, ways)}
+    sound = found.shares <= UNLIKE**2
+    left = {way: _left_by(model, changed, joint, sound) for way, changed in _changed(motion, joint, ways)}
     best = min(left, key=lambda way: left[way], default=None)
     return best if best is not None and left[best] < EXPLAINS * whole else None
 
 
-def _total(found: Balance | None, joint: int | None) -> float:
-    if found is None:
-        return np.inf
-    shares = found.shares
-    return float(shares.mean() if joint is None else shares[joint])
+def _total(found: Balance, joint: int | None) -> float:
+    return float(found.shares.mean() if joint is None else found.shares[joint])
 
 
-def _believable(found: Balance | None, joint: int | None) -> float:
-    """The same of another way to read a record; infinite where nearly all of the drive would go into friction, which
-    any drive along the motion may."""
-    if found is None:
+def _left_by(model: Model, changed: Motion, joint: int | None, sound: NDArray[np.bool_]) -> float:
+    """What another way to read a record leaves; infinite where nearly all of the drive would go into friction, which
+    any drive along the motion may, where friction would brake the motion as well without any drive, or where a joint
+    that was sound (n,) is not."""
+    found, idle = balance(model, changed), balance(model, replace(changed, drive=np.zeros_like(changed.drive)))
+    if found is None or idle is None or (found.shares[sound] > UNLIKE**2).any():
         return np.inf
+    left = _total(found, joint)
     given, needed = (float(np.sum(one if joint is None else one[joint])) for one in (found.given, found.needed))
-    return np.inf if given > MOST_FRICTION**2 * needed else _total(found, joint)
+    return np.inf if given > MOST_FRICTION**2 * needed or left > EXPLAINS * _total(idle, joint) else left
 
 
 def _changed(motion: Motion, joint: int | None, ways: Sequence[str]) -> Iterator[tuple[str, Motion]]:
@@ -267,12 +291,10 @@ WAYS: dict[str, Callable[[Motion, list[int]], Motion]] = {
     "thousands": _scaled("drive", 1e3),
     "drive-sign": _scaled("drive", -1.0),
     "milliseconds": _slower(1e-3),
-    "half-times": _slower(0.5),
-    "double-times": _slower(2.0),
     "position-drive": _exchanged,
 }
 """Ways to read a record, or its machine file, otherwise than it stands."""
-OF_ALL = frozenset(["milliseconds", "half-times", "double-times"])
+OF_ALL = frozenset(["milliseconds"])
 """Ways that are of the whole record."""
 
 

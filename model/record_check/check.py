@@ -19,11 +19,13 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.record_check.columns import column_findings
-from model.record_check.finding import FindingKind, RecordFinding
+from model.record_check.drives import drive_findings
+from model.record_check.finding import FindingKind, RecordFinding, doubts_in
 from model.record_check.readings import (
     FalseReadings,
     Jump,
     find_bounds,
+    find_bursts,
     find_gaps,
     find_jumps,
     is_bridged,
@@ -33,6 +35,8 @@ from model.record_check.readings import (
 )
 from model.record_check.words import at_times, number, times_of
 
+FEWEST = 3
+"""Least samples of a record that shows a motion."""
 ON_EARTH = (9.76, 9.84)
 """Least and largest gravity on the ground, m/s²: on a mountain at the equator, and at a pole, rounded outwards."""
 Loop = Literal["closed", "open"]
@@ -53,11 +57,22 @@ def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding,
     """
     found = list(_on_machine(model.machine, traces))
     for trace in traces:
-        if len(trace) >= 3 and all(j in trace.joints for j in model.machine.modelled_joints):
-            readings = list(_on_readings(trace, model.machine))
-            found += readings
-            found += column_findings(repaired(trace, model.machine), model)
+        if len(trace) < FEWEST:
+            found.append(_short(trace))
+        elif all(j in trace.joints for j in model.machine.modelled_joints):
+            bursts = list(_on_bursts(trace))
+            found += bursts or [
+                *_on_readings(trace, model.machine),
+                *_on_columns(repaired(trace, model.machine), model),
+            ]
     return tuple(found)
+
+
+def _on_columns(trace: Trace, model: Model) -> Iterator[RecordFinding]:
+    columns = column_findings(trace, model)
+    yield from columns
+    if not doubts_in(columns):
+        yield from drive_findings(trace, model)
 
 
 def repaired(trace: Trace, machine: Machine) -> Trace:
@@ -162,6 +177,36 @@ def _on_readings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
         yield from _on_jumps(trace, machine, joint)
         yield from _on_bounds(trace, machine, joint)
     yield from _on_units(trace, machine)
+
+
+def _short(trace: Trace) -> RecordFinding:
+    return RecordFinding(
+        kind="short",
+        consequence="fatal",
+        record=trace.called,
+        value=float(len(trace)),
+        allowed=float(FEWEST),
+        unit="1",
+        says=f"{times_of(len(trace), 'sample')}; at least {FEWEST} are needed.",
+    )
+
+
+def _on_bursts(trace: Trace) -> Iterator[RecordFinding]:
+    """Stamps of arrival, which move each reading by up to a burst: all else that is told by times would follow."""
+    found = find_bursts(trace.time)
+    if found is not None:
+        yield RecordFinding(
+            kind="bursts",
+            consequence="doubt",
+            record=trace.called,
+            value=found[0],
+            allowed=found[1],
+            unit="s",
+            says=f"its times come in bursts, {number(1e3 * found[0])} ms or a multiple of it apart: they are stamps of "
+            "arrival at a buffer, not of measurement.",
+            advice="Stamp at the device, or set the latency timer of a USB serial adapter (FTDI: 16 ms) to 1 ms. Of "
+            f"evenly sampled rows, write their number times the period ({number(found[1])} s on average) as times.",
+        )
 
 
 def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:

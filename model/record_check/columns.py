@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +17,12 @@ from model.record_check.balance import (
     OUT_OF_SCALE,
     UNLIKE,
     WAYS,
+    Factors,
     Motion,
     balance,
+    factors,
     likelier,
     motion_of,
-    time_ratios,
 )
 from model.record_check.finding import FindingKind, RecordFinding
 from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
@@ -41,6 +42,13 @@ LEADS = 1.5
 asked."""
 FOLLOWS = 0.3
 """Least correlation of set point less position with the speed, for a lead to be told."""
+
+
+UNITS = {"N": {"lbf": 4.448, "kgf": 9.807}, "N·m": {"lbf·in": 0.113, "kgf·cm": 0.09807, "N·cm": 0.01}}
+"""Other units of a drive, in those that it may be stated in."""
+THOUSANDS = {"thousandths of its unit (mA for A)": 1e-3, "thousands of its unit": 1e3}
+RATIOS = (1e3, 3.0, 2.0, 1.5, 0.5)
+"""Times as long as they were that are looked for: ms, and clocks or periods of another speed."""
 
 
 def column_findings(trace: Trace, model: Model) -> tuple[RecordFinding, ...]:
@@ -202,13 +210,8 @@ class _Witnesses:
                 yield self._of_way(way, joint)
                 return
         if not holds:
-            scales = list(self._out_of_scale(motion))  # a drive of another unit asks for another inertia as well
-            stretched = self._stretched(motion) if not scales else None
-            if stretched is not None:
-                yield stretched
-                return
-            yield from scales
-            yield from self._behind(motion)
+            scales = self._other_units(motion)
+            yield from scales or self._behind(motion)
         if not isinstance(self.model.machine.controller, NoController) and not holds:
             for joint in joints:
                 if self._leads(joint):
@@ -228,25 +231,37 @@ class _Witnesses:
                 advice = f"Move the drive up by {rows}, if each row is read at one moment."
                 yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
 
-    def _stretched(self, motion: Motion) -> RecordFinding | None:
-        """Times that are another unit's, or a clock's of another speed, told by what accelerates the bodies: friction
-        and back-EMF may take nearly all of the torque. A load that nobody stated would do the same as a slow clock."""
-        ratios = [found for found in time_ratios(self.model, motion) if found is not None]
-        for ratio, sure in ((1e3, True), (2.0, False), (0.5, False)):
-            if ratios and all(_near(found, ratio) for found in ratios):
-                says = "drive and motion ask for another inertia than the machine file's, as if times were false."
-                advice = f"Are times {ratio:g} times as long as they were{', as in ms' if sure else ''}? They are in s."
-                return self._doubt("time-scale", None, says, advice, value=ratio, allowed=1.0, sure=sure)
-        return None
+    def _other_units(self, motion: Motion) -> list[RecordFinding]:
+        """Drives or times of another unit, or a clock's of another speed, told by the torques of the bodies: friction
+        may take nearly all of the drive. A load that nobody stated would do the same as a slow clock."""
+        joints = self.model.machine.modelled_joints
+        found = factors(self.model, motion)
+        known = [one for one in found if one.inertia is not None]
+        named = {unit for joint in joints for unit in self.model.machine.joint(joint).drive_units}
+        units = {**THOUSANDS, **(UNITS.get(next(iter(named)), {}) if len(named) == 1 else {})}
+        power = 2 if motion.speed is None else 1
+        ways: dict[str | float, Factors] = {unit: Factors(*[1 / size] * 4) for unit, size in units.items()}
+        ways |= {ratio: Factors(None, ratio**power, 1.0, ratio ** (power - 1)) for ratio in RATIOS}
+        near = {way: apart for way, made in ways.items() if (apart := _apart(known, made)) is not None}
+        if not near:
+            return list(self._out_of_scale(motion, found))
+        value = min(near, key=lambda way: near[way])
+        if isinstance(value, str):
+            says = f"drive and motion belong together if the drive is in {value}."
+            return [self._doubt("drive-scale", None, says, "Check the unit of the drive.")]
+        says = "drive and motion ask for another inertia than the machine file's: of a load, or times are false."
+        unit = ", as in ms" if value == 1e3 else ""
+        advice = f"Are times {value:.3g} times as long as they were{unit}? They are in s."
+        return [self._doubt("time-scale", None, says, advice, value=value, allowed=1.0, sure=bool(unit))]
 
-    def _out_of_scale(self, motion: Motion) -> Iterator[RecordFinding]:
-        found = balance(self.model, motion)
-        if found is None:
-            return
+    def _out_of_scale(self, motion: Motion, found: Sequence[Factors]) -> Iterator[RecordFinding]:
+        balanced = balance(self.model, motion)
         for place, joint in enumerate(self.model.machine.modelled_joints):
-            given, needed = math.sqrt(found.given[place]), math.sqrt(found.needed[place])
-            if given > 0.0 and needed > 0.0 and not 1 / OUT_OF_SCALE < given / needed < OUT_OF_SCALE:
-                yield self._scale(joint, given / needed, "the torque that the recorded motion needs")
+            factor = found[place].whole
+            if balanced is not None and balanced.needed[place] > OUT_OF_SCALE**2 * balanced.given[place] > 0.0:
+                factor = math.sqrt(balanced.given[place] / balanced.needed[place])  # friction takes no less
+            if factor is not None and not 1 / OUT_OF_SCALE < factor < OUT_OF_SCALE:
+                yield self._scale(joint, factor, "the torque that the recorded motion needs")
 
     def _of_way(self, way: str, joint: int | None) -> RecordFinding:
         kind, says, advice = _WAY_WORDS[way]
@@ -311,22 +326,32 @@ _WAY_WORDS: dict[str, tuple[FindingKind, str, str]] = {
         "Check the sign of the drive, the direction of positions, and `gear_ratio`.",
     ),
     "milliseconds": ("time-scale", "drive and motion belong together if times are in ms.", "Convert times to s."),
-    "half-times": (
-        "time-scale",
-        "drive and motion belong together if times are half as long.",
-        "Check the times: they are in s.",
-    ),
-    "double-times": (
-        "time-scale",
-        "drive and motion belong together if times are twice as long.",
-        "Check the times: they are in s.",
-    ),
     "position-drive": (
         "columns-swapped",
         "drive and motion belong together if position and drive are exchanged.",
         CHECK_COLUMNS,
     ),
 }
+
+
+def _apart(found: Sequence[Factors], expected: Factors) -> float | None:
+    """How far factors are from those of another unit, as a logarithm; None where they are not near, or not known. The
+    motor's braking counts beside them: friction that nobody stated may add to it."""
+    pairs = [
+        (value, other)
+        for one in found
+        for value, other in (
+            (one.whole, expected.whole),
+            (one.inertia, expected.inertia),
+            (one.weight, expected.weight),
+        )
+        if value is not None and other is not None
+    ]
+    if not pairs or not all(_near(value, other) for value, other in pairs):
+        return None
+    assert expected.braking is not None
+    braking = [abs(math.log(one.braking / expected.braking)) for one in found if one.braking is not None]
+    return max(abs(math.log(value / other)) for value, other in pairs) + max(braking, default=0.0)
 
 
 def _near(factor: float, unit: float) -> bool:

@@ -10,6 +10,7 @@ from daq.contracts.frozen import FrozenRecord
 Consequence = Literal["fatal", "doubt", "note"]
 """fatal: nothing can be computed. doubt: an answer would be of the record's fault. note: to be known."""
 FindingKind = Literal[
+    "bursts",
     "columns-swapped",
     "drive-late",
     "drive-scale",
@@ -22,6 +23,7 @@ FindingKind = Literal[
     "no-sensor",
     "position-unit",
     "saturated",
+    "short",
     "spikes",
     "stuck",
     "time-scale",

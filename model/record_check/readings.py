@@ -27,6 +27,8 @@ KINK = 2.0
 turns round in the middle of it gives half of that."""
 LEAST_COUNTS = 4.0
 """Least false step, in steps of the sensor: rounding alone makes two."""
+EARLY_OR_LATE = 1.0
+"""Intervals by which a bus, or the clock of a stamp, may shift one reading: what a joint moves meanwhile is no jump."""
 RETURNS = 3
 """Samples within which a spike returns."""
 STUCK = 5
@@ -35,6 +37,12 @@ ENTRY = 3
 """Intervals before a bound, in each of which a reading that is cut off there moves on."""
 MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
+BURST = 0.25
+"""Most of the mean interval that lies between the stamps of one burst: no sampler is so uneven."""
+ON_GRID = 0.1
+"""Most that bursts are apart beside whole times of one interval, in that interval."""
+MOST_OFF_GRID = 0.05
+"""Share of bursts that may be further off: stamps of a busy computer."""
 BRIDGED = (10.0, 0.05)
 """Longest gap that is bridged: so many intervals, and so many seconds more; a joint goes on as it did."""
 
@@ -80,19 +88,27 @@ def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
     outside = np.maximum(0.0, np.maximum(rate[1:-1] - above, below - rate[1:-1]))
     apart = intervals > MISSING * usual
     outside[apart[:-2] | apart[1:-1] | apart[2:]] = 0.0
-    line = float(np.quantile(outside, 1 - TAIL))
-    tail = np.sort(outside)[-max(1, round(TAIL * len(outside))) :]
-    spread = float(np.median(tail - line)) / np.log(2.0)
-    noise = line + spread * float(np.log(TAIL * len(outside) / FALSE_DOUBTS))
     kink = KINK * float(np.abs(np.diff(median_filter(rate, ISOLATED, mode="nearest"))).max())
     moved = np.abs(np.diff(reading))
     rounding = max(step, float(moved[moved > 0.0].min(initial=np.inf)) if moved.any() else 0.0)
-    allowed = max(noise + kink, LEAST_COUNTS * rounding)
+    allowed = max(_most_of_noise(outside, rounding) + kink, LEAST_COUNTS * rounding)
     found = []
     for k in np.flatnonzero(outside > allowed):
-        moved_by_itself = float(np.median(rate[max(0, k - 2) : k + 5]) * intervals[k + 1] / usual)
-        found.append(Jump(int(k) + 1, float(reading[k + 2] - reading[k + 1]) - moved_by_itself, allowed))
+        usually = float(np.median(rate[max(0, k - 2) : k + 5]))
+        if outside[k] > allowed + EARLY_OR_LATE * abs(usually):
+            size = float(reading[k + 2] - reading[k + 1]) - usually * float(intervals[k + 1]) / usual
+            found.append(Jump(int(k) + 1, size, allowed))
     return found
+
+
+def _most_of_noise(outside: Floats, rounding: float) -> float:
+    """The most that noise makes of these (k,), whose tail is taken for an exponential one. A rounded value stands for
+    any within its step: the steps alone have no tail."""
+    spreading = np.random.default_rng(0).uniform(-0.5, 0.5, len(outside))
+    spread = np.sort(outside + rounding * spreading)
+    tail = spread[-max(1, round(TAIL * len(spread))) :]
+    scale = float(np.median(tail) - tail[0]) / math.log(2.0)
+    return float(tail[0]) + scale * math.log(TAIL * len(outside) / FALSE_DOUBTS)
 
 
 def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -> FalseReadings:
@@ -140,6 +156,26 @@ def find_bounds(reading: Floats) -> list[tuple[int, int]]:
             if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
                 found.append((int(first), int(last)))
     return sorted(found)
+
+
+def find_bursts(time: Floats) -> tuple[float, float] | None:
+    """The interval (s) after which a buffer is emptied, and the mean interval of samples, where stamps are those of
+    arrival: several at once, and bursts on a grid. None where they are not."""
+    intervals = np.diff(time)
+    mean = float(intervals[intervals <= np.quantile(intervals, 0.99)].mean())
+    begins = intervals > BURST * mean
+    if int((~begins).sum()) < max(STUCK, 0.01 * len(intervals)) or int(begins.sum()) < 2 * STUCK:
+        return None
+    between = np.diff(time[1:][begins])
+    # whole times of one interval: of the shortest between bursts, or a half or a third of it
+    shortest = float(np.quantile(between, MOST_OFF_GRID))
+    near = between[between < 1.5 * shortest]
+    for parts in (1, 2, 3):
+        grid = float(np.median(near)) / parts
+        apart = np.abs(between / grid - np.round(between / grid))
+        if grid > BURST * mean and float(np.mean(apart > ON_GRID)) <= MOST_OFF_GRID:
+            return grid, mean
+    return None
 
 
 def find_gaps(time: Floats) -> list[tuple[int, float]]:

@@ -32,6 +32,7 @@ VERDICTS = {
     "nothing-significant": "nothing significant",
     "named": "named",
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
+    "partly": "partly: an effect is named, and something else is missing",
     "suspected": "suspected: more of this motion would settle it",
     "unknown-effect": "an effect that is not among the known ones",
     "check-the-record": "check the record",

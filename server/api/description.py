@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import threading
 from concurrent.futures import Future
+from contextlib import suppress
 from functools import cache
 from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, Request, Response
@@ -23,6 +28,10 @@ FIRST_ERROR = 400
 IN_COMPONENTS = "#/components/schemas/{model}"
 AFTER = 5.0
 """Time (s) after the start of the service at which the description is built: not while others start beside it."""
+KEPT = "openapi.json"
+"""File in the service's folder with the description that was built last: a digest in its first line, then the text."""
+PACKAGES = ("daq", "firmware_protocol", "model", "server")
+"""Where the description's models, words and examples come from."""
 Document = dict[str, Any]
 
 
@@ -39,10 +48,11 @@ def install(app: FastAPI) -> None:
 
 class Described:
     """The description, encoded once by a thread, since that takes seconds. The end of the service does not wait for
-    it."""
+    it. In `kept` it stays for the next start, until a file of this program changes."""
 
-    def __init__(self, app: FastAPI) -> None:
+    def __init__(self, app: FastAPI, kept: Path | None = None) -> None:
         self._app = app
+        self._kept = kept
         self._beginning = threading.Lock()
         self._encoded: Future[bytes] | None = None
         self._later = threading.Timer(AFTER, self.begin)
@@ -72,15 +82,55 @@ class Described:
 
     def _encode(self, encoded: Future[bytes]) -> None:
         try:
-            text = json.dumps(self._app.openapi(), ensure_ascii=False, separators=(",", ":"))
-            encoded.set_result(text.encode())
+            digest = b"" if self._kept is None else sources_digest()
+            text = self._read(digest)
+            if text is None:
+                text = json.dumps(self._app.openapi(), ensure_ascii=False, separators=(",", ":")).encode()
+                self._keep(digest, text)
+            encoded.set_result(text)
         except Exception as error:  # noqa: BLE001 - whoever waits is told
             encoded.set_exception(error)
 
+    def _read(self, digest: bytes) -> bytes | None:
+        """What is kept, if it was made of the same files."""
+        if self._kept is None:
+            return None
+        try:
+            made_of, _, text = self._kept.read_bytes().partition(b"\n")
+        except OSError:
+            return None
+        made_of, _, sum_of_text = made_of.partition(b" ")
+        return text if made_of == digest and sum_of_text == _sum(text) else None
 
-def serve(app: FastAPI, address: str) -> Described:
+    def _keep(self, digest: bytes, text: bytes) -> None:
+        if self._kept is None:
+            return
+        beside = self._kept.with_suffix(".new")
+        with suppress(OSError):  # it is built again at the next start
+            beside.write_bytes(digest + b" " + _sum(text) + b"\n" + text)
+            beside.replace(self._kept)
+
+
+def sources_digest() -> bytes:
+    """A digest of all that the description is made of: names, sizes and times of this program's files, and the versions
+    of the libraries that write it."""
+    digest = hashlib.sha256(repr([version(name) for name in ("fastapi", "pydantic", "ma2000-daq")]).encode())
+    for package in PACKAGES:
+        root = Path(str(files(package)))
+        for path in sorted(root.rglob("*.py")):
+            with suppress(OSError):
+                found = path.stat()
+                digest.update(f"{path.relative_to(root)} {found.st_size} {found.st_mtime_ns}\n".encode())
+    return digest.hexdigest().encode()
+
+
+def _sum(text: bytes) -> bytes:
+    return hashlib.sha256(text).hexdigest().encode()
+
+
+def serve(app: FastAPI, address: str, kept: Path | None = None) -> Described:
     """Serves the description at `address`, and a page on all kinds of problems at that of their types."""
-    described = Described(app)
+    described = Described(app, kept)
     app.add_route(address, described.get, include_in_schema=False)
 
     async def problems(_request: Request) -> Response:

@@ -235,7 +235,7 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "send a file as `daq fit` writes it",
     ),
     _met(".*", 429, "too-many", "too many requests", "ask less often"),
-    _met(".*", 503, "database", "the database: database is locked", "try again"),
+    _met(".*", 503, "database", "the database: locked by another program", "try again"),
     _met(
         "post .*/(traces|experiments|experiments/preview|schedules|gain)$",
         503,

@@ -126,7 +126,8 @@ def _checks(services: Services) -> dict[str, str]:
     for rig in services.robots():
         name = "traces" if len(services.robots()) == 1 else f"traces of {rig.robot.name}"
         checks[name] = _problem_of_folder(rig.catalogue.folder)
-        checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
+        arm = rig.robot.arm
+        checks[f"robot {rig.robot.name}"] = rig.robot.problem if arm is None else arm.unheard
     return checks
 
 

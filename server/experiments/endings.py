@@ -19,18 +19,18 @@ _OF_OUTCOME: dict[Outcome, Event] = {
 
 @dataclass(frozen=True)
 class Ending:
-    """How an experiment ended. `trace_not_in_catalogue`: its trace could not be added to the catalogue."""
+    """How an experiment ended. `left_out`: the answer whose trace could not be added to the catalogue at once."""
 
     event: Event
     reason: str
     outcome: Outcome | None = None
-    trace_not_in_catalogue: bool = False
+    left_out: Answer | None = None
 
     @property
     def pauses_queue(self) -> bool:
         """Whether a person must look at the arm before the next experiment runs: always, except after a completed plan
         whose trace is in the catalogue, or after a plan refused before anything moved."""
-        return self.trace_not_in_catalogue or self.event not in (Event.COMPLETED, Event.REFUSED)
+        return self.left_out is not None or self.event not in (Event.COMPLETED, Event.REFUSED)
 
 
 def ending_of(answer: Answer) -> Ending:

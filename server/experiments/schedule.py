@@ -13,6 +13,7 @@ from tzlocal import get_localzone_name
 from server.problems import ProblemError
 
 MOMENT = timedelta(microseconds=1)
+HOURS = 24
 FIELDS = 5
 """Minute, hour, day, month, weekday. A sixth field, of seconds, would let runs come too fast."""
 
@@ -90,17 +91,19 @@ def zone_here() -> str:
 def _after(cron: str, zone: str | None, moment: datetime) -> datetime | None:
     """Returns the first time after `moment` that fits. Where clocks are put forward, a time that is left out comes when
     they are; where they are put back, a time that comes twice counts once (unless the expression means every hour)."""
-    found = next(CronSim(_of_the_clock(cron), moment.astimezone(ZoneInfo(zone or "UTC"))), None)
+    wall = moment.astimezone(ZoneInfo(zone or "UTC"))
+    found = next(CronSim(_of_the_clock(cron, CronSim(cron, wall).hours), wall), None)
     return None if found is None else found.astimezone(UTC)
 
 
-def _of_the_clock(cron: str) -> str:
-    """The expression with the minutes and hours of a step such as `*/30` as a range, unless it means every hour. What
-    begins with a star is taken for time that passes, and would come twice, or not at all, when clocks change."""
-    minutes, hours, *days = cron.split()
-    if hours == "*":
-        return cron
-    return " ".join([minutes.replace("*", "0-59"), hours.replace("*", "0-23"), *days])
+def _of_the_clock(cron: str, hours: set[int]) -> str:
+    """The expression as CronSim takes it for the wall clock: with a star for `hours` that are all there are, however
+    they are written, else with the steps of minutes and hours as ranges. What begins with a star is taken for time that
+    passes, and would come twice, or not at all, when clocks change."""
+    minute, hour, *days = cron.split()
+    if len(hours) == HOURS:
+        return " ".join([minute, "*", *days])
+    return " ".join([minute.replace("*", "0-59"), hour.replace("*", "0-23"), *days])
 
 
 def _not_valid(field: str, line: str) -> ProblemError:

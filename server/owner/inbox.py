@@ -9,7 +9,7 @@ import math
 import os
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from pydantic import ValidationError
@@ -21,6 +21,7 @@ from server.owner.messages import (
     ORDER,
     Close,
     Finish,
+    Freeze,
     HaltRun,
     JogBegin,
     JogDrive,
@@ -42,11 +43,13 @@ class Inbox:
 
     closing: the service wants the port back, or has died
     finish:  the teaching under way must end in good order
+    freeze:  stops the arm at once and answers, on the inbox's thread
     """
 
     def __init__(self, descriptor: int) -> None:
         self.closing = threading.Event()
         self.finish = threading.Event()
+        self.freeze: Callable[[Freeze], None] = lambda _order: None
         self.guardian_end, self._to_guardian = os.pipe()
         self._input = os.fdopen(descriptor, "rb", closefd=False)
         self._waiting: queue.Queue[Long | Quick | None] = queue.Queue()
@@ -109,6 +112,8 @@ class Inbox:
         match order:
             case HaltRun():
                 self._end_what_runs(CANCEL)
+            case Freeze():
+                self.freeze(order)
             case Finish():
                 self.finish.set()
             case JogDrive():

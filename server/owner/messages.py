@@ -112,6 +112,12 @@ class HaltRun(FrozenRecord):
     kind: Literal["halt"] = "halt"
 
 
+class Freeze(_Request):
+    """Stops the arm, as the stop socket does. The answer's data are those of a `StopAnswer`; it comes at once."""
+
+    kind: Literal["freeze"] = "freeze"
+
+
 class ReadGains(_QuickRequest):
     """Reads P, I, D of all joints."""
 
@@ -171,6 +177,7 @@ Order = Annotated[
     | LeadBegin
     | Finish
     | HaltRun
+    | Freeze
     | ReadGains
     | WriteGains
     | ReadProcess
@@ -222,6 +229,8 @@ class ArmReport(FrozenRecord):
     counters: dict[str, float]
     stop: int | None = None
     """Number of the board's newest stop, 0 if there was none; None while it is not known, such as just after a stop."""
+    unheard: str = ""
+    """Why `daq stop` and the stop listener do not reach this process; empty where they do."""
 
 
 class TeachingText(FrozenRecord):

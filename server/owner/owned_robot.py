@@ -101,6 +101,7 @@ class OwnedRobot:
             link=self.controller.link.state.value,
             counters=counters,
             stop=self.newest_stop,
+            unheard=self.guardian.unheard,
         )
         if anew or report != self._told or self._due():
             self._told, self._told_at = report, time.monotonic()

@@ -15,7 +15,7 @@ from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 from server import logs
 from server.owner.inbox import Inbox
-from server.owner.messages import CannotOpen, Open, Opened
+from server.owner.messages import Answer, CannotOpen, Open, Opened
 from server.owner.owned_robot import OwnedRobot
 from server.owner.owner import serve
 from server.owner.watched_controller import WatchedController
@@ -75,5 +75,6 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
                 compact=Capability.COMPACT in identity.capabilities,
             )
         )
+        inbox.freeze = lambda order: speaker.say(Answer(number=order.number, data=session.guardian.stop().as_data()))
         with inbox.reading():
             serve(robot)

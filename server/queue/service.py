@@ -14,6 +14,7 @@ from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState, Schedule
 from daq.contracts.service.queue import QueueStatus
+from server.database_errors import is_locked
 from server.experiments.endings import Ending, ending_of
 from server.experiments.order import next_due
 from server.experiments.review import Given, Review
@@ -422,7 +423,8 @@ class QueueService:
         with self._lock:
             ending = self._with_stop_reason(ending, self._running)
             state = advance("running", ending.event)
-            why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
+            reason = _joined(ending.reason, "its trace is not in the catalogue yet" if ending.left_out else "")
+            why = f"{_ended_as(experiment, state)} ({reason}): look at the arm, then resume the queue"
             paused = ending.pauses_queue and self._pause(why)  # first, so that clients told of the end find it paused
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
@@ -442,16 +444,33 @@ class QueueService:
         if ended is None:
             return
         ending, state = ended.ending, advance("running", ended.ending.event)
+        reason = _joined(ending.reason, self._add_left_out(ending))
         try:
-            context.experiments.end(context.robot.name, ended.id, ending.event, ended.at, ending.reason, ending.outcome)
+            context.experiments.end(context.robot.name, ended.id, ending.event, ended.at, reason, ending.outcome)
         except (IllegalEventError, ProblemError):
             log.exception("experiment %s", ended.id)  # it has an end already, or was deleted: nothing to write
         self._ended = None
         what = "completed" if ending.event is Event.COMPLETED else state
-        context.record_event("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
-        context.ended(ended.id, state, ending.reason)
-        if ending.trace_not_in_catalogue:
-            context.add_unfinished_traces()  # the database can be written to again, so its folder can be read
+        context.record_event("experiment", f"{what}: {reason}".rstrip(": "), experiment=ended.id)
+        context.ended(ended.id, state, reason)
+
+    def _add_left_out(self, ending: Ending) -> str:
+        """Adds the trace that could not be added at once. Returns a line if it cannot be now. Raises DatabaseError
+        while the database is locked: nothing else can be written either."""
+        if ending.left_out is None:
+            return ""
+        try:
+            if ending.left_out.finished is None:
+                self._context.add_unfinished_traces()
+            else:
+                self._context.add_trace(ending.left_out)
+        except Exception as error:
+            if is_locked(error):
+                raise
+            log.exception("its trace")
+            self._context.add_unfinished_traces()  # whatever else of its folder can be read
+            return "its trace is not in the catalogue: see the log"
+        return ""
 
     def _run(self, experiment: Experiment) -> Ending:
         """Runs an experiment, and returns how it ended. Raises any error that prevents or loses it."""
@@ -479,8 +498,7 @@ class QueueService:
                 context.add_unfinished_traces()
         except Exception:
             log.exception("experiment %s: its trace", experiment.id)
-            line = "its trace is not in the catalogue: see the log"
-            return replace(ending, reason=f"{ending.reason}; {line}".removeprefix("; "), trace_not_in_catalogue=True)
+            return replace(ending, left_out=found)
         return ending
 
     def _await(self, answer: Future[Answer]) -> Answer:
@@ -504,6 +522,10 @@ class QueueService:
         if running is not None and running.cancelled_by is not None:
             return replace(ending, reason=f"cancelled by {running.cancelled_by}")
         return ending
+
+
+def _joined(*lines: str) -> str:
+    return "; ".join(line for line in lines if line)
 
 
 def _ended_as(experiment: Experiment, state: ExperimentState) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import logging
+import select
 import subprocess
 import sys
 import threading
@@ -12,13 +13,16 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
+from daq.acquisition.stop_socket import StopAnswer
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
-from server.owner.messages import REPORT, Answer, Close, Open, Order, Report
+from server.owner.messages import REPORT, Answer, Close, Freeze, Open, Order, Report
 
 GRACE = 4.0
 """Time (s) for the process to freeze the arm and close its trace when the service ends. If it needs longer it finishes
 alone, as the unit in deploy/ allows."""
+STOPS_WITHIN = 1.0
+"""Time (s) for the answer to a stop, as at the stop socket."""
 log = logging.getLogger("server.robot")
 
 
@@ -78,6 +82,17 @@ class OwnerProcess:
             self._asked[number] = future
         self.send(kind(number=number, **fields))
         return future
+
+    def stop(self) -> StopAnswer | None:
+        """Stops the arm through the pipe of orders, for which no file need be there. Returns None without an answer
+        within STOPS_WITHIN. Call it on a thread that may wait."""
+        assert self._process.stdin is not None
+        try:
+            if not select.select([], [self._process.stdin], [], 0)[1]:
+                return None  # full, since the process does not read: writing would wait for it
+            return StopAnswer.from_data(self.ask(Freeze).result(STOPS_WITHIN).data)
+        except (OwnerGoneError, OSError, ValueError):  # a time-out is an OSError
+            return None
 
     def close(self, patience: float = GRACE) -> bool:
         """Frees the port. Returns whether the process has ended within `patience` s."""

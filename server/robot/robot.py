@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from daq.acquisition.messages import EventHappened, Progress
+from daq.acquisition.stop_socket import StopAnswer
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import ConnectionState, RobotIdentity
@@ -169,7 +170,7 @@ class Robot:
 
     def reach(self) -> Reach:
         """Returns how the robot can be reached for a stop."""
-        return Reach(self.name, self.place.url, self.owner_pid, self._terminal)
+        return Reach(self.name, self.place.url, self.owner_pid, self._terminal, self._stop_by_pipe)
 
     def require_same_place(self) -> None:
         """Raises ReachError if another program has got the port's number meanwhile: nothing may be sent there."""
@@ -207,6 +208,10 @@ class Robot:
             told = {"arm": "stopped", "cause": "a stop that the board has confirmed", "stop": None}
             stopped = arm.model_copy(update=told)
             self._arm = Seen(stopped, self.clock.monotonic())
+
+    def _stop_by_pipe(self) -> StopAnswer | None:
+        owner = self._owner
+        return None if owner is None else owner.stop()
 
     def _begin(self) -> None:
         place = self.place

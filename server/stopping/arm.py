@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from daq.acquisition.port_stop import stop_at_port
@@ -15,12 +15,14 @@ from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, 
 @dataclass(frozen=True)
 class Reach:
     """How to reach a robot. `owner`: the process that owns its port, None if there is none; `terminal`: the
-    pseudo-terminal at which it was reached, if it is a mock's."""
+    pseudo-terminal at which it was reached, if it is a mock's; `ask`: stops through the owner's pipe, and returns None
+    without an answer; the service alone has it."""
 
     robot: str
     url: str
     owner: int | None = None
     terminal: Terminal | None = None
+    ask: Callable[[], StopAnswer | None] | None = None
 
 
 def stop_arm(reach: Reach) -> StopResult:
@@ -69,17 +71,27 @@ def _in_detail(results: Mapping[str, StopResult]) -> str:
 
 
 def _ask(reach: Reach) -> StopAnswer:
+    """Asks at the stop socket; where nobody answers there, by the owner's pipe; where nobody owns it, at the port."""
+    why = ""
     try:
         attempts = request_stop(reach.robot, reach.owner)
     except OSError as error:  # for example, too many files are open for another socket
-        return _undelivered(reach, f"the process that owns the port cannot be asked: {error.strerror or error}")
-    if attempts:
-        silent = _undelivered(reach, "the process that owns the port did not answer")
-        answers = [attempt.answer or silent for attempt in attempts]
+        attempts, why = [], f"the process that owns the port cannot be asked: {error.strerror or error}"
+    answers = [attempt.answer for attempt in attempts if attempt.answer is not None]
+    if len(answers) < len(attempts):
+        why = "the process that owns the port did not answer"
+    elif answers:
         return next((answer for answer in answers if not answer.confirmed), answers[0])
+    if reach.ask is not None and (answer := reach.ask()) is not None:
+        return answer
+    return _undelivered(reach, why) if why else _ask_port(reach)
+
+
+def _ask_port(reach: Reach) -> StopAnswer:
     port = parse_port_url(reach.url)
     if reach.url.startswith("mock://"):
-        return _undelivered(reach, "no robot is connected")
+        lost = "the process that owns the port has no stop socket"
+        return _undelivered(reach, "no robot is connected" if reach.owner is None else lost)
     if isinstance(port, SerialPort):
         try:
             require_same(port.device, reach.terminal)

@@ -6,8 +6,6 @@ and without SAMPLE; before the mock's board, the bridge in C, on this computer a
     pytest tests/contract --port serial:///dev/ttyUSB0 --allow-motion      moves joints 1-3 by a few posture units
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The dialogues of vectors.json with every controller at a port: sessions, stops, ring, waiting samples, restarts."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

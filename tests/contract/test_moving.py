@@ -1,7 +1,5 @@
 """What every controller does when told: set points, gains, outputs, stop and release, and the arm left where it was."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 

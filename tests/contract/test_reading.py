@@ -1,7 +1,5 @@
 """What every controller tells, without moving: who it is, whole samples in order, memory and reports that agree."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

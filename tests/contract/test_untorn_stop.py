@@ -1,7 +1,5 @@
 """A stop freezes the posture where the arm is, also in the moment at which a position is being stored."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.driver import Controller

@@ -1,8 +1,6 @@
 """What every bridge makes of single frames: repeats, old and recorded commands, damage and noise. Set points written
 here are those already in force."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing
 from random import getrandbits

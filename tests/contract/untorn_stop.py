@@ -4,8 +4,6 @@ A bridge that reads the position once then freezes the joint up to 256 counts aw
 moment is some 20 to 90 µs of a period in which a position crosses a multiple of 256. In lock-step it can be found.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from daq.driver import Controller

@@ -1,7 +1,5 @@
 """A bench of servos inside the test's own process, in a time of its own: nothing waits, and every run repeats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -48,7 +46,7 @@ class VirtualBench:
     def waited(self) -> float:
         return 0.0
 
-    def connect(self) -> VirtualBench:
+    def connect(self) -> "VirtualBench":
         return self
 
     def write(self, data: bytes) -> None:

@@ -1,7 +1,5 @@
 """A machine file of two axes: the first slides, the second turns. Made up for tests of what knows both kinds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from daq.contracts.machine import Machine, load_machine

@@ -1,7 +1,5 @@
 """What the kernel says of a process' wait for a processor."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from daq.contracts.processor import ProcessorTime, added, processor_time

@@ -1,7 +1,5 @@
 """The progress bar: where a person watches, and gone at the end."""
 
-from __future__ import annotations
-
 import io
 import os
 import pty

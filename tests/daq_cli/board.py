@@ -1,7 +1,5 @@
 """What the board holds, asked behind the command line's back."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from daq.transport.mock_process import MockProcess

@@ -1,7 +1,5 @@
 """A command line that knows nothing of whoever runs the tests: no configuration, no runs, a folder of its own."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

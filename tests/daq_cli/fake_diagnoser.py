@@ -4,8 +4,6 @@ The answer names what the process was given (files, arguments, environment, the 
 for one more experiment while it has only one trace, of an arm that carries much.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

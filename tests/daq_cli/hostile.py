@@ -1,7 +1,5 @@
 """Files and numbers that nobody means, for every command that takes one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.daq_cli.invoke import Said

@@ -1,7 +1,5 @@
 """The command line as a person types it, in this process: output, complaints, exit code."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import pytest

@@ -1,7 +1,5 @@
 """A real arm, and the operator who is asked about it at the terminal. Both are pretended: every arm here is a mock."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """A person's terminal with `daq` running in it."""
 
-from __future__ import annotations
-
 import os
 import pty
 import subprocess

@@ -1,7 +1,5 @@
 """docs/batches.md: its commands do what the page says, on a folder of traces."""
 
-from __future__ import annotations
-
 import csv
 import re
 import shlex

@@ -1,7 +1,5 @@
 """A blind trial from seeds to the table: what each stage is told, what it keeps, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The last stage of a blind trial: what the records could tell apart, worked out once answers are sealed and scored."""
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 from pathlib import Path

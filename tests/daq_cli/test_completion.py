@@ -1,7 +1,5 @@
 """What the tab key offers: all there is of presets, effects, joints and traces, without loading what computes."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A trace's CSV never takes the place of a configuration or a machine file that has the name of its TOML."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """`daq docs`: where the documents are, built or made at once."""
 
-from __future__ import annotations
-
 import webbrowser
 from pathlib import Path
 

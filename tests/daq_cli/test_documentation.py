@@ -1,7 +1,5 @@
 """docs/command-line.md shows every command there is, no other, with options that exist; and every exit code."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re

@@ -1,7 +1,5 @@
 """Every option that takes a file or a number, given what nobody means: one line, and the exit code of wrong input."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tomllib

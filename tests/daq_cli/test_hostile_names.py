@@ -1,7 +1,5 @@
 """Text from outside is never markup: whatever a robot, a file or a model is called is shown as it is, at every door."""
 
-from __future__ import annotations
-
 import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`daq traces` with files made to do harm: one line and the documented exit code, never a traceback."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

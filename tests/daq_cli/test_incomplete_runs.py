@@ -1,7 +1,5 @@
 """A run that did not come to its end is not used as if it had: the command ends with the run's exit code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

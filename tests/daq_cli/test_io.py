@@ -1,7 +1,5 @@
 """`daq io`: outputs and gripper of a real arm need the operator's word, stay as they are after a stop, and are told."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`--json` makes every result one JSON document, the same here and at a server."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Every table of results fits 80 columns, and no number or word of it is cut."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

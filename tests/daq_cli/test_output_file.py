@@ -1,7 +1,5 @@
 """What took long to make is written whole or not at all, and a folder that is not there is told first."""
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

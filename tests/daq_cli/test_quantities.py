@@ -1,7 +1,5 @@
 """Lengths and angles as people type them: neither is taken for the other."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

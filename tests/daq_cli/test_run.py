@@ -1,7 +1,5 @@
 """`daq run`: what it does, prints, and ends with; stopped in every way a person has."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

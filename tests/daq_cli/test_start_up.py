@@ -1,7 +1,5 @@
 """`daq --help` starts fast because it loads little; which modules it loads is tested, not how long that takes."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,11 +1,8 @@
 """`daq stop`, whatever it finds: it says what became of it, and never says more than it knows."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
-import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +11,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from daq.acquisition.stop_socket import StopAnswer, stop_listener
+from daq.acquisition.stop_socket import StopAnswer, StopSocket, stop_listener
 from daq.driver import Controller
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
@@ -128,13 +125,13 @@ def test_a_named_port_goes_before_the_default_service(
 def moving_process(answer: StopAnswer) -> Iterator[None]:
     """A process that moves a robot, and answers one stop."""
 
-    def answer_stop(listener: socket.socket) -> None:
-        connection, _ = listener.accept()
+    def answer_stop(listener: StopSocket) -> None:
+        connection, _ = listener.socket.accept()
         with connection:
             connection.sendall(answer.to_json())
 
     with stop_listener(answer.robot) as listener:
-        listener.setblocking(True)
+        listener.socket.setblocking(True)
         thread = threading.Thread(target=answer_stop, args=(listener,))
         thread.start()
         yield

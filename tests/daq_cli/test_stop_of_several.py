@@ -1,7 +1,5 @@
 """`daq stop` with several robots in daq.toml: all of them unless one is named, and all in doubt."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,11 +31,7 @@ LEFT, RIGHT = ("left", "tcp://127.0.0.1:1"), ("right", "tcp://127.0.0.1:2")
 
 @pytest.mark.parametrize(
     ("words", "stopped"),
-    [
-        (["stop"], [LEFT, RIGHT]),
-        (["stop", "--robot", "right"], [RIGHT]),
-        (["--robot", "left", "stop"], [LEFT]),
-    ],
+    [(["stop"], [LEFT, RIGHT]), (["stop", "--robot", "right"], [RIGHT]), (["--robot", "left", "stop"], [LEFT])],
 )
 def test_all_robots_are_stopped_unless_one_is_named(
     daq: CommandLine, asked: list[tuple[str, str]], words: Sequence[str], stopped: list[tuple[str, str]]

@@ -1,7 +1,5 @@
 """Keys that stop what a service's robot does, and `daq stop` at a service: sent in time, told, and never lost."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence

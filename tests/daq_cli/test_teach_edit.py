@@ -1,7 +1,5 @@
 """A taught program edited on the command line: what is possible gives a program, the rest leaves the file as it was."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`daq gains set` on joints without drive: no jump, and never on a real arm without the operator's word."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """`daq teach` in a terminal, stopped in every way a person has: one line, exit 6, and what was taught is kept."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

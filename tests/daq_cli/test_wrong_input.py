@@ -1,7 +1,5 @@
 """What cannot be is refused in one line that says what, where and what is allowed; nothing moves, nothing is lost."""
 
-from __future__ import annotations
-
 import socket
 from pathlib import Path
 
@@ -139,10 +137,7 @@ def test_a_file_that_is_no_trace_is_refused(daq: CommandLine, content: bytes) ->
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (
-            "[robot]\nprot = 3\n",
-            ("robot.prot = 3", "allowed here: limits, machine, memory_map, name, owners, port"),
-        ),
+        ("[robot]\nprot = 3\n", ("robot.prot = 3", "allowed here: limits, machine, memory_map, name, owners, port")),
         ('[robot]\nname = "My Arm"\n', ("robot.name = 'My Arm'", "should match pattern")),
         ("[robot.limits]\nreach = -1\n", ("robot.limits.reach = -1", "greater than 0")),
         ("[robot.limits]\njoints = [{}]\n", ("robot.limits.joints has 1 entries", "6 joints")),

@@ -1,7 +1,5 @@
 """docs/your-robot.md: what it types can be typed, and its settings are settings."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import tomllib

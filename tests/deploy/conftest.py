@@ -1,7 +1,5 @@
 """One composition for all files here: starting it takes longer than what is tried on it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

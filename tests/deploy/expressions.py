@@ -1,7 +1,5 @@
 """Whether an expression of PromQL names only metrics, labels and values that a service has."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -35,7 +33,7 @@ class Scraped:
     labels: Mapping[str, Mapping[str, set[str]]]
 
     @classmethod
-    def of(cls, text: str) -> Scraped:
+    def of(cls, text: str) -> "Scraped":
         """What a service has answered at /metrics."""
         found: dict[str, dict[str, set[str]]] = {"up": {}}
         for family in text_string_to_metric_families(text):

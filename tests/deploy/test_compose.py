@@ -1,7 +1,5 @@
 """deploy/compose.yaml is what the service needs: its commands run as processes, and an experiment goes all the way."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Board and alert rules name what a running service has, and Prometheus, promtool and Grafana's types accept them."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The service behind the real Caddy and the real nginx, with the configurations of `deploy/`, over TLS."""
 
-from __future__ import annotations
-
 import shutil
 import socket
 import ssl

@@ -1,7 +1,5 @@
 """A container that is killed or ended leaves whole traces. These tests end the service that the other files use."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

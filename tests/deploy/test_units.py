@@ -1,7 +1,5 @@
 """The units of systemd: accepted by systemd itself, hardened, and what the guide says of them."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """A core in C on the board of the second bridge: a memory in which nothing happens by itself, on a hand-wound clock."""
 
-from __future__ import annotations
-
 from tests.firmware.compiled import made
 from tests.firmware.core import Core, PeriodSource
 from tests.protocol.play import PurePartner

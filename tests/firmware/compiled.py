@@ -1,7 +1,5 @@
 """What the tests compile of the bridge in C: with its own Makefile, into build/, once for all workers."""
 
-from __future__ import annotations
-
 import fcntl
 import shutil
 import subprocess

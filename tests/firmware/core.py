@@ -1,7 +1,5 @@
 """The bridge's core in C, as a shared library: bytes in, bytes out, on a memory and a clock of Python."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """The core in C on this computer, before the mock's board. Time is the board's: each byte of the memory costs some."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from secrets import randbits
 

@@ -1,7 +1,5 @@
 """One connection to a bridge in C on the mock's board: takes the place of the mock's own link and bridge."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 from mock_controller.bridge.link import LinkCounts

@@ -1,7 +1,5 @@
 """A motor controller that stores its results byte by byte, for a bridge that watches it; on a hand-wound clock."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from random import Random
 from typing import Any

@@ -1,7 +1,5 @@
 """The Mega's firmware image before the mock's board: every access to the memory is a cycle of the bus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from mock_controller.board.parameters import default_board_text

@@ -1,7 +1,5 @@
 """The bridge in C before the mock's board, as a process with a port."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -5,8 +5,6 @@ simulated one. Everything else is the mock's: `--pty`, `--no-sample`, `--start`,
 for the map that `--memory-map` names, or for the one that ships.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The Mega's firmware image on a simulated ATmega2560, as a shared library."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from pathlib import Path
@@ -45,11 +43,7 @@ class Simulator:
     """One simulated board, running an image from its reset on; `read` and `write` get the moment in clocks."""
 
     def __init__(
-        self,
-        library: Path,
-        image: Path,
-        read: Callable[[int, int], int],
-        write: Callable[[int, int, int], None],
+        self, library: Path, image: Path, read: Callable[[int, int], int], write: Callable[[int, int, int], None]
     ) -> None:
         self._library = ctypes.CDLL(str(library))
         self._library.simulator_clock.restype = ctypes.c_uint64

@@ -1,7 +1,5 @@
 """What a memory map leaves out is neither read nor written, by the mock's bridge and by that in C."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

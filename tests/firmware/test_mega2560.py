@@ -1,7 +1,5 @@
 """The Mega's firmware image on a simulated board: what it does on the line, on the bus, and with a freeze."""
 
-from __future__ import annotations
-
 from itertools import count
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is read from the tools of an AVR: sizes from the linker's map, and the deepest stack from a disassembly."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

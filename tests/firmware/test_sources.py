@@ -1,7 +1,5 @@
 """The sources of the bridge in C: how long they are, their warnings, their sizes, and what a fuzzer finds."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The core in C finds every vector of vectors.json true, and says to the byte what the second bridge says."""
 
-from __future__ import annotations
-
 import json
 from random import Random
 from typing import Any

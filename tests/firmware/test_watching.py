@@ -1,7 +1,5 @@
 """The core in C finds the controller's periods by watching the memory, and never passes on what it read torn."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

@@ -1,7 +1,5 @@
 """The notebooks of docs/gallery, as tests read and run them."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The notebooks of the gallery, run as readers run them, each in a fresh folder."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

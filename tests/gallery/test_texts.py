@@ -1,7 +1,5 @@
 """The texts of the gallery: they parse, use the public interface alone, and are listed."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """An arm at a port: state, runs, stop."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

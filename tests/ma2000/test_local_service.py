@@ -1,7 +1,5 @@
 """A service of a program's own: on a mock alone, and ended with its block."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

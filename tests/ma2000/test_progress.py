@@ -1,7 +1,5 @@
 """Progress of the long calls: a bar, nothing, or the caller's own."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import subprocess
@@ -15,17 +13,7 @@ from ma2000.progress import told
 from tests.gallery.notebooks import executed, outputs_of
 
 ROOT = Path(__file__).parents[2]
-LONG = (
-    "batch",
-    "design",
-    "diagnose",
-    "feedforward",
-    "fit",
-    "fit_torques",
-    "reproduce_thesis",
-    "run",
-    "validate",
-)
+LONG = ("batch", "design", "diagnose", "feedforward", "fit", "fit_torques", "reproduce_thesis", "run", "validate")
 CALL = "ma2000.run(ma2000.ExperimentSpec.model_validate({'trajectory': {'kind': 'step'}, 'joints': [1], 'hold': 0.1})"
 
 HEARD = """
@@ -61,11 +49,7 @@ def test_false_is_silence_and_a_function_is_told_itself() -> None:
 
 def test_a_program_whose_output_is_a_log_says_nothing(tmp_path: Path) -> None:
     done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from ma2000.progress import told\nwith told(True, 'fit') as tell: tell(0.5, 'half')",
-        ],
+        [sys.executable, "-c", "from ma2000.progress import told\nwith told(True, 'fit') as tell: tell(0.5, 'half')"],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": str(ROOT), "FORCE_COLOR": "1"},
         capture_output=True,

@@ -1,7 +1,5 @@
 """`import ma2000`: its names, what it loads, and what it says of files in its way."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
@@ -12,6 +10,7 @@ from typing import Any
 import pytest
 
 import ma2000
+from daq.contracts.experiment import Ramp
 from daq.contracts.machine import load_machine
 from ma2000 import _HOME
 
@@ -97,6 +96,11 @@ def test_what_a_notebook_shows_of_a_machine_or_model_is_short() -> None:
             {"trajectory": {"kind": "ramp", "amplitude": 10}},
             "trajectory.amplitude: must lie between -360° and 360°, that is ±6.283 rad (got 10 rad, 572.958°)",
         ),
+        (
+            "ExperimentSpec",
+            {"trajectory": {"kind": "ramp", "amplitude": {1: 10}}},
+            "trajectory.amplitude.1: must lie between -360° and 360°, that is ±6.283 rad (got 10 rad, 572.958°)",
+        ),
         ("ExperimentSpec", {"amplitude": 0.1}, "amplitude: Extra inputs are not permitted"),
         ("FitOptions", {"starts": 0}, "starts: "),
         ("DesignOptions", {"duration": -1}, "duration: "),
@@ -109,6 +113,13 @@ def test_wrong_arguments_are_refused_in_one_line(name: str, given: dict[str, Any
         getattr(ma2000, name)(**given)
     assert str(refused.value).startswith(f"{name}: {words}")
     assert str(refused.value).isprintable()
+
+
+def test_a_wrong_part_of_an_experiment_is_refused_in_one_line() -> None:
+    with pytest.raises(ma2000.DaqError) as refused:
+        Ramp(amplitude=10)
+    words = "amplitude: must lie between -360° and 360°, that is ±6.283 rad (got 10 rad, 572.958°)"
+    assert str(refused.value) == f"Ramp: {words}"
 
 
 def test_the_presets_are_printed_on_a_page() -> None:

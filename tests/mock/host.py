@@ -1,7 +1,5 @@
 """A host for the mock without input or output: requests in, replies out, on the board's time or a hand-wound clock."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from firmware_protocol.commands import PROTOCOL_VERSION, Hello, ReadStatus, Release, Released, Reply, Request, Status

@@ -1,7 +1,5 @@
 """A mock in lock-step inside the test's own process: for bridges that no command line can start."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mock_controller.bridge.bridge import Bridge
@@ -28,7 +26,7 @@ class InProcess:
     def waited(self) -> float:
         return 0.0
 
-    def connect(self) -> InProcess:
+    def connect(self) -> "InProcess":
         return self
 
     def write(self, data: bytes) -> None:

@@ -11,8 +11,6 @@ A step is what the host sends, what the bridge answers, or what happens to the b
 `"$s+1"` is one more. `"?"` is anything. Set points that are written are those in force, so that nothing moves.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -332,10 +330,7 @@ DIALOGUES = (
     Dialogue(
         "what a bridge cannot do it refuses before it looks at the payload",
         ("CLOCK",),
-        (
-            *misunderstood(0x40, "", 1, NOT_CAPABLE),
-            *misunderstood(0x40, "e8030000", 2, NOT_CAPABLE),
-        ),
+        (*misunderstood(0x40, "", 1, NOT_CAPABLE), *misunderstood(0x40, "e8030000", 2, NOT_CAPABLE)),
     ),
     Dialogue(
         "the ring gives each period once, in order, and a lost reply costs nothing",

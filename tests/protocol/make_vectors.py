@@ -1,7 +1,5 @@
 """Makes firmware_protocol/vectors.json: `python -m tests.protocol.make_vectors`, a developer's step."""
 
-from __future__ import annotations
-
 import json
 from itertools import count
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plays a dialogue of vectors.json with a bridge: sends what the host says, compares what comes back."""
 
-from __future__ import annotations
-
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ It shares no code with `firmware_protocol` or the mock, and is written as a smal
 array, no objects for messages. What both say is what a bridge in another language will say.
 """
 
-from __future__ import annotations
-
 from tests.protocol.second_implementation import frame_of, read_frame
 
 BASE, SIZE = 0xFC00, 0x80

@@ -19,10 +19,7 @@ readings = st.builds(
 )
 
 compact_readings = st.builds(
-    c.CompactReading,
-    position=st.integers(0, 4095),
-    error=st.integers(-2048, 2047),
-    power=st.integers(-0x80, 0x7F),
+    c.CompactReading, position=st.integers(0, 4095), error=st.integers(-2048, 2047), power=st.integers(-0x80, 0x7F)
 )
 
 

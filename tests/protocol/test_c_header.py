@@ -1,7 +1,5 @@
 """The memory map as a header of the bridge in C: the one that ships is up to date, another map gives another."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

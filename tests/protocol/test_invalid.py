@@ -1,7 +1,5 @@
 """What pydantic refuses, in one line: where, what is wrong, and nothing of pydantic's own words."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import pytest

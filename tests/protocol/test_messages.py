@@ -288,10 +288,7 @@ def test_the_set_point_of_a_compact_reading_is_what_position_and_error_come_to(
 
 @pytest.mark.parametrize(
     ("payload", "says"),
-    [
-        (b"\x00\x00", "payload of 2 bytes, expected at least 3"),
-        (b"\x00", "payload of 1 bytes, expected at least 3"),
-    ],
+    [(b"\x00\x00", "payload of 2 bytes, expected at least 3"), (b"\x00", "payload of 1 bytes, expected at least 3")],
 )
 def test_a_poke_without_a_byte_is_too_short(payload: bytes, says: str) -> None:
     with pytest.raises(PayloadLengthError, match=says):

@@ -1,7 +1,5 @@
 """Sessions: nothing recorded is ever new again, whatever wraps; time in lock-step has an order of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import count
 

@@ -1,7 +1,5 @@
 """Bridges that break one rule each: some dialogue finds every one of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest

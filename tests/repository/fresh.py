@@ -1,7 +1,5 @@
 """Distributions of this tree, and fresh environments that they are installed into."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

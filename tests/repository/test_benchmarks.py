@@ -1,7 +1,5 @@
 """Benchmarks tell a missed target by their exit code, and reach no robot but their own."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

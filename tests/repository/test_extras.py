@@ -1,7 +1,5 @@
 """What needs an extra that is not installed says in one line which one, from Python and on the command line."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys
@@ -169,11 +167,7 @@ def test_a_failed_import_of_anything_else_stays_what_it_is(name: str) -> None:
 @pytest.mark.parametrize(
     ("package", "needs_it", "line"),
     [
-        (
-            "websockets",
-            lambda: WebSocket("ws://127.0.0.1:9", None, 1.0, 1, None),
-            "live stream .*websockets.*[live]",
-        ),
+        ("websockets", lambda: WebSocket("ws://127.0.0.1:9", None, 1.0, 1, None), "live stream .*websockets.*[live]"),
         ("mujoco", lambda: start_mock(MockPort()), "the mock controller .*mujoco.*[robot]"),
         ("matplotlib", lambda: ma2000.plot(NO_TRACE), "ma2000.plot .*matplotlib.*[robot]"),
     ],

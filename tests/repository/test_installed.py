@@ -1,7 +1,5 @@
 """Wheel and source distribution as a user gets them: checked, installed into fresh environments, and used there."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """The page of the machine file explains every field of the schema."""
 
-from __future__ import annotations
-
 from docs.extensions.machine_file import PARTS, page
 
 

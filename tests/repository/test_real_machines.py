@@ -1,7 +1,5 @@
 """The bench of real machines: its entries fit together, records are only renamed, and marks say what they promise."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Sequence

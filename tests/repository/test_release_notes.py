@@ -39,12 +39,7 @@ def test_a_version_has_the_text_of_its_section_and_no_more(tag: str, tmp_path: P
     [
         ("v0.2.1", CHANGELOG, "0.2.0", r"v0\.2\.1: pyproject\.toml says version 0\.2\.0"),
         ("v0.2.0", CHANGELOG, "0.1.0", r"CITATION\.cff says version 0\.1\.0"),
-        (
-            "v0.2.0",
-            CHANGELOG.replace("## 0.2.0", "## 0.3.0"),
-            "0.2.0",
-            r"first section of CHANGELOG\.md is 0\.3\.0",
-        ),
+        ("v0.2.0", CHANGELOG.replace("## 0.2.0", "## 0.3.0"), "0.2.0", r"first section of CHANGELOG\.md is 0\.3\.0"),
         ("v0.2.0", "# Changelog\n", "0.2.0", "is missing"),
         ("v0.2.0", CHANGELOG.replace("2026-11-23", "unreleased"), "0.2.0", r"says `unreleased` where its date belongs"),
         ("v0.2.0", CHANGELOG.replace(" (2026-11-23)", ""), "0.2.0", "says nothing where its date belongs"),

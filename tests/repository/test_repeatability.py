@@ -1,7 +1,5 @@
 """The study of repeatability tells the spread of runs, not of these few alone, and wants at least two of them."""
 
-from __future__ import annotations
-
 import runpy
 from contextlib import nullcontext
 from pathlib import Path

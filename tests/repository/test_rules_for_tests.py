@@ -1,17 +1,13 @@
 """The rules of tests/conftest.py hold: each is shown a file of tests that breaks it."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import DETERMINISTIC
 from tests.order import AGAINST_THE_CLOCK
-
-ROOT = Path(__file__).parents[2]
+from tests.repository.inner_run import ROOT, run_folder
 
 SKIPPING = """
 import pytest
@@ -62,16 +58,10 @@ def test_that_leaves_nothing():
 
 def outcomes(folder: Path, tests: str, *, ci: str = "") -> tuple[dict[str, int], str]:
     """Run a file of tests under this repository's rules; the counts of pytest's last line, and all it printed."""
-    file = folder / "test_example.py"
-    file.write_text(tests)
-    command = [sys.executable, "-m", "pytest", "-p", "tests.conftest", "-p", "no:cacheprovider"]
-    command += ["-c", str(ROOT / "pyproject.toml"), "--rootdir", str(folder)]
-    command += ["--lab-data", str(folder / "absent"), str(file)]
-    run = subprocess.run(
-        command, cwd=ROOT, env=os.environ | {"CI": ci}, capture_output=True, text=True, check=False, timeout=60
-    )
-    last_line = run.stdout.strip().splitlines()[-1]
-    return {word: int(count) for count, word in re.findall(r"(\d+) ([a-z]+)", last_line)}, run.stdout
+    (folder / "test_example.py").write_text(tests)
+    printed = run_folder(folder, ci=ci).stdout
+    counts = re.findall(r"(\d+) ([a-z]+)", printed.strip().splitlines()[-1])
+    return {word: int(count) for count, word in counts}, printed
 
 
 @pytest.mark.parametrize(

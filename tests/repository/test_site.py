@@ -1,7 +1,5 @@
 """The site of the documents: its parts made from the code are whole, and its pages run under the service's policy."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

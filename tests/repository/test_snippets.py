@@ -1,7 +1,5 @@
 """What the pages show is run by a test, or it is said why not."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import shutil

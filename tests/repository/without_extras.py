@@ -1,7 +1,5 @@
 """A Python in which the packages of some extras are missing, for tests of what it says then."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

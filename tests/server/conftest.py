@@ -1,12 +1,12 @@
 """One service for most tests, and one for jobs: starting one costs more than most of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.daq_cli.invoke import CommandLine
+from tests.server.other_user import other_users_command_line
 from tests.server.polling import reset
 from tests.server.queue.bench import Bench
 from tests.server.service import Service, running_service
@@ -54,3 +54,10 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made = Bench(tmp_path)
     yield made
     made.close()
+
+
+@pytest.fixture
+def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
+    """The command of another user, in a folder of their own, who has no configuration."""
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
+        yield daq

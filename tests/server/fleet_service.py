@@ -1,7 +1,5 @@
 """A real service with several mocks, for tests."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from collections.abc import Iterator, Mapping

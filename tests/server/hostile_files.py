@@ -1,7 +1,5 @@
 """Traces that are made to harm whoever reads them: bombs, lengths that are lies, nesting, numbers beyond measure."""
 
-from __future__ import annotations
-
 import json
 import struct
 import tempfile

@@ -1,7 +1,5 @@
 """A service inside the tests' own process, for what cannot be done to another one: to its clock, to its disk."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Iterator, Mapping

@@ -6,8 +6,6 @@ last byte and its turn among the threads, and wherever they wait. A seed decides
 made here: the wire with a board that stops and releases as PROTOCOL.md says (section 6), the clock, and the stores.
 """
 
-from __future__ import annotations
-
 import math
 import queue
 import threading
@@ -279,7 +277,7 @@ class Turn:
     def __init__(self, world: World) -> None:
         self._world, self._set = world, False
 
-    def __enter__(self) -> Turn:
+    def __enter__(self) -> "Turn":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -389,7 +387,8 @@ class Scene:
         self.control = ArmControl(self.controller)
         freezer = Freezer("arm", "wire")
         freezer.control = self.control
-        self.guardian = Guardian(cast(Any, None), None, lambda cause: freezer._stop(self.control, cause))
+        listener = cast(Any, SimpleNamespace(problem=""))
+        self.guardian = Guardian(listener, None, lambda cause: freezer._stop(self.control, cause))
         self.guardian._thread = cast(Any, SimpleNamespace(is_alive=lambda: True))
         self.inbox = InboxHere(self.world, self._spawn_cancel)
         self.owned = OwnedRobot(

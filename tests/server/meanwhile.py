@@ -1,7 +1,5 @@
 """A real object to which something happens at a chosen call: what another thread does, a disk that is full."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,8 +1,6 @@
 """New databases of SQLite with this version's tables, each a copy of one that is made once: to make the tables takes
 longer than most of what is tried on them. The migrations themselves are tried in tests/server/store."""
 
-from __future__ import annotations
-
 import tempfile
 from functools import cache
 from pathlib import Path

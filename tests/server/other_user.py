@@ -1,7 +1,5 @@
 """The command line of another user of a service, in a folder of their own with nothing in it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Asks a service until it answers what a test waits for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from subprocess import Popen
 from typing import Any

@@ -1,7 +1,5 @@
 """A PostgreSQL server of the tests' own: Debian's programs, a data folder of its own, a socket in place of a port."""
 
-from __future__ import annotations
-
 import os
 import pwd
 import shutil

@@ -1,7 +1,5 @@
 """A real service for tests: `daq serve` in a process of its own, on a mock behind a pseudo-terminal."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """A day of a lab at its arm, over REST and the live stream, with a restart in its middle."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

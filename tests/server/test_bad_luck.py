@@ -1,7 +1,5 @@
 """What becomes of queue, trace and states when things break."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import os
@@ -20,6 +18,7 @@ from daq.traces.reader import read_trace
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
 from server.jobs.mailbox import PROGRESS
+from tests.left_running import wait_for_end
 from tests.server.service import Service, running_service
 
 pytestmark = pytest.mark.timeout(600)
@@ -53,7 +52,7 @@ def test_whatever_process_is_killed_its_work_is_interrupted_and_what_waits_waits
         running, waiting = _left_behind(service)
         owner = _owner_of(service.process.pid)
         assert service.end(signal.SIGKILL) == -signal.SIGKILL
-        _until_gone(owner)  # it freezes the arm, records a second more and closes the trace by itself
+        wait_for_end(owner, 60)  # it freezes the arm, records a second more and closes the trace by itself
     log = tmp_path / "log"
     with log.open("wb") as stream, running_service(tmp_path, log=stream) as service:
         service.until_connected()
@@ -234,16 +233,3 @@ def _owner_of(service: int) -> int:
         if b"server.owner" in Path(f"/proc/{child}/cmdline").read_bytes():
             return child
     raise AssertionError("no process owns the port")
-
-
-def _until_gone(process: int) -> None:
-    try:
-        handle = os.pidfd_open(process)
-    except ProcessLookupError:
-        return
-    try:
-        poll = select.poll()
-        poll.register(handle, select.POLLIN)
-        poll.poll()
-    finally:
-        os.close(handle)

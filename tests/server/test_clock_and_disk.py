@@ -1,11 +1,11 @@
 """A clock that is set back, and a disk without room: in a service inside the tests' process."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, NoReturn
@@ -109,13 +109,34 @@ def test_what_was_carried_out_is_told_though_no_event_of_it_can_be_written(
     def refuses(*_args: object) -> NoReturn:
         raise OperationalError("INSERT", {}, Exception("database or disk is full"))
 
-    monkeypatch.setattr(EventStore, "add", refuses)
-    answer = api.post("control", json={})
-    assert answer.status_code == 201, answer.text
-    assert api.delete("control", headers={"Control-Lease": answer.json()["lease"]}).status_code == 204
-    made = _submit(api)
-    assert [one["id"] for one in api.get("queue/experiments").json()] == [made]
-    assert api.post("queue/pause").json()["paused"]
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(EventStore, "add", refuses)
+        answer = api.post("control", json={})
+        assert answer.status_code == 201, answer.text
+        assert api.delete("control", headers={"Control-Lease": answer.json()["lease"]}).status_code == 204
+        made = _submit(api)
+        assert [one["id"] for one in api.get("queue/experiments").json()] == [made]
+        assert api.post("queue/pause").json()["paused"]
+        assert _listed(api, "events") == []
+    found = until(api, "events", lambda page: len(page["items"]) == 4)["items"]
+    assert [event["kind"] for event in found] == ["queue", "experiment", "control", "control"]
+
+
+def test_a_stop_while_another_program_holds_the_database_is_told_later_with_its_time(
+    tmp_path: Path, clock: WrongClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.store.engine.BUSY_TIMEOUT_MS", 50)
+    with service_inside(tmp_path, clock, monkeypatch) as api:
+        ready = str(api.base_url.join("/readyz"))
+        with closing(sqlite3.connect(tmp_path / "service" / "service.sqlite")) as other:
+            other.execute("BEGIN EXCLUSIVE")
+            begun = datetime.now(UTC)
+            assert api.post("stop").status_code == 200
+            told = api.get(ready)
+            assert (told.status_code, told.json()["checks"]["database"]) == (503, "locked by another program")
+            ended = datetime.now(UTC)
+        found = until(api, "events", lambda page: any(event["kind"] == "stop" for event in page["items"]))["items"]
+        assert all(begun <= datetime.fromisoformat(event["at"]) <= ended for event in found if event["kind"] == "stop")
 
 
 def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(

@@ -1,7 +1,5 @@
 """What the kernel says of the weights of the service's processes."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The service ends within 5 s of SIGTERM, whatever it is doing for whomever."""
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import socket

@@ -1,7 +1,5 @@
 """No order of what people, queue, owner and board do moves the arm after a confirmed stop that nobody has released."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """Standard error of a service that is no terminal: JSON alone, whoever writes there."""
 
-from __future__ import annotations
-
 import json
 import logging
 import subprocess

@@ -1,7 +1,5 @@
 """How the documents reach a browser, as the built site and as pages that are made from them."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The worlds' integrator: energy, steps, drives and friction against what is known without it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether an answer's intervals cover a world's truth."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

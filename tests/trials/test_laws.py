@@ -1,7 +1,5 @@
 """Every law of the worlds has the shape of its formula, in the words of its source."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A registered trial of worlds: which arm comes next, what an arm is worth, and the table of its lines."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

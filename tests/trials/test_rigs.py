@@ -1,7 +1,5 @@
 """Folders of worlds: the same for a seed, imported by the product, and of no code of the product's."""
 
-from __future__ import annotations
-
 import ast
 import json
 from dataclasses import replace
@@ -18,6 +16,7 @@ from daq.traces.csv_table import import_csv
 from model.dynamics import recursive
 from model.machine_model.model import base_model
 from model.simulation.chain_of_model import chain_of
+from trials import judge
 from trials.judge import score
 from trials.rigs.bodies import mjcf
 from trials.rigs.drawing import sound_rig
@@ -210,3 +209,12 @@ def test_a_weight_that_presses_evenly_rubs_as_coulomb_friction(joint: int, law: 
     rig = sound_rig("six-torques", KINDS["six-torques"], 1)
     (hidden,) = hide(rig, "load_dependent_friction", joint, law, {"load_share": 0.1}).hidden
     assert (hidden.name, hidden.known_as) == ("load_dependent_friction", name)
+
+
+def test_an_unknown_kind_is_told_the_nearest(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["judge", "--kinds", "planar-tork"])
+    with pytest.raises(SystemExit):
+        judge.main()
+    assert "planar-tork: there is none of that name; the nearest are planar-torques, " in capsys.readouterr().err

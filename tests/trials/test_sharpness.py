@@ -1,7 +1,5 @@
 """What the world's side says of which laws a record can tell apart."""
 
-from __future__ import annotations
-
 import pytest
 
 from trials.rigs.drawing import sound_rig

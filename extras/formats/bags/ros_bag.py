@@ -109,7 +109,8 @@ def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, li
     try:
         found = contents(path, limits)
         name = _topic(path, found, topic)
-        return name, list(_decoded(f"{path}: topic {name}", found.messages[name], found.ros_1)), found.missing
+        states = _decoded(f"{path}: topic {_listed([name])}", found.messages[name], found.ros_1)
+        return name, list(states), found.missing
     except TraceError:
         raise
     except MemoryError as error:
@@ -128,7 +129,7 @@ def _topic(path: Path, found: Contents, wanted: str | None) -> str:
         others = sorted(f"{name} ({kind})" for name, kind in found.types.items())
         raise TraceError(f"{path}: has no topic of {JOINT_STATE}; it has {_listed(others) or 'no topic'}")
     if wanted is not None and wanted not in there:
-        raise TraceError(f"{path}: topic {wanted}: has no joint states; there are some on {_listed(there)}")
+        raise TraceError(f"{path}: topic {_listed([wanted])}: has no joint states; there are some on {_listed(there)}")
     told = [name for name in there if found.messages[name]] or there
     if wanted is None and len(told) > 1:
         raise TraceError(f"{path}: has joint states on {_listed(told)}; choose one with --topic")
@@ -320,5 +321,5 @@ def _messages(count: int) -> str:
 
 
 def _listed(names: list[str] | tuple[str, ...]) -> str:
-    shown = ", ".join(str(name)[:60] for name in names[:SHOWN])
+    shown = ", ".join("".join(c if c.isprintable() else "?" for c in name[:60]) for name in names[:SHOWN])
     return shown if len(names) <= SHOWN else f"{shown} and {len(names) - SHOWN} more"

@@ -18,7 +18,7 @@ from model.arrays import Floats
 
 def read_urdf(path: Path) -> Description:
     """The robot in a URDF file; meshes are not read. Raises SpecError with one line."""
-    return parse_urdf(read_text(path, f"URDF {path}"), str(path))
+    return parse_urdf(read_text(path, f"URDF {path}", xml=True), str(path))
 
 
 def parse_urdf(text: str, origin: str) -> Description:

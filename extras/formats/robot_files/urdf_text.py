@@ -40,6 +40,8 @@ MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prisma
 """Types of joint that a machine can have, and what they are called there."""
 _REFUSED = {"planar": "moves in a plane", "floating": "moves freely", "spherical": "turns about a point"}
 
+_OF_BODIES = ("origin", "mass", "inertia", "axis")
+"""Elements whose numbers are computed with; NO_LIMIT bounds them. Those of limits may be as large as there are."""
 _NUMBERS: dict[str, dict[str, int]] = {
     "origin": {"xyz": 3, "rpy": 3},
     "mass": {"value": 1},
@@ -115,6 +117,10 @@ def _robot(text: str, origin: str) -> Xml.Element:
         raise SpecError(f"{origin}: not XML: {error}") from error
     if any("xacro" in element.tag.rpartition("}")[0] for element in root.iter()):
         raise SpecError(f"{origin}: {XACRO}")
+    space, brace, _ = root.tag.rpartition("}")
+    if brace:  # a default namespace, of which no other reader of URDF knows
+        for element in root.iter():
+            element.tag = element.tag.removeprefix(space + brace)
     if root.tag != "robot":
         raise SpecError(f"{origin}: its outermost element is <{shown(root.tag)[1:-1]}>; a URDF has <robot>")
     return root
@@ -137,8 +143,10 @@ def _numbers(element: Xml.Element | None, attribute: str, where: str) -> list[fl
         values = [float(word) for word in text.split()]
     except ValueError:
         values = []
-    if len(values) != count or not all(map(math.isfinite, values)):
+    most = NO_LIMIT if element.tag in _OF_BODIES else math.nextafter(math.inf, 0.0)
+    if len(values) != count or not all(abs(value) <= most for value in values):
         needed = "a finite number is needed" if count == 1 else f"{count} finite numbers are needed"
+        needed += f", ±{most:g} at most" if any(most < abs(value) < math.inf for value in values) else ""
         raise SpecError(f"{where}: {element.tag} {attribute} is {shown(text)}; {needed}")
     return values
 

@@ -31,7 +31,7 @@ def try_all(
     from time import perf_counter
 
     from daq.contracts.service.notifications import Notification
-    from extras.lab.notifications.delivery import DeliveryError
+    from extras.lab.notifications.delivery import problem_of
     from extras.lab.notifications.destinations import destinations_of
     from extras.lab.notifications.service import message_of
     from extras.lab.notifications.settings import NotificationSettings
@@ -50,8 +50,8 @@ def try_all(
         begun, problem, answer = perf_counter(), "", ""
         try:
             answer = one.sender.send(message_of(told))
-        except DeliveryError as error:
-            failed, problem = True, str(error)
+        except Exception as error:  # noqa: BLE001 - whatever fails for one, the others are told
+            failed, problem = True, problem_of(error)
         seconds = perf_counter() - begun
         found.append({"destination": one.key, "answer": answer, "problem": problem, "seconds": round(seconds, 3)})
         if not json:

@@ -25,6 +25,14 @@ class DeliveryError(DaqError):
         self.retry_after = retry_after
 
 
+def problem_of(error: Exception) -> str:
+    """Returns the line that tells why a message was not delivered. Of an error that nobody expected it has the kind
+    alone, since its words may repeat a secret."""
+    return (
+        str(error) if isinstance(error, DeliveryError) else f"not sent: {type(error).__name__}, a fault of this program"
+    )
+
+
 @dataclass(frozen=True)
 class Message:
     """A message in the outbox. `payload`: the text that is signed and posted, JSON; `id`: the same at each attempt, by

@@ -9,7 +9,6 @@ from daq.contracts.service.notifications import NotificationKind
 from extras.lab.notifications.delivery import Sender
 from extras.lab.notifications.mail import Mail
 from extras.lab.notifications.settings import NotificationSettings
-from extras.lab.notifications.webhook import Webhook
 
 
 @dataclass(frozen=True)
@@ -30,10 +29,13 @@ class Destination:
 
 def destinations_of(settings: NotificationSettings) -> list[Destination]:
     """Returns all destinations. Raises SpecError for a file of a secret that cannot be used."""
-    found = [
-        Destination("webhook", name, one.host, one.about, Webhook(one, private_hosts=settings.private_hosts))
-        for name, one in settings.webhooks.items()
-    ]
+    found = []
+    if settings.webhooks:
+        from extras.lab.notifications.webhook import Webhook  # with a client for HTTP, which nothing else here needs
+
+        for name, one in settings.webhooks.items():
+            sender = Webhook(one, private_hosts=settings.private_hosts)
+            found.append(Destination("webhook", name, one.host, one.about, sender))
     if settings.smtp is not None:
         smtp = settings.smtp
         found += [

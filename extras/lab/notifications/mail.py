@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import smtplib
 import ssl
+from base64 import b64encode
 from email.message import EmailMessage
 from email.utils import format_datetime
 
@@ -16,6 +17,8 @@ from extras.lab.notifications.settings import EmailSettings, SmtpSettings
 
 WITHIN = 20.0
 """Time (s) for one answer of the mail server."""
+LOGGED_IN = 235
+"""Answer of a mail server to a right password (RFC 4954)."""
 SUBJECTS = {"done": "done", "fault": "FAULT", "attention": "please look"}
 
 
@@ -41,7 +44,7 @@ class Mail:
                 if self._smtp.tls == "starttls":
                     server.starttls(context=self._trust)
                 if self._smtp.user is not None and self._password is not None:
-                    server.login(self._smtp.user, self._password)
+                    self._log_in(server, self._smtp.user, self._password)
                 server.send_message(self._written(message), self._smtp.sender, [self._to])
         except smtplib.SMTPRecipientsRefused as error:
             codes = ", ".join(str(code) for code, _ in error.recipients.values())
@@ -63,6 +66,21 @@ class Mail:
         if self._smtp.tls == "tls":
             return smtplib.SMTP_SSL(host, port, timeout=self._within, context=self._trust)
         return smtplib.SMTP(host, port, timeout=self._within)
+
+    def _log_in(self, server: smtplib.SMTP, user: str, password: str) -> None:
+        """Gives user and password: as smtplib does, which knows ASCII alone, or else in UTF-8, as RFC 4616 has it."""
+        if (user + password).isascii():
+            server.login(user, password)
+            return
+        server.ehlo_or_helo_if_needed()
+        if "PLAIN" not in server.esmtp_features.get("auth", "").upper().split():
+            raise DeliveryError(
+                f"{self._smtp.host}: takes a user and password of ASCII letters alone, since it has no AUTH PLAIN"
+            )
+        given = b64encode(f"\0{user}\0{password}".encode()).decode()
+        code, text = server.docmd("AUTH", f"PLAIN {given}")
+        if code != LOGGED_IN:
+            raise smtplib.SMTPAuthenticationError(code, text)
 
     def _written(self, message: Message) -> EmailMessage:
         """Returns the e-mail. Only words of this program's are in its head, so that nobody else's can add a line."""

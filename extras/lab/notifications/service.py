@@ -14,7 +14,7 @@ from datetime import datetime, timedelta
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.notifications import DestinationStatus, Notification, NotificationStatus
-from extras.lab.notifications.delivery import DeliveryError, Message
+from extras.lab.notifications.delivery import DeliveryError, Message, problem_of
 from extras.lab.notifications.destinations import Destination
 from extras.lab.notifications.outbox import Due, Outbox, pause_after
 from server.clock import Clock
@@ -226,11 +226,10 @@ class Notifier:
         try:
             answer = self._destinations[key].sender.send(due.message)
         except Exception as error:
-            told = isinstance(error, DeliveryError)
-            if not told:
+            expected = error if isinstance(error, DeliveryError) else None
+            if expected is None:
                 log.exception("notifications: %s", key)
-            line = str(error) if told else f"{type(error).__name__}: see the log"
-            self._failed(key, due, line, error if isinstance(error, DeliveryError) else None)
+            self._failed(key, due, problem_of(error), expected)
             return
         now = self._clock.utc()
         self._until_written(lambda: self._outbox.sent(due, now))

@@ -72,7 +72,7 @@ class ExperimentChooser:
     ) -> Asked:
         """What to make next: what separates the rivals of a name or a group; else the most informative one. Raises
         CancelledError when asked to end."""
-        if verdict in ("named", "ambiguous"):
+        if verdict in ("named", "ambiguous", "partly"):
             ended = converge_rivals(rivals)
             return best_experiment(ended, self, cancel) if len(ended) > 1 else Asked(None)
         done = [t.record.spec for t in traces if t.record.spec is not None]

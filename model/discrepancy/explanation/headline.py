@@ -40,6 +40,8 @@ def _finding_of(found: Diagnosis) -> str:
     findings = [_group(s, found.inseparable) if s.group else _finding(s) for s in shown]
     if found.verdict == "unknown-effect":
         findings.append("none of the known effects explains what is left")
+    if found.verdict == "partly":
+        findings.append("and more is missing that no known effect explains")
     return "; ".join(findings) or "several effects that these traces cannot tell apart"
 
 

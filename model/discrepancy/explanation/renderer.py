@@ -225,9 +225,13 @@ def _summary_of(answer: Diagnosis) -> str:
             return _suspected(answer)
         case "unknown-effect":
             return _unknown(answer)
-        case "named" | "ambiguous":
+        case "named" | "ambiguous" | "partly":
             parts = [_undecided(s.group, s.where, answer.inseparable) if s.group else reason_text(s) for s in adopted]
-            rest = ["Something is left that none of the known effects explains."] if answer.remaining else []
+            rest = (
+                ["Something is left that none of the known effects explains."]
+                if answer.remaining or answer.verdict == "partly"
+                else []
+            )
             return " ".join([*parts, *rest])
 
 

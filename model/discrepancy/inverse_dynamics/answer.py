@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.estimates import found_values, signal_er
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.gap import torque_gap
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.left_over import joints_left_over
+from model.discrepancy.inverse_dynamics.left_over import is_left_beside, joints_left_over
 from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.verdict import verdict
@@ -69,7 +69,12 @@ def answer_of(outcome: Outcome, traces: Sequence[str], held_out: Sequence[str], 
     missing = bool(shapes) or bool(joints_left_over(standing))
     fit_errors, held_errors = (_errors(standing, records) for records in (case.records, case.held_out))
     return Diagnosis(
-        verdict=verdict((*proved, *steps), unexplained=missing and not named, suspected=outcome.suspicion is not None),
+        verdict=verdict(
+            (*proved, *steps),
+            unexplained=missing and not named,
+            suspected=outcome.suspicion is not None,
+            partly=is_left_beside(standing),
+        ),
         suspicion=None if named else outcome.suspicion,
         summary=UNWRITTEN,
         method="inverse-dynamics",

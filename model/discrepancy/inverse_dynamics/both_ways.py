@@ -135,7 +135,7 @@ def _without_excluded(answer: Diagnosis, seen: Sequence[Step]) -> Diagnosis:
     if steps == answer.steps:
         return answer
     is_open = any(step.adopted and step.group for step in steps)
-    verdict: Verdict = "ambiguous" if is_open else "named"
+    verdict: Verdict = "partly" if answer.verdict == "partly" else "ambiguous" if is_open else "named"
     return _with_note(answer.model_copy(update={"steps": steps, "verdict": verdict}), Note(kind="names-excluded"))
 
 

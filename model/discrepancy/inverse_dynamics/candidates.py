@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.stated_numbers import number_trials, sta
 from model.discrepancy.inverse_dynamics.trial import Trial
 from model.effects.effect import Effect
 from model.effects.library import library
-from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, turns_round
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.effect_parameters import suits_drive
@@ -30,6 +30,9 @@ FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
 """Terms of a bent sensor that a trial frees; the shorter waves keep the priors of a sound one."""
 UNDER_LOAD = {"load_dependent_friction": "arm", "gravity_torque_friction": "share"}
 """Effects whose friction goes with a load that the posture decides, and the parameter that multiplies it."""
+SPRINGS = ("spring_torque", "one_sided_spring")
+"""Effects whose torque goes with the position and does not repeat every turn: no joint that turns round has them, since
+after a turn it is where it was."""
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 
@@ -37,7 +40,7 @@ CONSTANT_LOAD = 0.05
 def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once; of what the file states,
     whether it is another size than stated; and numbers of the machine that the fit has moved."""
-    names = case.options.effects
+    names, round_ = case.options.effects, turns_round(case.records, model.machine)
     for name, effect in library().items():
         if name in NOT_IN_TORQUES or (names is not None and name not in names):
             continue
@@ -53,6 +56,8 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
                 continue
             if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
+            if name in SPRINGS and round_[joints[0] - 1]:
+                continue
             trial = _trial(model, name, joints, now)
             if trial.starts:
                 yield trial

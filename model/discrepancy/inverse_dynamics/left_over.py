@@ -6,6 +6,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
+from model.arrays import Floats
 from model.discrepancy.diagnosis import RemainingShape, Step
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -34,20 +35,35 @@ SENSOR = "sensor"
 """The family of a position sensor's errors."""
 
 
+def is_left_beside(standing: Standing) -> bool:
+    """Whether far more than noise is left, on fitted and on held-out records, on a joint of an effect that was
+    adopted: its name is then not all of the answer."""
+    own = {j for step in standing.steps if step.adopted for j in step.joints}
+    joints = standing.model.machine.modelled_joints
+    far = _noises_left(standing) > FAR_ABOVE_NOISE
+    return any(is_far and (j in own or not own) for j, is_far in zip(joints, far, strict=True))
+
+
 def joints_left_over(standing: Standing) -> tuple[int, ...]:
     """Joints whose residual is above noise on fitted and on held-out records, and is no noise: far above and slower, or
     of a shape."""
     case, now = standing.case, standing.now
-    fitted = [np.sqrt(holdout.mean_squares(case.stretches, now.residual))]
-    if case.held_out:
-        held = holdout.held_out_squares(standing.model, now.values, case.held_out)
-        fitted.append(np.sqrt(held))
-    least = np.fmin.reduce(fitted) / case.noise  # a record in which a joint rests says nothing of it
+    least = _noises_left(standing)
     shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= ANOTHER_LAW}
     joints = standing.model.machine.modelled_joints
     slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > LONG_MEMORY)
     shapes = (least > SHAPED_ABOVE_NOISE) & np.array([j in shaped for j in joints])
     return tuple(j for j, left in zip(joints, slow | shapes, strict=True) if left)
+
+
+def _noises_left(standing: Standing) -> Floats:
+    """(n,) what fitted and held-out records leave at least, in noise floors: a record in which a joint rests says
+    nothing of it."""
+    case, now = standing.case, standing.now
+    left = [np.sqrt(holdout.mean_squares(case.stretches, now.residual))]
+    if case.held_out:
+        left.append(np.sqrt(holdout.held_out_squares(standing.model, now.values, case.held_out)))
+    return np.asarray(np.fmin.reduce(left) / case.noise)
 
 
 def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -20,7 +21,7 @@ from model.discrepancy.inverse_dynamics.left_over import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import REPEATING
 from model.discrepancy.inverse_dynamics.search import Fitted
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.inverse_dynamics.workflow import LEAVES_MORE, TorqueWorkflow
 from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
@@ -57,8 +58,12 @@ class Look:
         return self.workflow.answer(fitted, checked, self.cutoff).model_copy(update={"robot_seconds": robot})
 
     def speaks_for(self, step: Step) -> bool:
-        """Whether these records speak for the effect of a step, though their motion does not let it be named."""
+        """Whether these records speak for the effect of a step, though they do not let it be named: by their motion, or
+        since they leave more beside it."""
         own = names_of(step)
+        refused = (s for s in self.workflow.found.steps if s.refusal is not None and s.refusal.kind == LEAVES_MORE)
+        if any(own & names_of(s) and meet(step.joints, s.joints) for s in refused):
+            return True
         same = (f for f in self.workflow.beyond_motion if f.effect in own and meet(step.joints, f.joints))
         return any(f.effect != REPEATING or self._repeats_alike(step, f) for f in same)
 
@@ -121,7 +126,7 @@ def _finds(answer: Diagnosis) -> bool:
 
 def _names_slow_effects(answer: Diagnosis) -> bool:
     """Whether effects are named, all of which lower cutoffs show as well."""
-    named = answer.verdict in ("named", "ambiguous") and bool(found_in_torques(answer))
+    named = answer.verdict in ("named", "ambiguous", "partly") and bool(found_in_torques(answer))
     return named and not _jumps_anywhere(answer)
 
 
@@ -167,7 +172,7 @@ def _jumps(name: str) -> bool:
 
 @dataclass(frozen=True)
 class Records:
-    """What a diagnosis is of: traces to fit to, and others that are held out."""
+    """What a diagnosis is of: traces to fit to, and others that are held out. most: no cutoff is above it, Hz."""
 
     model: Model
     traces: tuple[Trace, ...]
@@ -175,6 +180,7 @@ class Records:
     options: TorqueOptions
     controller: JudgedController
     cancel: Cancel
+    most: float = math.inf
 
     def bears(self, cutoff: float) -> bool:
         """Whether every record lasts long enough for a cutoff (Hz)."""
@@ -186,12 +192,13 @@ class Records:
 
         Raises SpecError where nothing moves beyond the noise of its readings.
         """
-        return self.options.cutoff or choose_cutoff(self.traces, self.model.machine)
+        return self.options.cutoff or min(self.most, choose_cutoff(self.traces, self.model.machine))
 
     def exchanged(self) -> Records:
-        """The same with fitted and held-out traces exchanged. What the traces to fit to prove of the controller stays:
-        the proof is the record's, whatever is fitted."""
-        return replace(self, traces=self.held_out, held_out=self.traces)
+        """The same with fitted and held-out traces exchanged, below no higher cutoff: what stands above it in these was
+        not looked at in those. What the traces to fit to prove of the controller stays: the proof is the record's,
+        whatever is fitted."""
+        return replace(self, traces=self.held_out, held_out=self.traces, most=self.highest_cutoff)
 
     def below(self, cutoff: float, progress: Progress) -> Look:
         """What torques below a cutoff (Hz) show.

@@ -12,7 +12,7 @@ from model.arrays import Floats
 from model.fitting.unknowns import Unknown
 
 NEXT_TO_NONE = 1e-2
-"""Share of what a file states below which friction is not told from none."""
+"""Share of what a file states below which a number is not told from none."""
 SAME_MAGNET = 0.01
 """Deviation of a back-EMF constant from the torque constant of its motor, as a share: an assumption. Both are of one
 magnet, and in SI units the same number, or power would come of nothing; a file that states two different numbers is
@@ -33,14 +33,14 @@ def prior_cost(unknowns: Sequence[Unknown], values: Mapping[str, float]) -> floa
 def prior_distance(u: Unknown, value: float) -> tuple[float, float]:
     """Distance of a number from what is expected, in deviations, and its derivative. 0 where nothing is expected.
 
-    Friction that the file states is stated to a share of itself. Below, it counts by its logarithm: in plain
-    distances, none at all is only 3.3 deviations from friction that is stated to 30 %, and a fit would rather take a
-    friction away than show that another law is missing. Both have the same slope where they meet.
+    A number that cannot be below zero is stated to a share of itself. Below, it counts by its logarithm: in plain
+    distances, none at all is only 3.3 deviations from friction that is stated to 30 %, and no magnet at all 5 from one
+    that is stated to 20 %. A fit would rather take a friction or a motor away than show that another law is missing.
+    Both have the same slope where they meet.
     """
     if u.deviation is None:
         return 0.0, 0.0
-    of_effect = u.parameter.effect is not None and not u.nuisance
-    if not of_effect or u.low < 0.0 or u.expected <= 0.0 or value >= u.expected:
+    if u.nuisance or u.low < 0.0 or u.expected <= 0.0 or value >= u.expected:
         return (value - u.expected) / u.deviation, 1.0 / u.deviation
     least = max(value, NEXT_TO_NONE * u.expected)
     per_share = u.expected / u.deviation

@@ -36,7 +36,7 @@ from model.machine_model.parameter import Parameter
 
 REVISIONS = 2
 """Times that all effects are looked for once more, at most: again where the first time has changed one."""
-STRUCTURE = "leaves-more-than-noise"
+LEAVES_MORE: RefusalKind = "leaves-more-than-noise"
 """Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
 SUPERFLUOUS: RefusalKind = "superfluous"
 """Kind of refusal of an effect that nothing needs any more."""
@@ -324,7 +324,7 @@ def _has_more(after: Found, before: Found) -> bool:
 
 
 def _leaves_structure(step: Step) -> bool:
-    return step.refusal is not None and step.refusal.kind == STRUCTURE
+    return step.refusal is not None and step.refusal.kind == LEAVES_MORE
 
 
 def _own_bounds(found: Fitted) -> list[Parameter]:

@@ -6,7 +6,7 @@ and its errors, stay those of the step.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from model.discrepancy.candidates.candidate_fit import Fit, judge
 from model.discrepancy.candidates.estimates import found_values, shift_by_noise
@@ -21,7 +21,7 @@ def update_to_last_fit(current: Fit, steps: Sequence[Step]) -> tuple[Fit, tuple[
     """The last fit, and steps with its parameters.
 
     An effect whose intervals contain the values at which it is absent is dropped: a later one explains what it did, and
-    the last fit is made without it.
+    the last fit is made without it. So is a joint of an effect on several, on which only its neighbours made it stand.
     """
     adopted = [s for s in steps if s.adopted]
     if not adopted:
@@ -29,18 +29,34 @@ def update_to_last_fit(current: Fit, steps: Sequence[Step]) -> tuple[Fit, tuple[
     values = _values(current, adopted)
     known = current.point.model.by_name
     empty = [s for s in adopted[:-1] if _is_nothing([(values[n], known[n]) for n in s.parameters])]
-    if empty:
-        current = _without(current.point, [name for s in empty for name in s.parameters])
-        values = _values(current, [s for s in adopted if s not in empty])
+    absent = {id(s): () if s in empty else _absent_on(s, values, known) for s in adopted}
+    gone = [name for s in empty for name in s.parameters]
+    gone += [name for s in adopted for name in s.parameters if set(known[name].joints) & set(absent[id(s)])]
+    if gone:
+        current = _without(current.point, gone)
+        kept = [s.model_copy(update={"parameters": _kept(s, gone)}) for s in adopted if s not in empty]
+        values = _values(current, kept)
 
     def updated(step: Step) -> Step:
         if not step.adopted:
             return step
         if step in empty:
             return step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
-        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}})
+        joints = tuple(j for j in step.joints if j not in absent[id(step)])
+        return step.model_copy(update={"joints": joints, "parameters": {n: values[n] for n in _kept(step, gone)}})
 
     return current, tuple(updated(s) for s in steps)
+
+
+def _kept(step: Step, gone: Sequence[str]) -> dict[str, FoundValue]:
+    return {name: value for name, value in step.parameters.items() if name not in gone}
+
+
+def _absent_on(step: Step, values: Mapping[str, FoundValue], known: Mapping[str, Parameter]) -> tuple[int, ...]:
+    """Joints of an effect on several on which it may be absent; none where it may be absent on all."""
+    own = {j: [(values[n], known[n]) for n in step.parameters if known[n].joints == (j,)] for j in step.joints}
+    found = tuple(j for j, sizes in own.items() if sizes and _is_nothing(sizes))
+    return found if len(found) < len(step.joints) else ()
 
 
 def _values(now: Fit, steps: Sequence[Step]) -> dict[str, FoundValue]:

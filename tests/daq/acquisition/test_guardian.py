@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import socket
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
-from daq.acquisition import stop_socket
+from daq.acquisition import guardian, stop_socket
 from daq.acquisition.guardian import CANCEL, EndCause, Guardian
-from daq.acquisition.stop_socket import StopAnswer, request_stop, stop_listener
+from daq.acquisition.stop_socket import StopAnswer, StopSocket, request_stop, stop_listener
 
 CONFIRMED = StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)
 
@@ -48,7 +50,7 @@ class Freezes:
 class Scene:
     guardian: Guardian
     freezes: Freezes
-    listener: socket.socket
+    listener: StopSocket
     parent: int
 
 
@@ -130,7 +132,7 @@ def test_a_client_that_connects_and_says_and_reads_nothing_holds_up_nobody() -> 
     with guarded() as scene:
         hanging = [socket.socket(socket.AF_UNIX) for _ in range(3)]
         for client in hanging:
-            client.connect(scene.listener.getsockname())
+            client.connect(str(scene.listener.path))
         (attempt,) = request_stop()
         for client in hanging:
             client.close()
@@ -140,7 +142,7 @@ def test_a_client_that_connects_and_says_and_reads_nothing_holds_up_nobody() -> 
 def test_a_client_that_goes_at_once_has_asked_all_the_same() -> None:
     with guarded() as scene:
         client = socket.socket(socket.AF_UNIX)
-        client.connect(scene.listener.getsockname())
+        client.connect(str(scene.listener.path))
         client.close()
         scene.freezes.wait()
 
@@ -150,9 +152,47 @@ def test_a_client_that_comes_while_the_run_ends_is_still_answered() -> None:
     client.settimeout(10)
     with guarded() as scene:
         scene.guardian._closing = True  # it looks at its socket no more
-        client.connect(scene.listener.getsockname())
+        client.connect(str(scene.listener.path))
     with client:
         assert StopAnswer.from_json(client.recv(4096)) == CONFIRMED
+
+
+def test_a_socket_whose_folder_is_removed_is_made_again_and_who_had_found_it_is_answered(
+    own_runtime_folder: Path,
+) -> None:
+    with guarded() as scene, socket.socket(socket.AF_UNIX) as early:
+        early.settimeout(10)
+        with scene.guardian._lock:  # so that the early client waits until the folder is gone
+            early.connect(str(scene.listener.path))
+            shutil.rmtree(own_runtime_folder)
+        assert StopAnswer.from_json(early.recv(4096)) == CONFIRMED
+        until = time.monotonic() + 10
+        while not (found := request_stop()) and time.monotonic() < until:
+            time.sleep(guardian.LOOK_EVERY / 10)
+        assert [attempt.answer for attempt in found] == [CONFIRMED]
+        assert scene.guardian.unheard == ""
+
+
+def test_stops_of_two_threads_at_once_are_both_answered_and_a_reset_between_them_forgets_nothing() -> None:
+    begun, go_on = threading.Semaphore(0), threading.Semaphore(0)
+
+    def slow(_cause: str) -> StopAnswer:
+        begun.release()
+        assert go_on.acquire(timeout=10)
+        return CONFIRMED
+
+    with stop_listener("arm") as listener, Guardian(listener, None, slow) as watched:
+        with ThreadPoolExecutor(2) as pool:
+            first, second = pool.submit(watched.stop), pool.submit(watched.stop)
+            assert begun.acquire(timeout=10)
+            assert begun.acquire(timeout=10)
+            go_on.release()
+            done, (left,) = wait([first, second], timeout=10, return_when=FIRST_COMPLETED)
+            assert [one.result() for one in done] == [CONFIRMED]
+            assert not watched.forget(time.monotonic()), "the other one is still under way"
+            go_on.release()
+            assert left.result(10) == CONFIRMED
+        assert watched.forget(time.monotonic())
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

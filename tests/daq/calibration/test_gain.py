@@ -53,9 +53,7 @@ def test_the_default_gain_is_found_with_its_physical_value() -> None:
 
 
 @given(
-    st.floats(0.3, 30),
-    st.sampled_from(sorted(ROUNDINGS)),
-    st.lists(st.integers(-200, 200), min_size=3, max_size=60),
+    st.floats(0.3, 30), st.sampled_from(sorted(ROUNDINGS)), st.lists(st.integers(-200, 200), min_size=3, max_size=60)
 )
 def test_the_gain_lies_between_its_limits_whatever_the_rounding(gain: float, rounding: str, seen: list[int]) -> None:
     errors = np.array(seen)

@@ -1,7 +1,5 @@
 """A network that answers from a list, and a pause that nobody waits for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

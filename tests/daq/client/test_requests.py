@@ -1,7 +1,5 @@
 """What the client sends twice and what never, what it makes of refusals, and how it reads lists and files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A load that is told is known as well as the machine file's own, relative to its size."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.carried_load import LEAST_DEVIATION, carrying

@@ -1,7 +1,5 @@
 """A machine file with a mistake in it is refused in one line: the field, what was found, what is allowed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

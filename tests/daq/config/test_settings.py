@@ -1,7 +1,5 @@
 """Where settings come from, which goes before which, and that no guard is lost by leaving a limit out."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Several robots in one daq.toml: each has settings of its own, and nothing that only one can have is shared."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A shared memory that changes under the reader's hands, at moments and in steps that a test chooses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 

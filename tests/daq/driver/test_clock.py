@@ -1,7 +1,5 @@
 """Time in lock-step is the controller's own, which passes only when somebody asks for it; else it is the computer's."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

@@ -1,19 +1,11 @@
 """What the driver says when a controller is not what it should be, and when a link fails under it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
-from daq.driver import (
-    Controller,
-    ControllerRestartedError,
-    GainsNotTakenError,
-    NoSampleError,
-    ProtocolVersionError,
-)
+from daq.driver import Controller, ControllerRestartedError, GainsNotTakenError, NoSampleError, ProtocolVersionError
 from daq.driver.line_rate import bytes_of_a_compact_turn, bytes_of_a_turn
 from daq.link import Link, LinkState, LinkTimeoutError, RequestRefusedError
 from daq.transport import TransportError

@@ -1,7 +1,5 @@
 """Readings through the documented addresses: whole or not at all, whatever moment the controller chooses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pytest

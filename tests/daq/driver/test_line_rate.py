@@ -1,7 +1,5 @@
 """What a line carries: bytes of a turn as the frames have them, the rate that leaves room, and what is told."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.driver.line_rate import (

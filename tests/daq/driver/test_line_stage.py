@@ -3,8 +3,6 @@
 The stage is that of the example's rig, which shares no code with them; its time passes as the host waits.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
@@ -72,7 +70,7 @@ class Line:
     def waited(self) -> float:
         return 0.0
 
-    def connect(self) -> Line:
+    def connect(self) -> "Line":
         return self
 
     def write(self, data: bytes) -> None:

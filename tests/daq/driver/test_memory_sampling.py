@@ -1,7 +1,5 @@
 """Without SAMPLE: the host counts the periods itself, from its first reading on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import cast
 

@@ -1,7 +1,5 @@
 """With SAMPLE: when the question for a period is asked, what counts as late, and what a compact turn tells."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

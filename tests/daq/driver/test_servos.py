@@ -1,7 +1,5 @@
 """Servos behind the driver: what each request does to them, and one clear line for each thing that goes wrong."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

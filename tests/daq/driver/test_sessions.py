@@ -1,7 +1,5 @@
 """The driver when its session is over, and when a stop comes in the very moment of a release."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Which snapshots show a missed set point: not the ones within the pipeline of one period, all older ones."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """Samples over a slow line, in lock-step: every n-th period, evenly, with set points that are taken."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The driver against a faulty controller in lock-step: nothing lost, nothing wrong, everything counted, repeatable."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

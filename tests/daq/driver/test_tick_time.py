@@ -1,7 +1,5 @@
 """The host time of a tick, from arrivals that are late by the line and the scheduler."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """What the host's own memory map leaves out is never asked for, even of a bridge that would carry it out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import pytest

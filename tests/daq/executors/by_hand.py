@@ -1,7 +1,5 @@
 """Workers that compute in the test's own process, when they are told to, and die when they are told to."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The URL of an executor: what is understood, and what is refused in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.errors import SpecError

@@ -1,7 +1,5 @@
 """Every task is answered once, whatever becomes of workers."""
 
-from __future__ import annotations
-
 from concurrent.futures import BrokenExecutor, Future
 from typing import Any
 

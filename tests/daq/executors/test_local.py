@@ -1,7 +1,5 @@
 """Processes of this computer: what becomes of jobs and of the processes when one of them, or their parent, ends."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A controller that answers by a script, on a clock that moves only when somebody waits."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable
 from dataclasses import dataclass, field

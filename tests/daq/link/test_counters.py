@@ -1,7 +1,5 @@
 """What is counted from a mark on, beside what is counted from the beginning."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.link.counters import COUNTED, LinkCounters, RoundTrips, Tally

@@ -1,7 +1,5 @@
 """The port's URL names the line protocol: one of those that ship, or one of another installed package."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Turns in lock-step: what the idle mark ends, what a time-out costs, and that nothing depends on how bytes are cut."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,12 +1,23 @@
 """A stop from one thread while another waits for a sample: written at once, confirmed by itself."""
 
-from __future__ import annotations
-
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
+from typing import Any
 
-from daq.link import Link
-from firmware_protocol.commands import Request, Sample, Snapshot, Stop, Stopped, parse_request
+import pytest
+
+from daq.link import Link, StopCameFirstError
+from firmware_protocol.commands import (
+    GripperSet,
+    Request,
+    Sample,
+    SetGripper,
+    Snapshot,
+    Stop,
+    Stopped,
+    parse_request,
+)
 from firmware_protocol.framing import FrameDecoder
 from firmware_protocol.joints import JointReading
 from tests.daq.link.scripted import frame_of
@@ -38,7 +49,7 @@ class SampleWaitsForStop:
     def waited(self) -> float:
         return 0.0
 
-    def connect(self) -> SampleWaitsForStop:
+    def connect(self) -> "SampleWaitsForStop":
         return self
 
     def write(self, data: bytes) -> None:
@@ -50,6 +61,8 @@ class SampleWaitsForStop:
                 self.sample_waits.set()
             elif isinstance(request, Stop):
                 self._replies.put(frame_of(frame.sequence, STOPPED))
+            elif isinstance(request, SetGripper):
+                self._replies.put(frame_of(frame.sequence, GripperSet()))
 
     def answer_sample(self) -> None:
         assert self._sample is not None
@@ -78,7 +91,8 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
     bench.answer_sample()
     sampler.join(WITHIN)
     assert samples == [SNAPSHOT]
-    assert bench.order == [Sample, Stop, Stop]
+    assert bench.order[:3] == [Sample, Stop, Stop]
+    assert set(bench.order[3:]) <= {Stop}, "asked again where the machine is busy"
 
 
 def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
@@ -174,3 +188,49 @@ def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     assert not wrong
     assert link.counters.requests == 1200
     assert link.counters.retries == 0
+
+
+class WriteLock:
+    """The lock of the line, where the first of two threads goes on only when the second one waits for it."""
+
+    def __init__(self) -> None:
+        self.is_first_in = threading.Event()
+        self._lock = threading.Lock()
+        self._second_waits = threading.Event()
+
+    def __enter__(self) -> None:
+        if self.is_first_in.is_set():
+            self._second_waits.set()
+            self._lock.acquire()
+            return
+        self._lock.acquire()
+        self.is_first_in.set()
+        assert self._second_waits.wait(WITHIN)
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+@pytest.mark.parametrize("stop_is_first", [True, False])
+def test_what_was_allowed_before_a_stop_of_another_thread_is_never_written_behind_it(stop_is_first: bool) -> None:
+    bench, lock = SampleWaitsForStop(), WriteLock()
+    link = Link(bench)
+    link.set_period(PATIENCE)
+    link._connection._write_lock = lock  # type: ignore[assignment]
+
+    def close_the_gripper(stops: int) -> GripperSet:
+        return link.request(SetGripper(1), GripperSet, before_stop=stops)
+
+    with ThreadPoolExecutor(2) as pool:
+        orders: list[Any] = [(link.stop,), (close_the_gripper, link.stops)]
+        first, second = orders if stop_is_first else orders[::-1]
+        begun = pool.submit(*first)
+        assert lock.is_first_in.wait(WITHIN)
+        followed = pool.submit(*second)
+        stopped, closed = (begun, followed) if stop_is_first else (followed, begun)
+        assert stopped.result(WITHIN) == STOPPED
+        if stop_is_first:
+            assert isinstance(closed.exception(WITHIN), StopCameFirstError)
+        else:
+            assert closed.result(WITHIN) == GripperSet()
+    assert bench.order == [SetGripper] * (not stop_is_first) + 2 * [Stop]  # which is written twice at once

@@ -1,7 +1,5 @@
 """How long a reply may take, and how often a request is repeated: the numbers themselves."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.link.timing import LinkTiming, copies_of, reply_opcode

@@ -1,7 +1,5 @@
 """What a link makes of lost, late, repeated, foreign and refused replies."""
 
-from __future__ import annotations
-
 from random import Random
 
 import pytest

@@ -1,7 +1,5 @@
 """One mock for all runs of a session: starting one costs more than most runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A mock in lock-step with everything a run needs, and ears that can act at a chosen moment of the run."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A stop wins, in whatever moment it comes. The controller here only writes down what it is told."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, cast
 

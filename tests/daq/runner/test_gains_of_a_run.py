@@ -1,7 +1,5 @@
 """Gains of an experiment: set before it moves, put back after it, left alone on an arm that has been stopped."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """On samples that are too old nothing is sent, and not for ever."""
 
-from __future__ import annotations
-
 from daq.runner.lag import OLDEST_TO_ACT_ON, Lag
 
 PERIOD = 0.02

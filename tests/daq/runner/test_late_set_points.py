@@ -1,7 +1,5 @@
 """Set points that the computer sends late are told: the controller has then worked with the one before."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What the line to a controller can give, as a status has it, and as people read it."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """How runs end, and what each ending leaves: on the board, in the trace, in what is told."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """What is refused before anything moves: the board is as it was, and no file is left."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -108,7 +106,7 @@ class Line:
     joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
 
     @property
-    def link(self) -> Line:
+    def link(self) -> "Line":
         return self
 
 

@@ -1,7 +1,5 @@
 """Counts of the board become angles and volts by the machine file's numbers, and time begins with the record."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

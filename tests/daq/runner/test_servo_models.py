@@ -1,7 +1,5 @@
 """What models make of the records of a bench of servos. The bench's plant shares no code with them."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Experiments on a bench of servos: recorded, refused and ended as on the arm that the driver was written for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What models and a diagnosis make of records of a bench of servos that hides an effect."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A run over a slow line: every n-th period is recorded, the trace says so, and no motion is faster than its plan."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path

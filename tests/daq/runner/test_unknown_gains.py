@@ -1,7 +1,5 @@
 """A run of an arm whose memory map leaves out the gains: its record says that no limp joint can be seen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from daq.contracts.limp import GAINS_UNKNOWN

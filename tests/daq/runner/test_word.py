@@ -1,7 +1,5 @@
 """The operator's consent is True, and nothing that only counts as true."""
 
-from __future__ import annotations
-
 from typing import Any, cast
 
 import pytest

@@ -1,7 +1,5 @@
 """Joints that slide are checked, moved and shown in metres, never in degrees."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Trace files damaged in every way: at random as disks and power cuts do it, and on purpose in every length field."""
 
-from __future__ import annotations
-
 import random
 import struct
 import zlib

@@ -4,8 +4,6 @@ Nothing may end in another error than DaqError, in one line of bounded length; a
 of what the file has, or its notes say what is missing. The files of traces themselves have `trace_damage`.
 """
 
-from __future__ import annotations
-
 import itertools
 import random
 from collections import Counter

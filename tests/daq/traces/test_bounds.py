@@ -1,7 +1,5 @@
 """Values that no rig can have measured are refused; the largest possible ones are not. And room is looked for first."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

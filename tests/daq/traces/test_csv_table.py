@@ -83,6 +83,28 @@ def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -
     }
 
 
+def test_times_in_ms_are_asked_about_and_taken_where_they_are_stated(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time,position_1\n" + "".join(f"{5 * k},0.5\n" for k in range(4)))
+    assert "5 s apart. Are its times in ms?" in import_csv(path).record.notes
+    path.with_suffix(".toml").write_text('time_unit = "ms"\n')
+    stated = import_csv(path)
+    assert "ms" not in stated.record.notes
+    np.testing.assert_allclose(stated.time, [0.0, 0.005, 0.01, 0.015])
+
+
+@pytest.mark.parametrize(("begins", "unit"), [("1700000000", "s"), ("1700000000000", "ms")])
+def test_times_since_1970_count_from_the_first_row_and_keep_their_digits(
+    begins: str, unit: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(f"time,position_1\n{begins}.000001,0.5\n{begins}.000003,0.6\n")
+    path.with_suffix(".toml").write_text(f'time_unit = "{unit}"\n')
+    trace = import_csv(path)
+    np.testing.assert_allclose(trace.time, [0.0, 2e-6 if unit == "s" else 2e-9], rtol=1e-9)
+    assert f"which is at {begins}.000001 {unit}." in trace.record.notes
+
+
 def test_a_machine_that_is_not_shipped_is_not_named_beside_the_table(tmp_path: Path) -> None:
     """A name alone would not be found again."""
     trace = read_trace(write(tmp_path / "a.mcap", 3))

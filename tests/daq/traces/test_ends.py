@@ -1,7 +1,5 @@
 """The beginning and the end of a finished file are found without reading what lies between."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

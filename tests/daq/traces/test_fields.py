@@ -1,7 +1,5 @@
 """The fields of a record are read as mcap's own parsers read them, and none beyond the record."""
 
-from __future__ import annotations
-
 import io
 import struct
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What a trace says about itself is believed within bounds only, since another program may have written it."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """A figure looks as it was judged by eye once: sizes, colours and strokes, and every text in its place."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path
@@ -71,10 +69,7 @@ def test_every_text_has_its_size_and_place(figure: Figure) -> None:
     assert [
         (t.get_text(), t.get_fontsize(), t.get_horizontalalignment(), t.get_color(), t.get_position())
         for t in panel.texts
-    ] == [
-        ("stop", 6.5, "center", "#B00020", (0, 2)),
-        ("pause", 6.5, "center", "#8a8a8a", (0, 2)),
-    ]
+    ] == [("stop", 6.5, "center", "#B00020", (0, 2)), ("pause", 6.5, "center", "#8a8a8a", (0, 2))]
     title, foot = figure.texts
     assert (title.get_fontsize(), title.get_horizontalalignment(), title.get_position()[0]) == (11, "left", 0.01)
     assert (foot.get_fontsize(), foot.get_horizontalalignment(), foot.get_position()[0]) == (7.5, "left", 0.01)

@@ -1,7 +1,5 @@
 """Which traces a query means, and which texts are none."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 

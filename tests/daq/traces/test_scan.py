@@ -1,7 +1,5 @@
 """A walk through a file: limits that are met to the byte, checksums, and what may come once only."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

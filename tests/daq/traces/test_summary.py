@@ -1,7 +1,5 @@
 """The figures of a joint, from records whose figures are known beforehand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of an imported record: in the units that its file allows to know."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -5,8 +5,6 @@ no file is called complete, or trustworthy, of which anything is missing or diff
 deleted.
 """
 
-from __future__ import annotations
-
 import itertools
 import random
 from collections import Counter

@@ -7,17 +7,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import (
-    Cubic,
-    ExperimentSpec,
-    Multisine,
-    Ramp,
-    Sine,
-    SlowRamp,
-    Staircase,
-    Step,
-    Trajectory,
-)
+from daq.contracts.experiment import Cubic, ExperimentSpec, Multisine, Ramp, Sine, SlowRamp, Staircase, Step, Trajectory
 from daq.safety import check_plan
 from daq.trajectories import PRESETS, Plan, plan, preset, start_angles
 from tests.daq.trajectories.machines import MA2000

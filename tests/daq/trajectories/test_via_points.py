@@ -1,7 +1,5 @@
 """Via points and 4-3-4 trajectories (section 3.7 of the source), against conditions solved on their own."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

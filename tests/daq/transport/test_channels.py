@@ -1,7 +1,5 @@
 """Channels over real descriptors: a pseudo-terminal, a TCP connection; taken, absent and vanished ports."""
 
-from __future__ import annotations
-
 import os
 import pty
 import socket

@@ -1,7 +1,5 @@
 """What `daq ports` finds."""
 
-from __future__ import annotations
-
 from serial.tools.list_ports_common import ListPortInfo
 
 from daq.transport import FoundPort, parse_port_url, ports

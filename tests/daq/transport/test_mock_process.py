@@ -1,7 +1,5 @@
 """mock:// starts a controller of its own, and ends it, however its owner ends."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

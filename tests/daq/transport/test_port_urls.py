@@ -1,7 +1,5 @@
 """What may stand in a port URL, and what is said when something else does."""
 
-from __future__ import annotations
-
 import contextlib
 
 import pytest

@@ -1,7 +1,5 @@
 """A mock's pseudo-terminal that has become another program's is left alone."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The command line of models: the same empty folder as for every other command, and traces of pretended rigs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`daq diagnose --acquire`: what is asked for is run and used, and the loop ends where it should."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

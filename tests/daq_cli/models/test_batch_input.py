@@ -1,7 +1,5 @@
 """What `daq batch` refuses, in one line each, before anything is computed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

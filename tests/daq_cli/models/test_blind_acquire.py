@@ -1,7 +1,5 @@
 """A blind trial that may ask for more, by the diagnosis itself: what it is told, asks for, and is given."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`daq check`, and what every command of models does with a record that it doubts."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

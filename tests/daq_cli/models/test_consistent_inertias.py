@@ -1,7 +1,5 @@
 """`daq fit --consistent-inertias`: the hand-written swing, on a machine whose link is a body."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`daq diagnose`: the answer for people, the answer for programs, and one line for what cannot be answered."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

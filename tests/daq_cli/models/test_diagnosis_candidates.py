@@ -1,7 +1,5 @@
 """Candidates in a terminal: what fits have shown, the named one always among them; what probes promise below it."""
 
-from __future__ import annotations
-
 from daq_cli.models.diagnosis_text import candidates_lines
 from model.discrepancy.diagnosis import Candidate, Step
 from tests.model.discrepancy import steps

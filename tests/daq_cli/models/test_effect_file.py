@@ -1,7 +1,5 @@
 """An effect of the user's own, through every command that takes one."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """`daq run … --feedforward` and `--learn-from`: what is run, what the trace tells of it, and wrong input."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`daq fit --torques` for a person: what it prints, what its page shows, and what it calls the traces."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every file and number that a command of models takes, given what nobody means: one line, exit code of wrong input."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The machine that traces were made on: one, whatever it is called; its limits may have changed meanwhile."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulate, compare and fit from the command line, on traces whose truth is known."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

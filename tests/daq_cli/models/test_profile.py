@@ -1,7 +1,5 @@
 """`daq profile`: what a trace bounds on both sides, and what on one side alone."""
 
-from __future__ import annotations
-
 import csv
 import json
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """`daq sensitivity`: which parameter moves which joint's response, and when."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

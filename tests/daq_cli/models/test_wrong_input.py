@@ -1,14 +1,15 @@
 """What cannot give a model is refused in one line that says what, where and what is allowed; no file is written."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import SINGLE_AXIS, write_csv
+
+EIGHT_EFFECTS = "viscous,coulomb,stribeck,stiction,torque_ripple,gear_loss,spring,potentiometer_gain"
 
 
 def refused(daq: CommandLine, *words: object, says: tuple[str, ...], code: int = 2) -> None:
@@ -18,11 +19,6 @@ def refused(daq: CommandLine, *words: object, says: tuple[str, ...], code: int =
 
 def fitting(*traces: object) -> tuple[object, ...]:
     return ("fit", *traces, "--machine", SINGLE_AXIS, "-o", "out.json")
-
-
-def test_a_trace_without_motion_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    still = write_csv(tmp_path / "still.csv", amplitude=0.0)
-    refused(daq, *fitting(still), says=("no motion", "4 counts"))
 
 
 def test_a_trace_with_a_value_that_is_no_number_is_refused(daq: CommandLine, tmp_path: Path) -> None:
@@ -35,10 +31,6 @@ def test_a_trace_with_a_value_that_is_no_number_is_refused(daq: CommandLine, tmp
     refused(daq, *fitting(path), says=(f"row {row + 1}", "'nan' is not a finite number"))
 
 
-def test_a_trace_of_two_samples_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    refused(daq, *fitting(write_csv(tmp_path / "two.csv", count=2)), says=("2 samples", "at least 10"))
-
-
 def test_a_model_with_a_joint_that_the_trace_lacks_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     one = write_csv(tmp_path / "one.csv")
     refused(daq, "fit", one, "--machine", "ma2000", "-o", "out.json", says=("joint 2 is not in it",))
@@ -49,24 +41,6 @@ def test_degrees_instead_of_radians_are_named(daq: CommandLine, tmp_path: Path) 
     said = daq(*fitting(degrees))
     assert (said.code, Path("out.json").exists()) == (2, False), said
     assert all(word in said.out for word in ("CHECK", "joint 1", "degrees", "rad")), said.out
-
-
-def test_fewer_samples_than_parameters_are_refused(daq: CommandLine, tmp_path: Path) -> None:
-    short = write_csv(tmp_path / "short.csv", count=12)
-    everything = ("--effects", "viscous,coulomb,stribeck,stiction,torque_ripple,gear_loss,spring,potentiometer_gain")
-    words = (*fitting(short), *everything, "--parameters", "*")
-    refused(daq, *words, says=("12 samples for", "more samples than parameters"))
-
-
-def test_a_lower_bound_above_the_upper_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    trace = write_csv(tmp_path / "good.csv")
-    words = (*fitting(trace), "--bound", "link1.mass=2:1")
-    refused(daq, *words, says=("link1.mass=2:1", "lower bound 2 is not below the upper 1"))
-
-
-def test_a_bound_that_is_no_number_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    trace = write_csv(tmp_path / "good.csv")
-    refused(daq, *fitting(trace), "--bound", "link1.mass=much:", says=("link1.mass=much:", "numbers"))
 
 
 def test_a_machine_without_inertia_is_refused(daq: CommandLine, tmp_path: Path) -> None:
@@ -112,11 +86,34 @@ def test_a_file_that_is_no_model_is_refused(daq: CommandLine, tmp_path: Path, te
         ("--parameters link7.mass", ("link7.mass", "not in this model")),
         ("--parameters ,", ("no parameter named",)),
         ("--model model.json", ("--model and --machine",)),
+        ("--bound link1.mass=2:1", ("link1.mass=2:1", "lower bound 2 is not below the upper 1")),
+        ("--bound link1.mass=much:", ("link1.mass=much:", "numbers")),
     ],
 )
-def test_missing_files_are_named(daq: CommandLine, tmp_path: Path, words: str, says: tuple[str, ...]) -> None:
+def test_options_that_cannot_be_fitted_are_refused(
+    daq: CommandLine, tmp_path: Path, words: str, says: tuple[str, ...]
+) -> None:
     trace = write_csv(tmp_path / "good.csv")
     refused(daq, *fitting(trace), *words.split(), says=says)
+
+
+@pytest.mark.parametrize(
+    ("motion", "words", "says"),
+    [
+        ({"amplitude": 0.0}, "", ("no motion", "4 counts")),
+        ({"count": 2}, "", ("2 samples", "at least 10")),
+        (
+            {"count": 12},
+            f"--effects {EIGHT_EFFECTS} --parameters *",
+            ("12 samples for", "more samples than"),
+        ),
+    ],
+    ids=["still", "two samples", "fewer than parameters"],
+)
+def test_a_trace_that_says_too_little_is_refused(
+    daq: CommandLine, tmp_path: Path, motion: dict[str, Any], words: str, says: tuple[str, ...]
+) -> None:
+    refused(daq, *fitting(write_csv(tmp_path / "little.csv", **motion)), *words.split(), says=says)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Watching the memory, copying files that ship, and a commissioning that goes on where it was ended."""
 
-from __future__ import annotations
-
 import json
 import os
 import tomllib

@@ -1,7 +1,5 @@
 """The diagnosis of a commissioning asks for an experiment, so it is made by the method that proposes one."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

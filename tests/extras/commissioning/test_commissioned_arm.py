@@ -1,7 +1,5 @@
 """The port found by plugging, another arm at the same port, and an emergency stop that the search left pressed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The step that measures the computing delay: whatever ends it early freezes the arm, and nothing moves it then."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

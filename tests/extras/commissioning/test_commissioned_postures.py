@@ -1,7 +1,5 @@
 """Postures of a protractor that say nothing are asked for again; what was measured before stays until all is done."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A search that finds no place for gains, outputs and gripper leaves a map without them, with which the arm goes on."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The computing delay is bounded by what came before what, whatever the computer and the line are slow in."""
 
-from __future__ import annotations
-
 import math
 from random import Random
 

@@ -1,7 +1,5 @@
 """End stops from readings at both, and limits that keep clear of them."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

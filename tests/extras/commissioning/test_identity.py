@@ -1,7 +1,5 @@
 """Whether a controller is the one that was commissioned, against memories that the mock draws."""
 
-from __future__ import annotations
-
 import pytest
 
 from extras.commissioning.identity import (

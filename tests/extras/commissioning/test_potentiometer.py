@@ -1,7 +1,5 @@
 """Sensors are recovered from a protractor's angles, within the intervals that are stated."""
 
-from __future__ import annotations
-
 import math
 from random import Random
 

@@ -1,7 +1,5 @@
 """The first day from a port to an acceptance sheet, in lock-step, with an arm of which nothing is known beforehand."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Iterator

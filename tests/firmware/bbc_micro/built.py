@@ -1,7 +1,5 @@
 """The bridge's image, built from its sources, in a machine on a mock's board."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

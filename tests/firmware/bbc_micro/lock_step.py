@@ -7,8 +7,6 @@ SIMULATED to the capabilities in HelloReply. Every other reply is the bridge's o
     python -m tests.firmware.bbc_micro.lock_step 4000              serves tcp://127.0.0.1:4000?lock_step=1&baud=19200
 """
 
-from __future__ import annotations
-
 import argparse
 import socket
 from dataclasses import replace

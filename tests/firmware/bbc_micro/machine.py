@@ -5,8 +5,6 @@ and the bridge reaches them with absolute instructions only; so only those are l
 speed.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

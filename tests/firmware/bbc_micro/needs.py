@@ -1,7 +1,5 @@
 """What the tests of the BBC Micro's bridge need beyond the project: make, ca65 and ld65 to build it, py65 to run it."""
 
-from __future__ import annotations
-
 import shutil
 from importlib.util import find_spec
 

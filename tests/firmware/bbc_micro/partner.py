@@ -1,7 +1,5 @@
 """The emulated BBC Micro as the partner of a dialogue. Everything on its line takes its time."""
 
-from __future__ import annotations
-
 from firmware_protocol.framing import Frame, FrameDecoder
 from tests.firmware.bbc_micro.built import board, images
 from tests.firmware.bbc_micro.machine import BbcMicro

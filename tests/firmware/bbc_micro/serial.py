@@ -1,7 +1,5 @@
 """The BBC Micro's serial port in cycles of its 2 MHz processor: a 6850 behind the serial ULA."""
 
-from __future__ import annotations
-
 from collections import deque
 
 CYCLES_PER_SECOND = 2_000_000

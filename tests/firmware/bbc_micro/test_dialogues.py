@@ -1,7 +1,5 @@
 """The dialogues of vectors.json with the image for the BBC Micro, on its own line and in its own time."""
 
-from __future__ import annotations
-
 import json
 from random import Random
 from typing import Any

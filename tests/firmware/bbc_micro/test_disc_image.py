@@ -1,7 +1,5 @@
 """The disc image, read as Acorn's DFS reads it."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

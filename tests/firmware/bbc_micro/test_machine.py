@@ -1,7 +1,5 @@
 """The image on the emulated BBC Micro: damaged lines, refusals, rounding, times of answers, stack and size."""
 
-from __future__ import annotations
-
 import json
 from random import Random
 from typing import Any

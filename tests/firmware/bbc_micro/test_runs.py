@@ -1,7 +1,5 @@
 """A host at the emulated BBC Micro: what a line of 19200 baud gives, a run, and the contract of every controller."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

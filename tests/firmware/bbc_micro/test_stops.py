@@ -1,7 +1,5 @@
 """A stop of the image freezes the posture of now, and is answered, whatever the memory and the bus do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import count, pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """A board on an arm, as it comes out of the box."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The controller's period, its memory, and what it does when things go wrong."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ The linearised sampled loop of each joint (inertia at the posture, back-EMF and 
 computing delay) is worked out here on its own; friction is left out, as it only adds damping.
 """
 
-from __future__ import annotations
-
 import math
 
 import mujoco

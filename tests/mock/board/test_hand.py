@@ -1,7 +1,5 @@
 """The arm in a person's hands, while the emergency stop has taken the drives' power."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

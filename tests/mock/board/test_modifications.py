@@ -1,7 +1,5 @@
 """Hidden effects of sensor, set point and board act at their place."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Potentiometers and converter."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

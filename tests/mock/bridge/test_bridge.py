@@ -1,7 +1,5 @@
 """What each request does, and what is refused."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A bridge that sees the period keeps clear of the controller's fetch; one that does not meets it now and then."""
 
-from __future__ import annotations
-
 from random import Random
 
 from firmware_protocol.commands import (

@@ -1,7 +1,5 @@
 """Bytes on the line, on the board's time: line rate, damage, a Sample that waits, and Stop at any moment."""
 
-from __future__ import annotations
-
 from firmware_protocol.commands import (
     AFTER_NEWEST,
     Hello,

@@ -1,7 +1,5 @@
 """Turns: one idle mark for each piece, nothing that depends on how bytes were cut, the same bytes every time."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

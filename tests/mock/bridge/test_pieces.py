@@ -1,7 +1,5 @@
 """However the operating system cuts the host's bytes, the pieces are the same."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 from hypothesis import given

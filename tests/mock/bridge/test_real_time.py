@@ -1,7 +1,5 @@
 """The board follows the clock, is never ahead for long, catches up, and listens meanwhile."""
 
-from __future__ import annotations
-
 from firmware_protocol.commands import AFTER_NEWEST, Sample, Snapshot, Stop, Stopped
 from mock_controller.real_time import LATE_US
 from tests.mock.host import RealTimeHost

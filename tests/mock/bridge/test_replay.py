@@ -1,7 +1,5 @@
 """A line that plays back what it has heard: in a session whose numbers have all come round, and in a later session."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """Sessions, numbers and the freeze, whatever comes in whatever order, new or recorded."""
 
-from __future__ import annotations
-
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule

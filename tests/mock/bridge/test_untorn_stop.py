@@ -1,7 +1,5 @@
 """What the contract's test of stops tells of a bridge that reads the posture once, and of one that reads it twice."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.driver import Controller

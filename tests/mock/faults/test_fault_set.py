@@ -1,7 +1,5 @@
 """Switching on and off, spans of time, labels, seeds."""
 
-from __future__ import annotations
-
 import pytest
 
 from firmware_protocol.commands import Advance, ReadStatus

@@ -1,7 +1,5 @@
 """Faults of memory, sensors, arm and supply."""
 
-from __future__ import annotations
-
 from statistics import pstdev
 
 from firmware_protocol.commands import ALL_JOINTS, Advance, Hello, JointReading, Sample, Snapshot, StatusFlag

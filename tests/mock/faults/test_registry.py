@@ -1,7 +1,5 @@
 """Faults as they are asked for, and one clear line for what cannot be."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from pathlib import Path

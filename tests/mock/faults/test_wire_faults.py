@@ -1,7 +1,5 @@
 """Faults of the line: what each does to a frame, and that each one injected is counted."""
 
-from __future__ import annotations
-
 import pytest
 
 from firmware_protocol.commands import ReadStatus, Status

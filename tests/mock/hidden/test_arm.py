@@ -1,7 +1,5 @@
 """What a seed hides, and that a mock built from it has just that."""
 
-from __future__ import annotations
-
 import csv
 import json
 import zipfile

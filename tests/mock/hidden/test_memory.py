@@ -1,7 +1,5 @@
 """Memory maps that a seed draws."""
 
-from __future__ import annotations
-
 import pytest
 
 from firmware_protocol.memory_map import default_memory_map

@@ -1,7 +1,5 @@
 """A secret is told to nobody: not on the wire, the control port, standard output, or in the process's arguments."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Potentiometers that a seed draws."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

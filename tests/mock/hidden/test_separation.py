@@ -1,7 +1,5 @@
 """d′ of hidden effects, on an experiment short enough for a test."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

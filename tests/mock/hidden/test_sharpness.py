@@ -1,7 +1,5 @@
 """Which effects the records of an arm can tell from the hidden one, on an experiment short enough for a test."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -22,14 +20,9 @@ from mock_controller.hidden.sharpness import NOT_TOLD, Comparison
 from mock_controller.modifications.load import PeriodicDisturbance
 from mock_controller.modifications.registry import known_modifications
 from mock_controller.plant import default_plant
+from tests.mock.hidden.test_separation import short
 
 Floats = NDArray[np.float64]
-
-
-def short() -> Experiment:
-    """1.2 s: a quick ramp of joints 1 to 3 and back."""
-    there = [(500 + 2 * k, 333 + 2 * k, 500 - 2 * k, 500, 500, 500) for k in range(15)]
-    return Experiment((*there, *[there[-1]] * 15, *there[::-1], *[there[0]] * 15), settle=10)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """What may differ between sound arms."""
 
-from __future__ import annotations
-
 from random import Random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An arm on which one thing at a time is looked at."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Effects of potentiometers, converter and controller."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

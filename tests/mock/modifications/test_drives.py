@@ -1,7 +1,5 @@
 """Effects of motors, amplifiers and gears: sign, size, and the joint they act on."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

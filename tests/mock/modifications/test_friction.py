@@ -1,7 +1,5 @@
 """Friction effects: sign, size, and the joint they act on."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

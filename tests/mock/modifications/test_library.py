@@ -1,7 +1,5 @@
 """The library as a whole: the names that are shared, what every effect tells of itself, and that nothing is nothing."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Effects of masses, gravity, springs and disturbances."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Motors, gears, friction and amplifier against closed forms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Gears that give, at the waist of an upright arm with a light load: the lightest link there is."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Hidden effects act at their place, and nowhere when absent."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The plant's data file: every number with unit and source, anything odd refused in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 from mock_controller.plant.parameters import default_plant_text, parse_plant

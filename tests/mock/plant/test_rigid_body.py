@@ -1,7 +1,5 @@
 """The arm's rigid bodies against closed forms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The mock as a process of its own, and a host that reaches it through pyserial."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

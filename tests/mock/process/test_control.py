@@ -1,7 +1,5 @@
 """The control port's commands, without a port."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Options from command line and file; what cannot be is one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

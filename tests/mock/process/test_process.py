@@ -1,7 +1,5 @@
 """The whole process, through a real pseudo-terminal and a real socket."""
 
-from __future__ import annotations
-
 import os
 import signal
 import termios

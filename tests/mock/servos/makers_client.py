@@ -1,7 +1,5 @@
 """The maker's own client (dynamixel-sdk) with a bench in this process at the other end of its port."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Secret effects of the bench of servos: drawn from a seed, told by `reveal` alone, and at work in the plant."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Torques along a motion add up, and come from where they are said to come from."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Base parameters: the textbook's groupings, Pinocchio's regressor, published counts, and what records tell."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

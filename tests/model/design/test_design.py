@@ -1,7 +1,5 @@
 """Excitation design: what an experiment would add, and the set that adds most, within the limits."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The design check judges a step by its size, as the runner does; its margin is for the lag of smooth motions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """An answer with real signals behind it: an arm that lacks an effect, located, reasoned about and compared."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from daq.contracts.experiment import ExperimentSpec, SlowRamp

@@ -1,7 +1,5 @@
 """Fitted candidates of which only name, joints and evidence matter."""
 
-from __future__ import annotations
-
 from typing import Any, cast
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole workflow, from the mock's wire to the answer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from daq.contracts.machine import load_machine

@@ -1,7 +1,5 @@
 """Set points with every phase of motion, and records of an arm that is the model itself, with an effect or without."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from daq.contracts.trace import Trace

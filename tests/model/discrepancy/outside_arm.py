@@ -5,8 +5,6 @@ limited, rounded to what its converter can give, and acts some time later. Recor
 drive, and no error.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -72,7 +70,7 @@ class OutsideArm:
     lost: Floats = field(default_factory=lambda: np.zeros(3))
     period: float = PERIOD
 
-    def changed(self, name: str, joint: int, value: float) -> OutsideArm:
+    def changed(self, name: str, joint: int, value: float) -> "OutsideArm":
         """The arm with one number of one joint (from 1) changed."""
         column = getattr(self, name).copy()
         column[joint - 1] = value

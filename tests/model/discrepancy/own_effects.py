@@ -1,7 +1,5 @@
 """Effects as files of the user's own bring them, for tests that never simulate them."""
 
-from __future__ import annotations
-
 from model import layout as at
 from model.effects.effect import Effect, EffectFile, EffectParameter
 

@@ -1,7 +1,5 @@
 """Experiments on the mock, through its wire and into trace files, as a diagnosis gets them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import urlencode

@@ -1,7 +1,5 @@
 """Steps of a diagnosis without signals behind them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis, Step, Verdict, Where

@@ -1,7 +1,5 @@
 """A load that is stated for the arm: the model expects it, and one that no motor could hold is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

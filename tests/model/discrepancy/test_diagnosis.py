@@ -1,7 +1,5 @@
 """What a fit has shown stands before what a probe promises, however much that is."""
 
-from __future__ import annotations
-
 from model.discrepancy.diagnosis import Candidate, in_order
 
 

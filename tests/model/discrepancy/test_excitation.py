@@ -1,7 +1,5 @@
 """Frequencies that are the motion's own, at which no disturbance can be told from what goes with the motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from daq.trajectories import plan, start_angles

@@ -1,7 +1,5 @@
 """The whole workflow on effects hidden in the mock: recorded through the wire, named from the trace files alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

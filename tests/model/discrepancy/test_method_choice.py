@@ -1,7 +1,5 @@
 """Which of the two methods a diagnosis takes, by machine, traces and options."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

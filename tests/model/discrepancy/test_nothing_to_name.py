@@ -1,7 +1,5 @@
 """The whole workflow on arms of which no effect of the library is true: from the mock's wire, without a name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A diagnosis that has nothing to look for, or nowhere to look, is refused instead of answered with nothing."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """A joint that shares an effect only slightly is named as such, and is not in the headline."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, Step
@@ -32,12 +30,7 @@ def on_both(answer: Diagnosis, torque: float, evidence: float) -> Diagnosis:
     alone = Candidate(effect=EFFECT, joints=(2,), evidence=1554.0, misfit=1.05, refitted=True)
     other = Candidate(effect=EFFECT, joints=(1,), evidence=70.0, misfit=3.0, refitted=True)
     step = answer.steps[0].model_copy(
-        update={
-            "joints": (1, 2),
-            "parameters": values,
-            "evidence": 1554.0 + evidence,
-            "candidates": (alone, other),
-        }
+        update={"joints": (1, 2), "parameters": values, "evidence": 1554.0 + evidence, "candidates": (alone, other)}
     )
     return answer.model_copy(update={"steps": with_slight_joints((step,), GIVEN, after), "model_after": after})
 

@@ -1,7 +1,5 @@
 """No answer depends on the unit of the recorded drive: the same names, sizes and margins in V, N, counts or mA."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is answered when nothing more is found, and what is taken back."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, SignalError
@@ -42,6 +40,12 @@ def test_an_unexplained_joint_decides_the_verdict_before_any_step() -> None:
     assert verdict([taken], unexplained=False) == "named"
     assert verdict([], unexplained=False) == "nothing-significant"
     assert verdict([withdrawn(taken, (2,))], unexplained=False) == "nothing-significant"
+
+
+def test_a_name_beside_which_far_more_than_noise_is_left_is_a_part_of_the_answer() -> None:
+    taken = step("backlash", (2,))
+    assert verdict([taken], unexplained=False, partly=True) == "partly"
+    assert verdict([withdrawn(taken, (2,))], unexplained=False, partly=True) == "nothing-significant"
 
 
 def test_a_group_that_held_out_traces_refuse_is_no_answer() -> None:

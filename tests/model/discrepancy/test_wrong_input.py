@@ -1,7 +1,5 @@
 """What a diagnosis refuses, in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.errors import TraceError

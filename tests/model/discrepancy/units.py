@@ -1,7 +1,5 @@
 """The same machine and the same record, with the drive in a unit that many times smaller: V as mV, N as counts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from daq.contracts.machine import CurrentDrive, DcMotor, Joint, Machine, SampledPid, Sizes

@@ -1,7 +1,5 @@
 """Random but physical chains and states for the tests and benchmarks of the dynamics."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from model.dynamics.rod_arm import RodArm

@@ -1,7 +1,5 @@
 """The same chain in engines nobody here wrote: MuJoCo and Pinocchio."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """D, H, G and the energies agree with MuJoCo and Pinocchio to 1e-10 on random chains and states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A chain that cannot exist is refused in one line that says what and where."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

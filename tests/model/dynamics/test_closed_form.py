@@ -1,7 +1,5 @@
 """The generated closed form is that of its sources, and describes the same arm as the recursions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Compiled code is kept apart for every state of the sources it is made of, and of no others."""
 
-from __future__ import annotations
-
 import ast
 import errno
 import fcntl

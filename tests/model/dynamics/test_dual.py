@@ -1,7 +1,5 @@
 """Elementary functions in real and dual numbers."""
 
-from __future__ import annotations
-
 import cmath
 import math
 

@@ -1,7 +1,5 @@
 """Tables 5.1 and 5.2: which inertial parameters act on which joint."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

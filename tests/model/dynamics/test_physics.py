@@ -1,7 +1,5 @@
 """Laws of mechanics that hold whatever the formulas: energy, passivity, symmetry, gravity as a gradient."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Every effect of the library: nothing at its null value, and what its physics says beyond."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects of the user's own: the guide's file in simulation, derivatives, fits and saved models; and wrong files."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Motions of the tests, planned as `daq` plans them, and their attempts on the mock."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Set points by least squares within limits, and their rounding, beside what scipy and a full search find."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

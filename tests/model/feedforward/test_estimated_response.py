@@ -1,7 +1,5 @@
 """A loop of second order estimated from set points and readings, beside scipy's continuous-time systems."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Set points from a model: the mock follows the motion with them, within the limits, as nearly as the model says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Set points learned from trace to trace, without a model, and the traces that nothing is learned from."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Records of an arm that is the model itself, with noise drawn and readings rounded: what a fit must get right
 first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import UTC, datetime
 

@@ -1,7 +1,5 @@
 """The step within bounds: free where nothing is in the way, and best for the others where a bound is met."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

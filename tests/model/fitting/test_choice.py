@@ -1,7 +1,5 @@
 """Which parameters a fit changes, how far, and the nuisances it allows for beside them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coordinates of bodies that can exist: which numbers they take, what they refuse, and a fit of motion in them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

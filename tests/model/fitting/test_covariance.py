@@ -1,7 +1,5 @@
 """The sandwich: intervals that hold when residuals are correlated, where the plain formula's do not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Directions without information: their size, their deviation, and the scale of torque among them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Fitting records of an arm that is known: values, intervals, verdicts, lineage, progress and cancelling."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The identifiability report on Jacobians whose blind directions are known beforehand."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

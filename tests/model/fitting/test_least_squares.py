@@ -1,7 +1,5 @@
 """The search itself, on problems whose answer is known without it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Log-Cholesky parameters: against the published matrix written out, against Pinocchio's, and for whatever numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio
 import pytest

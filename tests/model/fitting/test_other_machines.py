@@ -1,7 +1,5 @@
 """Fits of one joint that slides or whose speed is measured: what is compared, in which unit, and what is told of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The arithmetic between simulation and result, on numbers small enough to be done by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -82,11 +80,7 @@ def test_a_parameter_is_known_where_the_data_leave_half_of_its_size_at_most() ->
         assert report.verdict("a").verdict == verdict
     told = judged(np.array([[20.0]]), np.ones(1), [unknown("a", "m", 1.0, 0.5)]).verdict("a")
     assert told.reason == "the data alone give it to 0.1 of its expected deviation"
-    assert (told.data_deviation, told.alone, told.expected_deviation) == (
-        pytest.approx(0.05),
-        pytest.approx(0.05),
-        0.5,
-    )
+    assert (told.data_deviation, told.alone, told.expected_deviation) == (pytest.approx(0.05), pytest.approx(0.05), 0.5)
 
 
 def test_a_parameter_that_others_can_stand_in_for_is_part_of_a_combination() -> None:

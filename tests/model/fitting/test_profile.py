@@ -1,7 +1,5 @@
 """Profile likelihoods, held against a published one and against straight lines."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Traces as a fit reads them: where it begins to compare, where it is cut, and how noisy a reading is."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from datetime import UTC, datetime

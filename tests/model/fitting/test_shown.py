@@ -1,7 +1,5 @@
 """What a notebook and `print` show of a fit: the numbers, in brackets those that the data do not determine."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The residuals of a simulated model: exact derivatives, one unknown a column, and readings drawn as a sensor gives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

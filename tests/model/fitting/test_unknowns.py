@@ -1,7 +1,5 @@
 """What a fit may change: impossible searches are refused, and every unknown has a natural size."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whitening: the filter undoes a known correlation, and never claims less noise than the sensor has."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

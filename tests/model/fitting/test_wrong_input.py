@@ -1,7 +1,5 @@
 """Wrong input to a fit: one clear error, never a number that looks like a result."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Records of one sliding joint whose drive a test writes itself: the motion is a sum of sines, and takes no part."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from daq.contracts.machine import Machine

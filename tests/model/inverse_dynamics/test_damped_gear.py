@@ -1,7 +1,5 @@
 """The damping of a gear that gives is found with its compliance, and the numbers of the file that have an effect."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

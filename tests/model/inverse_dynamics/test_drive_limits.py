@@ -1,7 +1,5 @@
 """Where a recorded drive stands at a limit that no file states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

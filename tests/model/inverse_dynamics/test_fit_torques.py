@@ -1,7 +1,5 @@
 """Fits of recorded torques: on a motion whose torque is worked out here by hand, and on a real double pendulum."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Friction of a joint that hardly moves takes whatever holds it, up to its level."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -139,7 +137,8 @@ def test_sliding_friction_is_what_the_balance_counts(difference: float) -> None:
     driven = kernel.DrivenMotion(
         RECORD.time, RECORD.position, RECORD.speed, RECORD.contact, RECORD.speed, none, level, none
     )
-    motor, other = np.empty(SHAPE), np.empty(SHAPE)
-    kernel.supplied_torque(driven, kernel.JointNumbers(joints, model.flags, own_table(model, np.float64)), motor, other)
+    motor, other, rise = (np.empty(SHAPE) for _ in range(3))
+    numbers = kernel.JointNumbers(joints, model.flags, own_table(model, np.float64))
+    kernel.supplied_torque(driven, numbers, motor, other, rise)
     assert np.abs(other).max() > 2.5
     np.testing.assert_allclose(friction_at_rest.friction_at_rest(level, motion, joints).sliding, other, atol=1e-12)

@@ -1,6 +1,8 @@
 """A recorded motion: what its low-pass keeps, what its derivatives lose, and how a recorded drive acts."""
 
-from __future__ import annotations
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
+from daq.contracts.machine import Machine
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.likelihood import stretches_of
-from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, low_pass
+from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, low_pass, turns_round
+from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, slide_machine
 from tests.model.inverse_dynamics.driven_slide import CUTOFF, PERIOD, TIME, controlled, motion_of
 
 ALL = np.array([np.inf])
@@ -193,3 +197,14 @@ def test_a_wheel_that_turns_many_times_is_low_passed_like_one_that_does_not() ->
     inside = slice(100, -100)
     turning = low_pass(wave + 4.0 * time, 36.0, 0.004) - 4.0 * time
     assert np.abs(turning - low_pass(wave, 36.0, 0.004))[inside].max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("machine", "travel", "round_"),
+    [(bench_machine, 6.5, True), (bench_machine, 6.0, False), (slide_machine, 6.5, False)],
+)
+def test_a_joint_turns_round_once_it_has_moved_by_more_than_a_turn(
+    machine: Callable[[], Machine], travel: float, round_: bool
+) -> None:
+    record: Any = SimpleNamespace(position=np.array([[0.0], [travel]]))
+    assert turns_round([record], machine()).tolist() == [round_]

@@ -1,7 +1,5 @@
 """Joints that shake faster than torques are compared are told, and what is slow or noise is not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The torque balance: on simulated records whose torques are known, and its derivatives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +39,13 @@ def test_required_torque_along_a_simulated_trace_is_what_the_motor_supplied() ->
     balance = TorqueBalance(model, (recorded_motion(measured, model.machine, 12.0),))
     left, supplied = balance.residual({})[0], balance.supplied_by_drive()[0]
     assert (np.abs(left).max(axis=0) < (0.06, 0.03, 0.03) * np.abs(supplied).max(axis=0)).all()
+    # what a warm winding does not let through is missing in full: no rise is large enough to explain the drive away
+    lost = [
+        TorqueBalance(model.with_effect("resistance_rise", (2,), {"rise": rise, "time_constant": 1.0}), balance.records)
+        for rise in (1.0, 2.0)
+    ]
+    some, twice = (np.std(one.residual({})[0][:, 1]) for one in lost)
+    assert twice == pytest.approx(2.0 * some, rel=0.1)
 
 
 def test_derivatives_are_those_of_the_residual() -> None:

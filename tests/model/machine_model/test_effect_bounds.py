@@ -1,7 +1,5 @@
 """Bounds of effects that follow from the drive, where the file tells its torque and where it does not."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """A parameter's words come from what it is; nobody reads its name."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

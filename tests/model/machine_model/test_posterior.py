@@ -1,7 +1,5 @@
 """What a fit has left of a number's deviation is what the next diagnosis expects of it."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.errors import SpecError

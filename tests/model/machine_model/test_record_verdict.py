@@ -1,7 +1,5 @@
 """The plain verdict on a model and its records: what is left beside the noise, and numbers far from the file."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.fitting.fit import fit

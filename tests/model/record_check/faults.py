@@ -62,6 +62,26 @@ def spikes(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     return Faulty(_with(trace, name, joint, signal), ("spikes",), joint, float(trace.time[rows[0]]))
 
 
+def drive_spikes(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """Three values of a drive, of one sample, far beyond all others."""
+    return _column_spikes("drive", trace, machine, draw)
+
+
+def set_point_spikes(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """The same of a set point."""
+    return _column_spikes("set_point", trace, machine, draw)
+
+
+def _column_spikes(name: str, trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    if getattr(trace, name) is None:
+        return None
+    joint = _joint(machine, draw)
+    signal = getattr(trace, name)[:, trace.column(joint)].copy()
+    rows = np.sort(draw.choice(np.arange(20, len(signal) - 20, 10), 3, replace=False))
+    signal[rows] += draw.uniform(4.0, 8.0) * np.ptp(signal) * draw.choice([-1.0, 1.0], 3)
+    return Faulty(_with(trace, name, joint, signal), ("spikes",), joint, float(trace.time[rows[0]]))
+
+
 def wraps(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
     """An encoder of one turn, whose end lies within the motion."""
     turning = [j for j in machine.modelled_joints if machine.joint(j).kind == "revolute"]
@@ -114,6 +134,16 @@ def cut_out(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     row = int(draw.integers(20, max(21, len(trace) - rows - 20)))
     kept = np.r_[0 : row + 1, row + rows : len(trace)]
     return Faulty(_rows(trace, kept), ("gap",), None, float(trace.time[row]))
+
+
+def bursts(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
+    """Stamps of arrival through a buffer that is emptied after 1.2 to 4 samples."""
+    usual = float(np.median(np.diff(trace.time)))
+    latency = usual * draw.uniform(1.2, 4.0)
+    time = np.ceil(trace.time / latency - draw.uniform(0.0, 1.0)) * latency
+    for row in range(1, len(time)):
+        time[row] = max(time[row], time[row - 1] + min(2e-4, 0.02 * usual))
+    return Faulty(replace(trace, time=time), ("bursts",))
 
 
 def milliseconds(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
@@ -199,11 +229,14 @@ FAULTS: dict[str, Fault] = {
     one.__name__: one
     for one in (
         spikes,
+        drive_spikes,
+        set_point_spikes,
         wraps,
         slipped,
         stuck,
         saturated,
         cut_out,
+        bursts,
         milliseconds,
         slow_times,
         late_drive,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,11 +25,11 @@ from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import base_model
 from model.record_check.check import check_records, repaired
 from model.record_check.finding import doubts_in
-from model.record_check.readings import find_bounds
+from model.record_check.readings import find_bounds, find_jumps
 from model.reports.diagnosis_report import diagnosis_report
 from model.reports.page import html
 from tests.model.discrepancy.inverse_dynamics import rigs
-from tests.model.record_check.rigs import ROOT, example
+from tests.model.record_check.rigs import ROOT, example, world
 
 SLIDE = rigs.slide_trace(1, {}, 8.0)
 GEARED = rigs.geared_trace(3, {}, 8.0)
@@ -135,6 +136,82 @@ def test_without_a_controller_only_a_delay_that_can_be_estimated_is_told(tmp_pat
         assert (one.kind, f"by {rows} row" in one.advice) == ("drive-late", True)
     for other in (np.roll(trace.drive, 12, axis=0), trace.drive / 4.448):
         assert "drive-late" not in kinds(machine, replace(trace, drive=other))
+
+
+def test_a_reading_that_is_stamped_late_is_no_jump() -> None:
+    turned = rigs.geared_trace(3, {}, 8.0)
+    time = turned.time.copy()
+    time[50:-50:100] += 0.4 * (time[1] - time[0])
+    assert kinds(rigs.geared_machine(), replace(turned, time=time)) == []
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.4, 1.2])
+def test_noise_of_a_few_counts_makes_no_jump(deviation: float) -> None:
+    time, step = np.linspace(0.0, 14.0, 700, dtype=np.float64), 4.71 / 4096
+    for seed in range(100):
+        noise = deviation * np.random.default_rng(seed).standard_normal(len(time))
+        reading = np.round(20.0 * np.sin(0.4 * time) + noise) * step
+        assert find_jumps(time, reading, step) == []
+        reading[400:] += 120.0 * step
+        assert [jump.row for jump in find_jumps(time, reading, step)] == [399]
+
+
+@pytest.mark.parametrize("play", [0.0, 0.01])
+def test_friction_that_takes_nearly_all_of_a_drive_says_nothing_of_its_unit(play: float) -> None:
+    time = np.linspace(0.0, 6.0, 6000, dtype=np.float64)
+    position = 0.03 * np.sin(2 * np.pi * 0.5 * time)
+    behind, rub = 0.0, []
+    for there in position:  # what rubs hangs behind a play and a spring
+        behind = min(max(behind, there - play - 0.002), there + play + 0.002)
+        rub.append(2e4 * np.clip((there - behind) / 0.002, -1.0, 1.0))
+    damper = replace(SLIDE, time=time, position=position[:, None], drive=np.array(rub)[:, None], velocity=None)
+    damper = replace(damper, set_point=None, error=None)
+    assert kinds(rigs.slide_machine(), damper) == []
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_spring_that_nobody_stated_is_no_other_unit_of_one_joint(seed: int, tmp_path: Path) -> None:
+    machine, trace = world("planar-torques", seed)(tmp_path)
+    assert trace.drive is not None
+    for stiffness, rests in ((7.0, 0.0), (15.0, 0.5), (30.0, 0.5)):
+        drive = trace.drive + stiffness * (trace.position - rests) * np.array([0.0, 1.0])
+        assert kinds(machine, replace(trace, drive=drive)) == [], stiffness
+
+
+UNIT_FAULTS: dict[str, tuple[Callable[[Trace], Trace], str, str]] = {
+    "lbf": (lambda t: replace(t, drive=None if t.drive is None else t.drive / 4.448), "drive-scale", "in lbf"),
+    "slower": (lambda t: replace(t, time=1.5 * t.time), "time-scale", "1.5 times"),
+    "slow": (lambda t: replace(t, time=3.0 * t.time), "time-scale", "3 times"),
+    "milliseconds": (lambda t: replace(t, time=1e3 * t.time), "time-scale", "ms"),
+}
+
+
+@pytest.mark.parametrize("fault", UNIT_FAULTS)
+def test_a_scale_is_said_of_what_has_it(fault: str, tmp_path: Path) -> None:
+    changed, kind, words = UNIT_FAULTS[fault]
+    axis, bench = example("linear_axis")(tmp_path), example("motor_bench")(tmp_path)
+    for machine, trace in [(rigs.slide_machine(), SLIDE), axis, *([] if fault == "lbf" else [bench])]:
+        found = check_records(base_model(machine), [changed(trace)])
+        (one,) = [one for one in found if one.kind != "no-sensor"]
+        assert (one.kind, words in one.line) == (kind, True), one.line
+
+
+@pytest.mark.parametrize("latency", [0.008, 0.016, 0.032])
+def test_stamps_of_arrival_are_the_one_doubt(latency: float, tmp_path: Path) -> None:
+    machine, trace = example("motor_bench")(tmp_path)
+    time = np.ceil(trace.time / latency) * latency
+    for row in range(1, len(time)):
+        time[row] = max(time[row], time[row - 1] + 2e-4)
+    (one,) = (one for one in check_records(base_model(machine), [replace(trace, time=time)]))
+    assert (one.kind, one.consequence, one.value) == ("bursts", "doubt", pytest.approx(latency, rel=1e-3))
+    assert "latency timer" in one.advice
+
+
+def test_a_record_of_one_row_is_no_sound_one(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time,position_1,drive_1\n0,0.1,0.2\n")
+    (one,) = doubts_in(check_records(base_model(rigs.slide_machine()), [import_csv(path)]))
+    assert (one.kind, one.says) == ("short", "1 sample; at least 3 are needed.")
 
 
 def test_spikes_are_a_doubt_beside_a_fit() -> None:

@@ -1,7 +1,5 @@
 """What the figures of a diagnosis show, and in which order: without drawing them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure

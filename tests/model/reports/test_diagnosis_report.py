@@ -1,7 +1,5 @@
 """The page of a diagnosis tells the whole story, for every verdict, from the answer alone."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -156,12 +154,7 @@ def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparis
     )
     report = diagnosis_report(sound, comparison)
     titles = [s.title for s in report.sections]
-    assert titles[:4] == [
-        "How the gap shrinks",
-        "Where they disagree",
-        "What was tried",
-        "Measured, before and after",
-    ]
+    assert titles[:4] == ["How the gap shrinks", "Where they disagree", "What was tried", "Measured, before and after"]
     assert all(any(isinstance(b, Picture) for b in s.blocks) for s in report.sections[:4])
     text = words(html(report))
     assert (

@@ -1,7 +1,5 @@
 """What the guides about models show is what the repository has."""
 
-from __future__ import annotations
-
 import re
 from importlib import import_module
 from pathlib import Path

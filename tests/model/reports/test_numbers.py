@@ -1,7 +1,5 @@
 """Numbers in a column have the same decimals; an interval has the digits that it knows."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.reports.numbers import column, estimate, whole

@@ -1,7 +1,5 @@
 """A report is one file that needs nothing else, says what it was given, and is the same every time."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

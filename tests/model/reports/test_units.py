@@ -1,7 +1,5 @@
 """Reports name the units of the joints that they are about: a sliding joint has no radians."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -5,8 +5,6 @@ Nothing of the product takes part but the model's numbers, by their names. Withi
 change at once where each joint's delay has passed, and steps end there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, exp, sin
 

@@ -1,7 +1,5 @@
 """Every effect of the library at a size that shows, beside the same effect in continuous time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

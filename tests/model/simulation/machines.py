@@ -1,7 +1,5 @@
 """Small machines for the tests: one joint each, described as a user would in a file."""
 
-from __future__ import annotations
-
 from daq.contracts.machine import Machine, parse_machine
 
 PENDULUM = """

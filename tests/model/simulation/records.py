@@ -1,7 +1,5 @@
 """Records that tests and benchmarks simulate: set points a period at a time, made here, measured nowhere."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 
 import numpy as np

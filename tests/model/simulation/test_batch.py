@@ -1,7 +1,5 @@
 """Many runs at once: the same whatever the number of cores, in their order, and announced where they are compiled."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import pytest

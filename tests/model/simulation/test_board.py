@@ -1,7 +1,5 @@
 """The controller and converters against vectors worked out by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Bodies as the equations of motion read them, held against sums over point masses, rotation matrices and tensors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

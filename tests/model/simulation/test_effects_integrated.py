@@ -1,7 +1,5 @@
 """Every effect against an outside integrator in continuous time, at the steps that fits and diagnoses use."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The compiled runs: each other's equals, deterministic, convergent."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

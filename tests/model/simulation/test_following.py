@@ -1,7 +1,5 @@
 """A simulated controller that is given part of what the recorded one has read."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

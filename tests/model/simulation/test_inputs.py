@@ -1,7 +1,5 @@
 """What a run takes from a record: the grid of periods, and what is held or interpolated between samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime
 

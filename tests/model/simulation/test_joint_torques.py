@@ -4,8 +4,6 @@ Functions of compiled code are tried here as Python (`py_func`) where they call 
 same, and nothing has to be compiled.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from math import factorial
 from typing import Any

@@ -1,7 +1,5 @@
 """Models as data: named parameters, files, lineage."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Effects of the user's own as a run has them: a table of addresses, each of a torque that was checked first."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Iterator
 from pathlib import Path

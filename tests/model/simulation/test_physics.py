@@ -1,7 +1,5 @@
 """What must hold of any mechanics: energy, periods, Newton's law, work; on one joint and on three."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

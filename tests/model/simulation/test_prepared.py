@@ -1,7 +1,5 @@
 """A record in the units of compiled code: rounding of set points, gains of the controller, and where a run begins."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

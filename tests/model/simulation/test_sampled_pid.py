@@ -1,7 +1,5 @@
 """What a machine file states of a sampled PID is what its simulation does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any

@@ -1,7 +1,5 @@
 """Exact derivatives against wide finite differences of the same loop without rounding."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A run without a compiler is the run that is compiled: for stepping through it, and for trying faults in it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

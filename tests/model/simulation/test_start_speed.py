@@ -1,7 +1,5 @@
 """Where a record begins in motion, from readings alone; and where it does not, whatever moves it then."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path

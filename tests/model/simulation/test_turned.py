@@ -1,7 +1,5 @@
 """Sensors that count down, and gears that turn the motion round: other signs of the same arm."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from pathlib import Path

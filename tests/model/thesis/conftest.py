@@ -1,7 +1,5 @@
 """What `daq thesis` computes with its default options, but for the hill climbing, which takes a minute."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.trace import Trace

@@ -1,7 +1,5 @@
 """Chapter 8, as far as it can be reproduced."""
 
-from __future__ import annotations
-
 import math
 import threading
 from itertools import pairwise

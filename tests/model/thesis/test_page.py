@@ -1,7 +1,5 @@
 """docs/thesis.md shows what `daq thesis` prints: every line of its blocks, in their order."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What follows from the published tables alone."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.machine import load_machine

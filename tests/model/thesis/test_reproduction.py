@@ -1,7 +1,5 @@
 """The whole reproduction on the ramp that the command records, of a plant with complete friction."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.errors import SpecError

@@ -1,7 +1,5 @@
 """Control laws on the arm in continuous time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Answers and truths made by hand, as short as they can be."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

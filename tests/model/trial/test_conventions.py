@@ -1,7 +1,5 @@
 """The mock moves as the model does with the mock's parameters translated, and not with others: signs, sides, scales."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Which arms a trial takes, and what a registration pins down."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

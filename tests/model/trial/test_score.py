@@ -1,7 +1,5 @@
 """What an answer is worth, question by question."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Diagnosis

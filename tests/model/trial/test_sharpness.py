@@ -1,7 +1,5 @@
 """Whether an answer is as sharp as the records allow."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Diagnosis, Step, Verdict

@@ -1,7 +1,5 @@
 """Rates with intervals, and the table made of them."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.diagnosis import Diagnosis

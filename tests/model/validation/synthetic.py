@@ -1,7 +1,5 @@
 """Traces that a model makes of itself, so that the truth behind them is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime
 

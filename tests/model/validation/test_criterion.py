@@ -1,7 +1,5 @@
 """σ from a doubling change, τ′ from a parameter, λ² from both."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Derivatives of sampled positions are exact averages of the true ones, with known noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The changes that double an error, found on functions whose answer is known."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

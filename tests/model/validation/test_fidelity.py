@@ -1,7 +1,5 @@
 """The transfer-function form on a model whose faults are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The noise floor of the time-domain form is what is left where the model is right."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The time-domain form finds what a model lacks, when, and against what it goes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

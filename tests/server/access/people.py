@@ -1,7 +1,5 @@
 """People and programs with tokens, at a service inside the tests' own process."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path

@@ -1,8 +1,6 @@
 """`python -m tests.server.access.provider PORT`: a provider of OpenID Connect, the package oidc-provider-mock, in a
 process of its own. That one does not look at PKCE; here Authlib's server side does, as it would in a real provider."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

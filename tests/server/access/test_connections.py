@@ -1,7 +1,5 @@
 """Connections that ask for nothing, and what they may take from whoever asks."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 
@@ -112,9 +110,7 @@ def test_a_head_too_large_is_refused_before_anything_is_made_of_it(sent: bytes, 
 
 
 @pytest.mark.parametrize("trailer", [b"x", b"x: a"], ids=["name", "value"])
-def test_a_trailer_that_never_ends_is_refused_before_it_fills_the_memory(
-    trailer: bytes,
-) -> None:
+def test_a_trailer_that_never_ends_is_refused_before_it_fills_the_memory(trailer: bytes) -> None:
     """Also after the answer: the parser keeps what follows the body, whether anybody reads that or not."""
     head = b"POST / HTTP/1.1\r\nhost: a\r\ntransfer-encoding: chunked\r\n\r\n0\r\n"
 

@@ -1,7 +1,5 @@
 """What the gate lets through of a request before anybody has looked at it: how much of its body, and how often."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Iterator
@@ -67,7 +65,7 @@ class Request:
         if message["type"] == "http.response.start":
             self.status = message["status"]
 
-    def through(self, gate: Gate) -> Request:
+    def through(self, gate: Gate) -> "Request":
         """Itself, answered."""
         try:
             asyncio.run(self.send_through(gate))

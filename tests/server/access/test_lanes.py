@@ -1,7 +1,5 @@
 """Whoever asks for much waits for themselves, and for nobody else."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

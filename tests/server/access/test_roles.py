@@ -1,7 +1,5 @@
 """Roles and ownership, through HTTP: who may change and cancel whose experiments."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

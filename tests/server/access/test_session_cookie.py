@@ -1,7 +1,5 @@
 """Names of the cookies of people who sign in."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path

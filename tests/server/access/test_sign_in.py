@@ -1,7 +1,5 @@
 """People sign in by OpenID Connect: a real service, a real provider in a process of its own, real redirects."""
 
-from __future__ import annotations
-
 import signal
 import socket
 import sqlite3

@@ -1,9 +1,6 @@
 """Who gets in, and what browsers may not do behind a person's back."""
 
-from __future__ import annotations
-
 import asyncio
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
@@ -29,7 +26,6 @@ from server.store.tables import TokenRow
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
 from tests.server.migrated import migrated_store
-from tests.server.other_user import other_users_command_line
 from tests.server.service import Service, running_service
 
 
@@ -340,35 +336,28 @@ def test_a_body_that_is_too_large_is_not_read(service: Service) -> None:
     assert (answer.status_code, answer.json()["type"]) == (413, "/api/v1/problems#too-large")
 
 
-@pytest.fixture
-def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
-    """The command of the user whose service it is."""
-    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
-        yield daq
-
-
-def test_others_are_not_let_in_without_tokens(daq: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_others_are_not_let_in_without_tokens(here: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.logs.begin", lambda: None)  # the logs of this process are the tests' own
-    refused = daq("serve", "--host", "0.0.0.0", "--port", "0")
+    refused = here("serve", "--host", "0.0.0.0", "--port", "0")
     refused.complains(2, "make one with `daq token add NAME --role operator`")
 
 
 def test_a_service_behind_a_proxy_does_not_start_without_tokens(
-    daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    here: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.logs.begin", lambda: None)
     (tmp_path / "daq.toml").write_text('[server]\ntokens = "always"\n')
-    daq("serve", "--port", "0").complains(2, 'server.tokens is "always", and there is no token')
+    here("serve", "--port", "0").complains(2, 'server.tokens is "always", and there is no token')
 
 
-def _token(daq: CommandLine, name: str, role: str) -> str:
-    made = daq("token", "add", name, "--role", role)
+def _token(here: CommandLine, name: str, role: str) -> str:
+    made = here("token", "add", name, "--role", role)
     assert made.code == 0, made.err
     return made.out.strip()
 
 
-def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path, daq: CommandLine) -> None:
-    viewer, operator = _token(daq, "anna", "viewer"), _token(daq, "bert", "operator")
+def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path, here: CommandLine) -> None:
+    viewer, operator = _token(here, "anna", "viewer"), _token(here, "bert", "operator")
     with running_service(tmp_path, "mock://?pty=1&lock_step=1", "--host", "0.0.0.0") as service:
         base = f"{service.url.replace('0.0.0.0', '127.0.0.1')}/api/v1"
         with httpx.Client(base_url=base, timeout=60) as nobody:

@@ -1,7 +1,5 @@
 """Many questions at once are worked out a few at a time, and hold up no stop."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`daq.client` with a real service."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Every body of the API has an example, and every example is what its schema says."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

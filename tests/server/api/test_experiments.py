@@ -1,7 +1,5 @@
 """From a request to a trace, through a real server, a real worker and a mock behind a pseudo-terminal."""
 
-from __future__ import annotations
-
 import io
 
 from daq.traces.reader import read_trace

@@ -1,7 +1,5 @@
 """Input that fits its type and yet nothing can be done with: refused with its field, and never a fault."""
 
-from __future__ import annotations
-
 import base64
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The guide's examples can be typed, and do what it says: every `console` block, every Python block, every script."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """Requests that are sent again: the key that says so, in both places that know one."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.server.service import Service

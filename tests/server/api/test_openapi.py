@@ -1,7 +1,5 @@
 """The description of the API: complete, usable for generated clients, and true."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re
@@ -136,6 +134,32 @@ def test_a_description_that_failed_is_made_again() -> None:
     making = description.Described(app)
     assert isinstance(making.begin().exception(60), MemoryError)
     assert [making.begin().result(60) for _ in range(2)] == [b"{}", b"{}"]
+
+
+def test_a_description_is_kept_for_the_next_start_until_the_program_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, kept, times = bare_app(None), tmp_path / "openapi.json", 0
+
+    def build() -> dict[str, Any]:
+        nonlocal times
+        times += 1
+        return {"made": times}
+
+    app.openapi = build  # type: ignore[method-assign]
+
+    def told() -> bytes:
+        return description.Described(app, kept).begin().result(60)
+
+    assert [told(), told()] == [b'{"made":1}'] * 2
+    kept.write_bytes(kept.read_bytes()[:-1])  # a power cut
+    assert told() == b'{"made":2}'
+    monkeypatch.setattr(description, "sources_digest", lambda: b"another")
+    assert [told(), told()] == [b'{"made":3}'] * 2
+    monkeypatch.setattr(description, "sources_digest", lambda: b"third")
+    kept.unlink()
+    kept.mkdir()
+    assert told() == b'{"made":4}', "it cannot be kept"
 
 
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"

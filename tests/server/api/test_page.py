@@ -1,7 +1,5 @@
 """How the page's files reach a browser."""
 
-from __future__ import annotations
-
 import asyncio
 import gzip
 import json
@@ -116,3 +114,23 @@ def test_a_package_without_the_text_of_its_licence_ends_the_build(tmp_path: Path
     (own / "LICENCE.md").write_text("Anybody may.")
     made = hatch_build.licences_of(["@scope/own/dist/own.js", "@scope/own/dist/own.css"], tmp_path)
     assert made.endswith("\n\n==== @scope/own 1.0.0 (MIT)\n\nAnybody may.")
+
+
+def test_what_has_passed_is_judged_again_once_a_file_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = tmp_path / "src" / "page.test.ts"
+    for file in (source, tmp_path / "node_modules" / "package.js"):
+        file.parent.mkdir()
+        file.write_text("as it was")
+    run: list[str] = []
+    codes = [0, 0, 1, 0]
+    monkeypatch.setattr(hatch_build, "DASHBOARD", tmp_path)
+    monkeypatch.setattr(hatch_build, "_install", lambda: None)
+    monkeypatch.setattr(hatch_build, "node", lambda words, **_: run.append(words[1]) or codes.pop(0))
+    for task in ("test", "test", "build"):
+        hatch_build.run(task)
+    assert run == ["run", "build"]
+    source.write_text("changed")
+    with pytest.raises(hatch_build.BuildError, match=r"^vitest failed in "):
+        hatch_build.run("test")
+    hatch_build.run("test")
+    assert run == ["run", "build", "run", "run"]

@@ -1,7 +1,5 @@
 """The page's types of the API are those of the service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import hatch_build

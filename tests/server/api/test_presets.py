@@ -1,7 +1,5 @@
 """What a form for experiments is made from: presets that run as they are, and the rules of a specification."""
 
-from __future__ import annotations
-
 from daq.contracts.experiment import ExperimentSpec
 from daq.trajectories.presets import PRESETS
 from tests.server.service import Service

@@ -1,7 +1,5 @@
 """Taught programs that the service keeps: until they are deleted, whoever has the control and whatever restarts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +16,6 @@ from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.other_user import other_users_command_line
 from tests.server.polling import until
 from tests.server.service import Service
 
@@ -165,31 +162,24 @@ def test_a_name_that_is_none_is_refused(empty: Service, name: str) -> None:
     assert empty.robot.get("/programs").json() == []
 
 
-@pytest.fixture
-def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
-    """Another user's."""
-    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
-        yield daq
-
-
 def test_the_command_line_keeps_lists_fetches_runs_and_deletes(
-    empty: Service, daq: CommandLine, tmp_path: Path
+    empty: Service, here: CommandLine, tmp_path: Path
 ) -> None:
     at = ("--server", empty.url, "teach")
     file = tmp_path / "waits.json"
     file.write_text(json.dumps({"name": "waits", "instructions": [{"kind": "wait", "duration": 0.1}]}))
-    assert daq(*at, "programs", "keep", str(file)).out.startswith("waits: 1 instructions, kept at")
+    assert here(*at, "programs", "keep", str(file)).out.startswith("waits: 1 instructions, kept at")
     file.write_text(json.dumps({"name": "waits", "instructions": [{"kind": "wait", "duration": 0.2}]}))
-    daq(*at, "programs", "keep", str(file)).complains(4, "there is a program 'waits' already")
-    assert daq(*at, "programs", "keep", str(file), "--replace").code == 0
-    (found,) = json.loads(daq(*at, "programs", "ls", "--json").out)
+    here(*at, "programs", "keep", str(file)).complains(4, "there is a program 'waits' already")
+    assert here(*at, "programs", "keep", str(file), "--replace").code == 0
+    (found,) = json.loads(here(*at, "programs", "ls", "--json").out)
     assert (found["name"], found["revision"]) == ("waits", 2)
-    assert "waits" in daq(*at, "programs", "ls").out
-    assert daq(*at, "programs", "fetch", "waits", "-o", str(tmp_path / "copy.json")).code == 0
+    assert "waits" in here(*at, "programs", "ls").out
+    assert here(*at, "programs", "fetch", "waits", "-o", str(tmp_path / "copy.json")).code == 0
     assert load_program(tmp_path / "copy.json").instructions == (Wait(duration=0.2),)
     file.unlink()
-    assert "done: 1 instructions" in daq(*at, "program", "waits").out
-    assert daq(*at, "programs", "delete", "waits").code == 0
-    daq(*at, "program", "waits").complains(2, "there is no program 'waits'")
-    daq(*at, "program", "no such").complains(2, "there is no such file")
-    daq("teach", "programs", "ls").complains(2, "a service has")
+    assert "done: 1 instructions" in here(*at, "program", "waits").out
+    assert here(*at, "programs", "delete", "waits").code == 0
+    here(*at, "program", "waits").complains(2, "there is no program 'waits'")
+    here(*at, "program", "no such").complains(2, "there is no such file")
+    here("teach", "programs", "ls").complains(2, "a service has")

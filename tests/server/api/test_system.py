@@ -1,7 +1,5 @@
 """What the service says about itself when its disk cannot be written, and to whom."""
 
-from __future__ import annotations
-
 import asyncio
 import errno
 import os

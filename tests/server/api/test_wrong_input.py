@@ -1,7 +1,5 @@
 """Wrong input is refused with the field named, before anything moves; what does not exist is a 404."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

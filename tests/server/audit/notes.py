@@ -1,7 +1,5 @@
 """Notes of an audit log that nobody has asked for."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 from daq.contracts.service.audit import AuditNote

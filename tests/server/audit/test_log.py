@@ -1,7 +1,5 @@
 """The log in the database: nobody changes a row through it, and what is changed beside it is noticed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sqlite3

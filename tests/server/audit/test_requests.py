@@ -1,7 +1,5 @@
 """What is asked of a service is in its log: who, from where, what, with which outcome; and no secret."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 from collections.abc import Iterator

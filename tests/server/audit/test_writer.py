@@ -1,7 +1,5 @@
 """The thread that writes the log: nobody waits for it, and nothing is lost without a word."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 Without PROCESS it is the worker that computed that trace.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import json
 import os

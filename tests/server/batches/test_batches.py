@@ -1,7 +1,5 @@
 """A batch: every trace once in the table, whatever was interrupted, failed, or done before."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

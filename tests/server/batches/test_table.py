@@ -1,7 +1,5 @@
 """The tables of a batch agree with each other."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A folder of short traces that an arm could have recorded, each of another number."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path

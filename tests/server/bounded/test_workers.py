@@ -1,7 +1,5 @@
 """Worker processes give way to the service, and do not outlive it."""
 
-from __future__ import annotations
-
 import os
 import select
 import subprocess
@@ -52,4 +50,5 @@ def test_a_worker_is_in_a_session_of_its_own_and_keeps_a_tenth_of_the_weight_whe
         worker = workers.submit(os.getpid).result()
         assert os.getsid(worker) == worker
         assert os.sched_getscheduler(worker) == os.SCHED_BATCH
-        assert os.getpriority(os.PRIO_PROCESS, worker) == os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
+        own = os.getpriority(os.PRIO_PROCESS, 0)
+        assert os.getpriority(os.PRIO_PROCESS, worker) == min(own + NICENESS, 19), "19 is the most there is"

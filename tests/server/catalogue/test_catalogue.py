@@ -1,7 +1,5 @@
 """Traces whose files are gone, or cannot be taken away."""
 
-from __future__ import annotations
-
 import errno
 import json
 import logging

@@ -1,7 +1,5 @@
 """The disk of the traces is told before experiments are refused for it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Files that are made to harm their reader: each is one line, and the service goes on as if nothing had been."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

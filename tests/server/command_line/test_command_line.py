@@ -1,30 +1,21 @@
 """`daq --server URL`: what the local command does, with a service's robot."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from daq.traces.reader import read_trace
 from tests.daq_cli.invoke import CommandLine, Said
-from tests.server.other_user import environment_in, other_users_command_line
+from tests.server.other_user import environment_in
 from tests.server.polling import until
 from tests.server.service import DAQ, Service
 
 RAMP = ["run", "ramp", "--joints", "1-3", "--amplitude", "3", "--duration", "0.2", "--settle", "0.1", "--hold", "0.1"]
 Daq = Callable[..., Said]
-
-
-@pytest.fixture
-def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
-    """The command of another user, in a folder of their own, who has no configuration."""
-    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
-        yield daq
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """Teaching a service's robot in a terminal: keys drive it, and every key that stops, stops it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

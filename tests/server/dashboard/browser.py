@@ -1,7 +1,5 @@
 """A real Chromium on a real service, whose robot is a mock in real time that tests can ask behind its back."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """One service, one mock and one Chromium for all tests of the dashboard; a new tab for each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

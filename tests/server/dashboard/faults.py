@@ -1,7 +1,5 @@
 """What axe finds fault with on a page as it is now."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from playwright.sync_api import Page

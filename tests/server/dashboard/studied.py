@@ -1,7 +1,5 @@
 """A service that has studied its arm: traces, a fit, a validation and a diagnosis, each made once by the real code."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Every page, light and dark: nothing that axe finds fault with; usable with the keyboard alone."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import pytest

@@ -1,7 +1,5 @@
 """The reference of the API at `/api/docs`: everything that the service describes, without a network."""
 
-from __future__ import annotations
-
 from collections import Counter
 from urllib.parse import urlsplit
 

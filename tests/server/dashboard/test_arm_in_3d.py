@@ -1,7 +1,5 @@
 """The arm in 3-D, in a Chromium that draws it, if need be without a graphics card."""
 
-from __future__ import annotations
-
 from io import BytesIO
 
 import pytest

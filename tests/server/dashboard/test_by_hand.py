@@ -1,7 +1,5 @@
 """By hand, on the page: a program that outlives the control and the page, gains, jogging beside the arm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """A lost connection cannot be overlooked, and heals by itself."""
 
-from __future__ import annotations
-
 import pytest
 from playwright.sync_api import expect
 

@@ -1,7 +1,5 @@
 """The page of diagnoses: one begun from chosen traces, followed, told as a story, and its next experiment queued."""
 
-from __future__ import annotations
-
 import re
 from math import degrees
 

@@ -1,7 +1,5 @@
 """The page of experiments: written in a form, seen before it is sent, followed in the queue to its trace."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta

@@ -1,7 +1,5 @@
 """In every test run: a motion is written into the form, is followed while it runs, and its trace is looked at."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

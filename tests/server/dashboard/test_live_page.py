@@ -1,7 +1,5 @@
 """The Live page shows what the service says, and moves the arm for whoever has the control."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

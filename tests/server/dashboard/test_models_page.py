@@ -1,7 +1,5 @@
 """The page of models: where they come from, what is known of them, and jobs begun, followed and ended there."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """On the narrowest screens: Stop is whole on every page, nothing sticks out, and a thumb reaches every page."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

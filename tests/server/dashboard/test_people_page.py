@@ -1,7 +1,5 @@
 """Signing in on the page, and approving somebody else's experiment there, in a real Chromium."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

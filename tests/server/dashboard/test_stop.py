@@ -1,7 +1,5 @@
 """Stop, from the page: at once, from everywhere, and with the truth about what became of it."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Iterator

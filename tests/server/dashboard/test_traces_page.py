@@ -1,7 +1,5 @@
 """The page of traces: found, laid over each other, zoomed, measured, simulated, noted, taken in and out."""
 
-from __future__ import annotations
-
 import re
 import uuid
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """The pure rules of the queue: states, order, schedule, what is missing."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from typing import Any, get_args
 from zoneinfo import ZoneInfo
@@ -256,7 +254,8 @@ def test_a_nightly_run_comes_once_a_night_also_when_the_clocks_change(
 
 @pytest.mark.parametrize(
     ("cron", "hours"),
-    [("*/30 2 * * *", ["02:00", "02:30"]), ("0 */2 * * *", ["02:00", "04:00"]), ("0 * * * *", ["02:00", "02:00"])],
+    [("*/30 2 * * *", ["02:00", "02:30"]), ("0 */2 * * *", ["02:00", "04:00"]), ("0 * * * *", ["02:00", "02:00"])]
+    + [(f"0 {hours} * * *", ["02:00", "02:00"]) for hours in ("*/1", "0-23", "0-23/1", "0-11,12-23")],
 )
 def test_steps_of_the_clock_come_once_when_it_is_put_back_and_every_hour_means_every_hour(
     cron: str, hours: list[str]
@@ -277,6 +276,15 @@ def test_a_cron_run_at_the_very_start_counts_and_missed_ones_are_left_out() -> N
     assert following(plan, 1, begun, datetime(2026, 1, 5, 2, 30, tzinfo=UTC)) == datetime(2026, 1, 6, 2, tzinfo=UTC)
     assert following(plan, 2, begun, begun) is None, "its number of runs is reached"
     assert following(plan, 1, begun, begun - timedelta(days=9)) == begun + timedelta(days=1), "the clock is set back"
+
+
+def test_a_day_of_the_month_and_a_weekday_are_alternatives() -> None:
+    """As POSIX has it."""
+    plan = Plan(datetime(2026, 6, 1, tzinfo=UTC), 0.0, None, "0 2 1-3 * 1", "UTC")
+    runs = [first(plan)]
+    while len(runs) < 5 and runs[-1] is not None:
+        runs.append(following(plan, len(runs), runs[-1], runs[-1]))
+    assert [run.day for run in runs if run is not None] == [1, 2, 3, 8, 15]  # 8 and 15 June 2026 are Mondays
 
 
 @pytest.mark.parametrize(

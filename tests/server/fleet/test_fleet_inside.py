@@ -1,7 +1,5 @@
 """Several robots in a service inside this process: what goes wrong with one, and what becomes of the others."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

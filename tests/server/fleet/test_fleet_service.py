@@ -1,7 +1,5 @@
 """Several robots in one service: each has its own queue, stop, lease, traces and stream."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

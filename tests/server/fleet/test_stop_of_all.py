@@ -1,7 +1,5 @@
 """The stop of all arms at the stop listener, and its result, which is as good as the worst."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Batches as jobs of the service: a table is their result, and one goes on where another ended."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

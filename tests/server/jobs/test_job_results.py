@@ -1,7 +1,5 @@
 """What jobs find, as a page gets it: true to its types, thinned without losing a peak, told in one line."""
 
-from __future__ import annotations
-
 import json
 from typing import Any, get_args
 

@@ -1,7 +1,5 @@
 """The service of jobs with an executor that tests hold by hand: what meets in one moment, and what goes wrong once."""
 
-from __future__ import annotations
-
 import errno
 import threading
 from collections.abc import Callable, Iterable, Iterator

@@ -1,7 +1,5 @@
 """Jobs: through real worker processes, and what becomes of them when those are killed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

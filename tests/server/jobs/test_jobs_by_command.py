@@ -1,9 +1,7 @@
 """`daq --server URL fit` and the like: computed by the service, kept by it, told as if it had been done here."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -13,7 +11,6 @@ from daq.contracts.service.jobs import DiagnoseRequest, FitRequest, Job, WaitsBe
 from daq_cli.models.service_jobs import standing_of
 from model.machine_model.model_file import load_model
 from tests.daq_cli.invoke import CommandLine, Said
-from tests.server.other_user import other_users_command_line
 from tests.server.service import Service
 
 pytestmark = pytest.mark.timeout(600)
@@ -33,13 +30,6 @@ def worker(sound_service: Service) -> None:
     for request, state in ((compare, "done"), (refused, "failed")):
         job = sound_service.robot.post("/jobs", json=request).json()["id"]
         assert sound_service.end_of(job, "jobs")["state"] == state
-
-
-@pytest.fixture
-def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
-    """Another user's command."""
-    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
-        yield daq
 
 
 @pytest.fixture

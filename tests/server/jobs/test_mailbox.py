@@ -1,7 +1,5 @@
 """How a worker says how far its job is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from server.jobs.mailbox import Mailbox, Reported

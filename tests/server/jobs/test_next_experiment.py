@@ -1,7 +1,5 @@
 """The experiments that a diagnosis may ask for."""
 
-from __future__ import annotations
-
 from daq.contracts.machine import load_machine
 from server.jobs.next_experiment import experiment_chooser
 

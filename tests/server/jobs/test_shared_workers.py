@@ -1,7 +1,5 @@
 """The places of workers, which the robots of a service take in turn."""
 
-from __future__ import annotations
-
 from concurrent.futures import Future
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A job that gets no processor is told from one that computes for long."""
 
-from __future__ import annotations
-
 from daq.contracts.processor import ProcessorTime
 from server.jobs.mailbox import Reported
 from server.jobs.standing import ASKED_AFTER, Standing

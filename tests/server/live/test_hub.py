@@ -1,7 +1,5 @@
 """When the hub hands messages to clients: at once to a few, with the next sample to many."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable
 

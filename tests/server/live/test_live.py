@@ -1,7 +1,5 @@
 """The live stream: through a real WebSocket, and its rules for slow clients without one."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Answers that wait for an end."""
 
-from __future__ import annotations
-
 import asyncio
 
 from daq.contracts.service.robot import RobotStatus

@@ -1,7 +1,5 @@
 """A client of the live stream, for tests."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

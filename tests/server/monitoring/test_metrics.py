@@ -1,7 +1,5 @@
 """What Prometheus is told, as its own parser reads it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any

@@ -1,7 +1,5 @@
 """The owner's inbox, through a real pipe: what a newer order does to one that still goes on."""
 
-from __future__ import annotations
-
 import os
 import select
 from collections.abc import Iterator

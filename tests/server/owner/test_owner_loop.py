@@ -1,7 +1,5 @@
 """The owner's loop when the robot is silent for a while although its line stays open."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from threading import Event

@@ -1,7 +1,5 @@
 """Gains, signals, gripper and reset: carried out soon, or not at all."""
 
-from __future__ import annotations
-
 import time
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -104,11 +102,7 @@ def _robot(moved: list[bool], ended: str | None = None, halted: str | None = Non
     control = SimpleNamespace(halted=halted)
     guardian = SimpleNamespace(outdated=lambda _asked: False)
     return SimpleNamespace(
-        activity="none",
-        controller=_gripper_of(moved),
-        control=control,
-        guardian=guardian,
-        end_cause=lambda: ended,
+        activity="none", controller=_gripper_of(moved), control=control, guardian=guardian, end_cause=lambda: ended
     )
 
 

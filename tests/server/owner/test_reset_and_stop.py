@@ -1,7 +1,5 @@
 """In the owner's process: a reset ends the stop that its asker knew of, and none that has come since."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,6 @@
 """A queue on stores of its own, with a clock turned by hand and an arm that answers what a test says."""
 
-from __future__ import annotations
-
+import sqlite3
 import threading
 import time
 from collections.abc import Callable
@@ -33,6 +32,9 @@ CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected
 MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
 REAL = MOCK.model_copy(update={"simulated": False})
 FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
+_BUSY = sqlite3.OperationalError("database is locked")
+_BUSY.sqlite_errorcode = sqlite3.SQLITE_BUSY
+LOCKED = OperationalError("INSERT", {}, _BUSY)
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
 
 ONLY_WHEN_WOKEN = 3600.0

@@ -1,7 +1,5 @@
 """The arm begins nothing by itself: what ends a person's part in its motion holds the queue until one resumes it."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The queue's own thread, on stores of its own and an arm that answers what a test says."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from datetime import timedelta
@@ -15,7 +13,7 @@ from server.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
 from tests.server.meanwhile import raising
-from tests.server.queue.bench import AT_ONCE, CALM, FULL, REAL, SPEC, Bench, done
+from tests.server.queue.bench import AT_ONCE, CALM, FULL, LOCKED, REAL, SPEC, Bench, done
 
 
 def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_room(
@@ -122,6 +120,19 @@ def test_a_trace_that_cannot_be_taken_in_holds_the_queue_and_is_looked_for(bench
     assert bench.looked_for_traces == 1
     assert _is_free(bench)
     assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_a_trace_that_is_taken_in_once_the_database_is_free_leaves_no_reason(bench: Bench) -> None:
+    bench.answer, bench.lost = done(), LOCKED
+    made = bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused") and "not in the catalogue yet" in event)
+    assert bench.experiments.get("ma2000", made.id).state == "running"
+    bench.lost = None
+    bench.queue.wake()
+    bench.until(lambda event: event == "experiment: completed")
+    ended = bench.experiments.get("ma2000", made.id)
+    assert (ended.state, ended.reason) == ("done", "")
 
 
 def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(bench: Bench) -> None:

@@ -1,7 +1,5 @@
 """What the queue tells of itself: every event with who did it and the experiment it is about, and its state."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 
 import pytest

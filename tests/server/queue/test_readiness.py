@@ -1,7 +1,5 @@
 """What the queue waits for, and what only a person can end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """No experiment moves a real arm before somebody else has approved exactly what it is."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass

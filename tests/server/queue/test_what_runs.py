@@ -1,7 +1,5 @@
 """The experiment that runs: its progress, who cancels it, and what is left when it ends."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.service.experiments import ExperimentRequest

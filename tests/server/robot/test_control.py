@@ -1,7 +1,5 @@
 """The control of the robot, with a clock turned by hand."""
 
-from __future__ import annotations
-
 import queue
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """An order counts from its first byte: what was begun before a stop and ends after it changes nothing."""
 
-from __future__ import annotations
-
 import json
 import socket
 from typing import Any

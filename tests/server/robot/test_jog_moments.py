@@ -1,7 +1,5 @@
 """When a jog command was said: the moment at which it arrived, whatever it had to wait for in the service."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time

@@ -1,7 +1,5 @@
 """Giving the port back while a connection is being made."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -21,7 +19,7 @@ from tests.server.meanwhile import Meanwhile
 class SlowOwner:
     """A process that takes until `go` to be started, and never greets."""
 
-    made: list[SlowOwner]
+    made: list["SlowOwner"]
     begun: threading.Event
     go: threading.Event
 

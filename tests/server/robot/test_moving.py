@@ -1,7 +1,5 @@
 """Moving the arm by hand through the service: only with the control, and never past a stop."""
 
-from __future__ import annotations
-
 from tests.server.polling import until
 from tests.server.service import Service
 

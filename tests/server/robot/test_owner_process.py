@@ -1,7 +1,5 @@
 """The service's side of a robot's owner when the owner, or a listener, or the computer does what it should not."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from functools import partial

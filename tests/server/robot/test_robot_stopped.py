@@ -1,7 +1,5 @@
 """Between the board's word that it has stopped and its owner's report of that."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Teaching in the service, without a robot: when a command was said, and what is left of a lead."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import Future
 from pathlib import Path
@@ -123,9 +121,7 @@ def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked
     assert teaching.status().path is None
 
 
-def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_rest(
-    robot: Asked,
-) -> None:
+def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_rest(robot: Asked) -> None:
     assert LEAD_ENDS_WITHIN > PATIENCE
     teaching = TeachingService(robot, lambda _line: None, ends_within=0.0)
     teaching.lead(Word(0.0), (1,))

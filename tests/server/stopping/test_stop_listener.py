@@ -204,8 +204,7 @@ def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("head", "status"),
-    [(b"x: y\r\n" * 300_000, 431), (b"x: " + b"y" * 5_000_000, 431), (b"x: y\r\n" * 20, 404)],
+    ("head", "status"), [(b"x: y\r\n" * 300_000, 431), (b"x: " + b"y" * 5_000_000, 431), (b"x: y\r\n" * 20, 404)]
 )
 def test_a_head_too_large_is_refused_at_once(service: Service, head: bytes, status: int) -> None:
     where = urlsplit(_beside(service))

@@ -1,7 +1,5 @@
 """Databases of both kinds, new for each test."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rows that tests of several rooms put into the database."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 from server.store.traces import NewTrace

@@ -1,7 +1,5 @@
 """What a refusal says: people know experiments, traces, jobs and models by their names and times, not by numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """A database that is not as it was left: one line at the start, a 503 that names the table afterwards."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 from collections.abc import Callable

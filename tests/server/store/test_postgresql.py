@@ -1,7 +1,5 @@
 """PostgreSQL below the service: one service at a time, nothing lost when its server ends, wrong values refused."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rows of several robots in one database: what one robot has is nothing to another."""
 
-from __future__ import annotations
-
 from server.store.engine import Store
 from server.store.models import ModelStore, NewModel
 from server.store.traces import TraceStore

@@ -1,7 +1,5 @@
 """The database: catalogue and cursors do what they say."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from contextlib import suppress

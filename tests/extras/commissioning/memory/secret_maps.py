@@ -1,7 +1,5 @@
 """Memory maps that a seed hides in the mock, found by what `daq memory find` uses, in the board's own time."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass

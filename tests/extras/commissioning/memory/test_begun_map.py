@@ -1,7 +1,5 @@
 """A map of which a part was found is written so that a person completes it, and cannot be used before."""
 
-from __future__ import annotations
-
 import pytest
 
 from extras.commissioning.memory.findings import Finding, Findings

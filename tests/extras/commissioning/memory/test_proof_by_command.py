@@ -1,7 +1,5 @@
 """The smallest steps of a set point: what is written, in what order, and when the proof ends."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import pytest

@@ -1,7 +1,5 @@
 """Memory maps that the mock hides are found again, nothing is found wrongly, and nothing unproved is written."""
 
-from __future__ import annotations
-
 import pytest
 
 from firmware_protocol.memory_map import JOINTS

@@ -138,7 +138,7 @@ def test_a_velocity_that_is_not_measured_is_left_out(tmp_path: Path) -> None:
         ([{}], {"topic": "/other"}, "topic /other: has no joint states; there are some on /joint_states"),
         ([{}], {"joints": ("elbow",)}, "has no joint 'elbow'; it has pan, lift"),
         ([{}], {"joints": ("pan", "pan")}, "choose up to 99 different ones"),
-        ([{"names": ["a", "a"]}], {}, "names a joint twice"),
+        ([{"names": ["a\nb", "a\nb"]}], {}, r"names a joint twice: a\?b, a\?b"),
         ([{"effort": [1.0]}], {}, "has 2 names and 1 values of effort"),
         ([{"names": [], "position": [], "effort": []}], {}, "has no joint states in 1 messages"),
         ([], {}, "has no joint states in 0 messages"),

@@ -1,7 +1,5 @@
 """`daq traces import` of somebody else's bag: what is chosen, what is told, and what cannot be."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

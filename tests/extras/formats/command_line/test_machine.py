@@ -1,7 +1,5 @@
 """`daq machine`: URDF in, URDF and MJCF out, as a person types it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

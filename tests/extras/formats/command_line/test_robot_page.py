@@ -1,7 +1,5 @@
 """docs/robots-from-urdf.md: what it types gives what it shows, and its program runs."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

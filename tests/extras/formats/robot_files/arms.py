@@ -1,7 +1,5 @@
 """Arms that others described: URDF files of the package `example-robot-data`, and what each of its joints does."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from importlib.metadata import files
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Small URDFs, sound and hostile."""
 
-from __future__ import annotations
-
 INERTIAL = (
     '<inertial><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/><mass value="2"/>'
     '<inertia ixx="0.02" ixy="0" ixz="0.001" iyy="0.03" iyz="0" izz="0.02"/></inertial>'
@@ -70,6 +68,10 @@ HOSTILE: dict[str, tuple[str, str]] = {
     "two numbers for three": (
         robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="0 1"/>')),
         "joint 'j': axis xyz is '0 1'; 3 finite numbers are needed",
+    ),
+    "an axis beyond measure": (
+        robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="1e308 1e308 0"/>')),
+        "joint 'j': axis xyz is '1e308 1e308 0'; 3 finite numbers are needed, ±1e+09 at most",
     ),
     "no axis to speak of": (
         robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="0 0 0"/>')),

@@ -1,7 +1,5 @@
 """Arms of published URDFs have the dynamics that Pinocchio and MuJoCo give them, each with a reader of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -29,10 +27,7 @@ def test_a_published_arm_has_the_dynamics_of_other_engines(name: str, engine: ty
     for _ in range(5):
         q, velocity = random.uniform(-3.0, 3.0, len(arm.joints)), random.normal(size=len(arm.joints))
         bias = recursive.velocity_torques(chain, q, velocity) + recursive.gravity_torques(chain, q)
-        for ours, theirs in (
-            (recursive.mass_matrix(chain, q), other.inertia(q)),
-            (bias, other.bias(q, velocity)),
-        ):
+        for ours, theirs in ((recursive.mass_matrix(chain, q), other.inertia(q)), (bias, other.bias(q, velocity))):
             np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=AGREEMENT * np.abs(theirs).max())
 
 

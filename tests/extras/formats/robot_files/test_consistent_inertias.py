@@ -1,7 +1,5 @@
 """Fits of torques that Pinocchio computed, with noise: the plain fit ends with bodies that cannot exist."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from xml.etree import ElementTree as Xml
 

@@ -1,7 +1,5 @@
 """A URDF that nobody means is refused in one line that says what is wrong and where."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -129,6 +127,27 @@ def test_what_is_not_taken_over_of_limits_and_gears_is_noted(tmp_path: Path) -> 
 def test_xacro_that_was_not_expanded_is_named(tmp_path: Path, declared: str) -> None:
     with pytest.raises(SpecError, match=r"is xacro that was not expanded; .*`xacro FILE > robot\.urdf`"):
         machine_from_urdf(written(tmp_path, f'<robot name="a" {declared}><xacro:arm name="b"/></robot>'))
+
+
+def test_a_default_namespace_changes_nothing(tmp_path: Path) -> None:
+    plain = machine_from_urdf(written(tmp_path, TWO_JOINTS))
+    spaced = TWO_JOINTS.replace("<robot ", '<robot xmlns="http://example.org/urdf" ', 1)
+    assert spaced != TWO_JOINTS
+    assert machine_from_urdf(written(tmp_path, spaced)) == plain
+
+
+def test_a_urdf_is_read_in_the_encoding_that_it_declares(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    body = TWO_JOINTS.removeprefix('<?xml version="1.0"?>') + "<!-- Körper -->"
+    path.write_bytes(('<?xml version="1.0" encoding="ISO-8859-1"?>\n' + body).encode("latin-1"))
+    assert len(machine_from_urdf(path).joints) == 2
+    for head, said in (
+        ("", "it is not UTF-8 text"),
+        ('<?xml version="1.0" encoding="klingon"?>', "'klingon', which is"),
+    ):
+        path.write_bytes((head + body).encode("latin-1"))
+        with pytest.raises(SpecError, match=said):
+            machine_from_urdf(path)
 
 
 def test_damaged_files_are_refused_in_one_line_or_read_as_a_whole(tmp_path: Path) -> None:

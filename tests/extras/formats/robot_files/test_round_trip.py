@@ -1,7 +1,5 @@
 """A machine that goes out as URDF or MJCF and comes back has the dynamics that it had."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as Xml

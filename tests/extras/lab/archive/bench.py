@@ -1,7 +1,5 @@
 """An archive behind a folder of traces, with its own threads, on a store that may fail."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta

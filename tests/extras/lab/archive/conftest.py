@@ -1,7 +1,5 @@
 """One store for all tests of the archive: starting it takes longer than most of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """A store that speaks S3, as a process of another project's, and a proxy before it that fails as it is told."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Traces between the folder and the archive: none is ever lost, whatever the store does."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterator
 from datetime import timedelta

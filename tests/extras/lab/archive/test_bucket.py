@@ -1,7 +1,5 @@
 """What the store does with a trace, and each way in which it may fail."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The archive as clients meet it: over REST, from Python, by commands."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from pathlib import Path

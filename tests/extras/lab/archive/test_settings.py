@@ -1,7 +1,5 @@
 """What an administrator may write into `[archive]`, and what of it is never shown."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

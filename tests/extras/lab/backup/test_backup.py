@@ -1,7 +1,5 @@
 """Backup and restore: true while a service writes, and nothing touched unless all of it is as it was written."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

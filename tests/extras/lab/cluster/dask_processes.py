@@ -1,7 +1,5 @@
 """A scheduler of Dask and its workers, as processes of this computer, for tests."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Jobs through a scheduler and a worker of Dask in this process; in a test their threads would outlive it."""
 
-from __future__ import annotations
-
 import json
 
 from distributed import LocalCluster

@@ -1,7 +1,5 @@
 """A batch on a real cluster: a scheduler and workers as processes, one of which is killed in mid-batch."""
 
-from __future__ import annotations
-
 import csv
 import json
 import subprocess

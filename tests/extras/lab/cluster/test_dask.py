@@ -1,7 +1,5 @@
 """Jobs through Dask, as far as one process shows it; tests/extras/lab/cluster/test_cluster.py has real clusters."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A batch by Slurm's own commands, of which we have none: stand-ins take what sbatch is given, and run it here."""
 
-from __future__ import annotations
-
 import csv
 import os
 import subprocess

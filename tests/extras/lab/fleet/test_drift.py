@@ -1,7 +1,5 @@
 """Which numbers count as changed: held against a published table of the normal distribution, and against chance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

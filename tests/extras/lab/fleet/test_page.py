@@ -1,7 +1,5 @@
 """The page on several arms: its commands and its program work as they stand there."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess
@@ -39,11 +37,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
 
 @pytest.mark.parametrize("line", LINES)
 def test_a_command_of_the_page_works(
-    line: str,
-    fleet: FleetService,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    line: str, fleet: FleetService, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words = shlex.split(line.removeprefix("$ ").replace(URL, fleet.url.removesuffix("/")))
     assert words[0] == "daq"

@@ -1,7 +1,5 @@
 """Databases of both kinds, new for each test."""
 
-from __future__ import annotations
-
 from tests.server.store.conftest import postgresql, sqlite_store, store
 
 __all__ = ["postgresql", "sqlite_store", "store"]

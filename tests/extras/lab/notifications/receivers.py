@@ -1,7 +1,5 @@
 """Receivers that are not this project's: an SMTP server (aiosmtpd), and an HTTP server that notes what is posted."""
 
-from __future__ import annotations
-
 import ssl
 import threading
 from collections.abc import Callable, Iterator

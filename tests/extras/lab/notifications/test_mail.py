@@ -1,7 +1,5 @@
 """E-mail, through a mail server that is not this project's (aiosmtpd)."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 import ssl
@@ -129,6 +127,28 @@ def test_a_password_is_given_after_the_connection_is_encrypted(tmp_path: Path) -
         assert len(handler.taken) == 1
     assert seen[-1] == (True, b"arm", b"right")
     assert all(encrypted for encrypted, _, _ in seen)
+
+
+def test_user_and_password_may_have_any_letters(tmp_path: Path) -> None:
+    authority, seen = Authority(tmp_path, "localhost"), []
+
+    def check(_server: SMTP, _session: Session, _envelope: Envelope, _kind: str, given: Any) -> AuthResult:
+        seen.append((given.login.decode(), given.password.decode()))
+        return AuthResult(success=seen[-1] == ("Jürgen", "schlüßel θ"), handled=False)
+
+    file = tmp_path / "password"
+    file.write_text("schlüßel θ\n", "utf-8")
+    options = {"tls_context": authority.server(), "authenticator": check, "auth_required": True}
+    with mail_server(**options) as (handler, port):
+        settings = smtp(port, ca=authority.file(), password=file, user="Jürgen")
+        Mail(ANNA, settings).send(told())
+        assert len(handler.taken) == 1
+        with pytest.raises(DeliveryError, match="localhost: answered 535"):
+            Mail(ANNA, settings.model_copy(update={"user": "Jörg"})).send(told())
+    with mail_server(**options, auth_exclude_mechanism=["PLAIN"]) as (_, port):
+        settings = smtp(port, ca=authority.file(), password=file, user="arm")
+        with pytest.raises(DeliveryError, match="ASCII letters alone, since it has no AUTH PLAIN"):
+            Mail(ANNA, settings).send(told())
 
 
 def test_a_server_without_tls_gets_nothing_where_tls_is_asked_for() -> None:

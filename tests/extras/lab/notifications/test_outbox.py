@@ -1,7 +1,5 @@
 """Messages arrive at least once, in spite of receivers that are away, restarts and full outboxes; and nobody waits."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

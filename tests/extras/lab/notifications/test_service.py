@@ -1,10 +1,8 @@
 """A service tells its webhooks what happens; a command tries them; nobody sees or changes an address by a request."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 from standardwebhooks import Webhook as Witness
@@ -84,6 +82,21 @@ def test_a_command_tries_every_destination(
     assert PATH not in daq("config", "show").out
     (tmp_path / "daq.toml").write_text("")
     daq("notify", "test").complains(2, "nobody is told", "[notifications]")
+
+
+def test_a_fault_while_a_test_is_sent_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(*_: object) -> NoReturn:
+        raise RuntimeError("with the secret in its words")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("server.notifications.mail.Mail.send", fails)
+    mail = '[notifications.smtp]\nhost = "localhost"\nsender = "arm@lab.example"\n[notifications.email.anna]\n'
+    (tmp_path / "daq.toml").write_text(f'{mail}to = "anna@lab.example"\n', "utf-8")
+    told = CommandLine(capsys)("notify", "test")
+    assert (told.code, told.err) == (3, "")
+    assert told.out.startswith("email anna: not sent: RuntimeError, a fault of this program (")
 
 
 def test_a_service_with_a_wrong_secret_does_not_start(

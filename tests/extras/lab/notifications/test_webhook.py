@@ -1,7 +1,5 @@
 """Webhooks: signed so that another's library accepts them, and only to addresses that are allowed."""
 
-from __future__ import annotations
-
 import ipaddress
 import json
 import socket

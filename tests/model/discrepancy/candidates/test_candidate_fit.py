@@ -1,7 +1,5 @@
 """Candidates that are far from where the search for the tolerance parameters has led."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """What a ranking allows to be said."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.discrepancy.candidates.decision import Added, decide

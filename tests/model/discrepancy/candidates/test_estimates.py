@@ -1,7 +1,5 @@
 """Intervals: right where the residual is coloured, and no narrower than the priors allow."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Every effect of the library is tried, at places and sizes that its bounds allow."""
 
-from __future__ import annotations
-
 import pytest
 
 from daq.contracts.errors import SpecError

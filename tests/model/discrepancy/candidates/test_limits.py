@@ -1,7 +1,5 @@
 """Backlash without a gap is a gear that gives, and no rival of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

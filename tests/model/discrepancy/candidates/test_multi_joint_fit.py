@@ -1,7 +1,5 @@
 """One effect on several joints: found on all of them at once, and not where only one has it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

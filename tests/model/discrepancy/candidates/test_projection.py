@@ -1,7 +1,5 @@
 """What the tolerance parameters explain, where nothing is known of one of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

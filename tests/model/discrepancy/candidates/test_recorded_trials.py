@@ -1,7 +1,5 @@
 """Trial sizes that follow from the recorded drive."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

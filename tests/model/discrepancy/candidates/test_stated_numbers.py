@@ -1,7 +1,5 @@
 """Numbers far from what a file states, as the effects that do the same."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Ripples and disturbances are proposed at their frequency, on joints that have a tone already too."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

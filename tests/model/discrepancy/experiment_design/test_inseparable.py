@@ -1,7 +1,5 @@
 """Candidates that no motion tells apart: which are one class, what they share, and what would tell them."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import pytest

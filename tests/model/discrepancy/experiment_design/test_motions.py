@@ -1,7 +1,5 @@
 """Free motions: drawn and changed at random within the machine's limits, and written as experiments that can be run."""
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """What to run next: predicted separations are what a record then shows; pairs that nothing tells are named."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a prediction imagines: an arm that begins at rest, as the real one does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The search for a motion of its own: admissible, repeatable, no worse than what is offered, and kept by the mock."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,10 +39,7 @@ def simple_rival(effect: str, joint: int, values: dict[str, float]) -> Candidate
 
 @pytest.fixture(scope="module")
 def rivals() -> tuple[CandidateFit, CandidateFit]:
-    return (
-        simple_rival("coulomb_friction", 2, {"torque": 6.0}),
-        simple_rival("dead_zone", 2, {"width": 0.8}),
-    )
+    return (simple_rival("coulomb_friction", 2, {"torque": 6.0}), simple_rival("dead_zone", 2, {"width": 0.8}))
 
 
 @pytest.fixture(scope="module")

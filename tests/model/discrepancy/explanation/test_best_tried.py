@@ -1,7 +1,5 @@
 """How near the best candidate came to being named: by the evidence that it needed itself."""
 
-from __future__ import annotations
-
 from model.discrepancy.diagnosis import Candidate
 from model.discrepancy.explanation.renderer import best_tried
 

@@ -1,7 +1,5 @@
 """Numbers of the machine file after a fit, beside what the file states."""
 
-from __future__ import annotations
-
 from daq.contracts.machine import load_machine
 from daq_cli.models.diagnosis_text import WIDTH, answer_text
 from model.discrepancy.diagnosis import Diagnosis, FoundValue

@@ -1,7 +1,5 @@
 """Notes on an answer: their data, and how they read."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import get_args
 

@@ -1,7 +1,5 @@
 """Numbers of a sentence: units, verbs by their signs, digits that count, and no exponent."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reasons say what a record shows: for every effect of the shared list, put into an arm and read off its record."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

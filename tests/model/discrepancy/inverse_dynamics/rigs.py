@@ -4,8 +4,6 @@ Nothing of this is shared with the models that are diagnosed: friction is a smoo
 masses and a spring, the six-joint arm a cloud of points whose accelerations are differences of their places.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Any

@@ -1,7 +1,5 @@
 """A diagnosis by inverse dynamics as far as its first search."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from daq.contracts.progress import Never, silent

@@ -1,7 +1,5 @@
 """Held-out traces are fitted to in turn: they may show what the others do not, and confirm or exclude what these do."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +12,7 @@ from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion, Verdict
 from model.discrepancy.explanation.method_words import method_words
+from model.discrepancy.grounds import Refusal, RefusalKind
 from model.discrepancy.inverse_dynamics import both_ways, looks
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.machine_model.model import base_model
@@ -273,7 +272,21 @@ def test_records_speak_for_a_disturbance_that_repeats_as_often(
     effect: str, joints: tuple[int, ...], frequency: float, speaks: bool
 ) -> None:
     records: Any = SimpleNamespace(traces=(SimpleNamespace(time=np.array([0.0, 8.0])),), held_out=())
-    workflow: Any = SimpleNamespace(beyond_motion=(_Candidate(effect, joints, frequency),))
+    beyond = (_Candidate(effect, joints, frequency),)
+    workflow: Any = SimpleNamespace(beyond_motion=beyond, found=SimpleNamespace(steps=()))
     rate = FoundValue(value=1.5, low=1.4, high=1.6, unit="Hz", part="frequency", joints=(1,))
     found = step("periodic_disturbance", parameters={"joint1.periodic_disturbance.frequency": rate})
     assert looks.Look(workflow, records, 12.0).speaks_for(found) == speaks
+
+
+@pytest.mark.parametrize(
+    ("kind", "joints", "speaks"),
+    [("leaves-more-than-noise", (1,), True), ("leaves-more-than-noise", (2,), False), ("superfluous", (1,), False)],
+)
+def test_records_that_leave_more_beside_an_effect_speak_for_it(
+    kind: RefusalKind, joints: tuple[int, ...], speaks: bool
+) -> None:
+    refused = step("coulomb_friction", joints).model_copy(update={"adopted": False, "refusal": Refusal(kind=kind)})
+    workflow: Any = SimpleNamespace(beyond_motion=(), found=SimpleNamespace(steps=(refused,)))
+    records: Any = SimpleNamespace(traces=(), held_out=())
+    assert looks.Look(workflow, records, 12.0).speaks_for(named("coulomb_friction")) is speaks

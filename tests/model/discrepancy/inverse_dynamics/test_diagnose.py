@@ -1,7 +1,5 @@
 """Effects that rigs without a known controller hide, named from recorded drive and motion."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 from dataclasses import replace

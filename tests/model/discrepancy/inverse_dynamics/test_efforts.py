@@ -1,7 +1,5 @@
 """Recorded forces beside those that a model before and after a diagnosis predicts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """docs/one-joint-rig.md: the rig's CSV files, its machine file, and what the diagnosis says of them."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from pathlib import Path

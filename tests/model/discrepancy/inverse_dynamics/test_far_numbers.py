@@ -1,7 +1,5 @@
 """A number of the machine that is far from its file: what stands for it, and on how little evidence it is named."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Records that were not fitted to meet a disturbance at a phase of their own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

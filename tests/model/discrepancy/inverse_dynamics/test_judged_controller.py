@@ -3,8 +3,6 @@
 The controllers and the joints that they move are written out here: nothing of `model` made these records.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any

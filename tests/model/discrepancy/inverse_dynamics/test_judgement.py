@@ -1,7 +1,5 @@
 """When an effect that has the evidence is taken, and when it is not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws that the field has beside each other, hidden in rigs that others wrote, are told apart by their names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Which effects may be named below a lower cutoff: none whose torque jumps, as it is smeared there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any

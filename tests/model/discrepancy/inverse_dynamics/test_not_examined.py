@@ -1,7 +1,5 @@
 """A joint whose drive stands at an unknown limit nearly throughout is not examined, and the answer begins with that."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What numbers are expected to be: both constants of a motor are of one magnet."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What a sound rig imitates is not named: a drive that is held, noise of readings, friction near a reversal, numbers
 within what their file states."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """How candidates compete, and effects that are looked for once more with all others in place."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Which candidates of a step are fitted, how far, and what a rival that was refused means for the next one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -82,8 +80,7 @@ def test_an_effect_with_less_than_half_the_evidence_of_a_refused_rival_is_not_na
 
 
 @pytest.mark.parametrize(
-    ("parameters", "behind", "open_"),
-    [(1, 11.0, True), (1, 13.0, False), (3, 24.0, True), (3, 27.0, False)],
+    ("parameters", "behind", "open_"), [(1, 11.0, True), (1, 13.0, False), (3, 24.0, True), (3, 27.0, False)]
 )
 def test_records_leave_open_what_differs_by_the_cost_of_parameters_alone(
     found: tuple[Fitted, ...], parameters: int, behind: float, open_: bool

@@ -1,7 +1,5 @@
 """A number that is far from what the machine file states is a step of its own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

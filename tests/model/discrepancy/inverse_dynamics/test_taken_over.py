@@ -1,8 +1,6 @@
 """Effects that stated numbers can take over, at the price of being far from what is stated; and laws that only
 resemble what is missing."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -54,7 +52,8 @@ def test_friction_below_what_is_stated_counts_by_its_ratio_and_above_by_its_dist
     assert (
         prior_cost([u], {u.name: 0.0}) == prior_cost([u], {u.name: 0.05}) == pytest.approx((math.log(100) / 0.3) ** 2)
     )
-    for other in (friction(effect=None), friction(low=-5.0), replace(u, nuisance=True)):
+    assert prior_distance(friction(effect=None), 1.0) == prior_distance(u, 1.0), "no number of a machine vanishes"
+    for other in (friction(low=-5.0), replace(u, nuisance=True)):
         assert prior_distance(other, 1.0)[0] == pytest.approx(-3.0)
 
 

@@ -1,7 +1,5 @@
 """No answer depends on the unit of the recorded drive; an offset and too short a record are told as what they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

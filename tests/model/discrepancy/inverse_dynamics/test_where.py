@@ -1,7 +1,5 @@
 """Where torques are missing most, and what is told of a size that ended at its bound."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

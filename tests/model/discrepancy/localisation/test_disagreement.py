@@ -1,7 +1,5 @@
 """Where: phases are what a person would call them, noise is not significant, a disagreement is found where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

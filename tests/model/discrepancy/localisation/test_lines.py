@@ -1,17 +1,10 @@
 """A line over a smooth spectrum is found at the rate that theory gives, and noise is not taken for one more often."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from model.discrepancy.localisation.lines import (
-    HALF,
-    has_line_over_position,
-    has_line_over_time,
-    line_over_median,
-)
+from model.discrepancy.localisation.lines import HALF, has_line_over_position, has_line_over_time, line_over_median
 
 SAMPLES = 1000
 FLOOR = 0.3

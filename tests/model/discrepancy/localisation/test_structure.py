@@ -1,7 +1,5 @@
 """Whether what is left has a shape: noise of any size and colour has none, a torque or law that is missing has one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

@@ -1,7 +1,5 @@
 """The remaining torque: what was put in comes out, at its joint, against what it depends on, and never from noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

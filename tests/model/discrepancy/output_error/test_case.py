@@ -1,7 +1,5 @@
 """What held-out errors are compared with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

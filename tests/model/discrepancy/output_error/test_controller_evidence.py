@@ -1,7 +1,5 @@
 """The controller's own numbers prove a wrong gain and lost set points, and nothing else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Σλ² from derivatives is that from simulations, and says whether tolerances explain what is left."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

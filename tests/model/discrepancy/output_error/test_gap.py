@@ -1,7 +1,5 @@
 """The gap of the closed loop: root mean squares of an arm that follows nothing of the record, stage by stage."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -60,10 +58,10 @@ class Readings:
     drive: bool = True
     share: float = 0.9
 
-    def with_drive_as_input(self, recorded: bool) -> Readings:
+    def with_drive_as_input(self, recorded: bool) -> "Readings":
         return replace(self, drive=recorded)
 
-    def with_feedback_share(self, share: float) -> Readings:
+    def with_feedback_share(self, share: float) -> "Readings":
         return replace(self, share=share)
 
     def residuals(self, point: str) -> Signals:

@@ -1,7 +1,5 @@
 """Held-out traces begin where they begin, whatever is known of those fitted to."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The yardstick: each residual judged by a noise model of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import lfilter
 

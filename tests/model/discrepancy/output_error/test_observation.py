@@ -1,7 +1,5 @@
 """What may differ, and around which numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

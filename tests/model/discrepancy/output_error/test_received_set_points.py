@@ -1,7 +1,5 @@
 """Which set points a controller worked with, told by its drive: a third of the time it stands at its limit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -128,11 +126,7 @@ def checked(trace: Trace, machine: Machine) -> tuple[ControllerFinding, ...]:
 @pytest.mark.parametrize("stated", [True, False], ids=["stated", "read from the record"])
 @pytest.mark.parametrize(
     "loop",
-    [
-        Loop(lost=0.1),
-        Loop(gains=(80.0, 60.0, 0.0), lost=0.1),
-        Loop(gains=(80.0, 60.0, 3.0), lost=0.1, winds_up=True),
-    ],
+    [Loop(lost=0.1), Loop(gains=(80.0, 60.0, 0.0), lost=0.1), Loop(gains=(80.0, 60.0, 3.0), lost=0.1, winds_up=True)],
     ids=["PD", "PI", "PID that winds up"],
 )
 def test_lost_set_points_are_counted_though_the_drive_stands_at_its_limit_a_third_of_the_time(

@@ -1,7 +1,5 @@
 """An arm that others wrote, diagnosed with its recorded drive as the input."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The power of a board that is told by the volts of its drive."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Least squares with kept derivatives, and the projection of what tolerance parameters explain."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Noise that a file does not state is taken for noise, and readings that lie apart are left out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

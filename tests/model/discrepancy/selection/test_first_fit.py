@@ -1,7 +1,5 @@
 """The first fit, of the tolerance parameters alone, also where a strong effect takes it to the verge of instability."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

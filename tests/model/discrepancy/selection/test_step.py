@@ -1,7 +1,5 @@
 """Steps: candidates that held-out traces refuse give way to the next, and parameters are those of the last fit."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -75,6 +73,18 @@ def test_the_search_ends_after_three_refused_candidates(monkeypatch: pytest.Monk
     assert found.ended
 
 
+def removed(monkeypatch: pytest.MonkeyPatch, without: Any) -> list[str]:
+    """Names of the parameters without which the last fit is made, which then is `without`."""
+    gone: list[str] = []
+
+    def taken_out(_point: Any, names: list[str]) -> Any:
+        gone.extend(names)
+        return without
+
+    monkeypatch.setattr(last_fit, "_without", taken_out)
+    return gone
+
+
 def test_an_effect_that_a_later_one_explains_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both have come out with the same interval; only one of them has its null in it, and the newest stays anyway."""
     value = FoundValue(value=0.1, low=-0.1, high=0.3, unit="1")
@@ -85,8 +95,7 @@ def test_an_effect_that_a_later_one_explains_is_removed(monkeypatch: pytest.Monk
     known = {"a": parameter("a", 0.0), "b": parameter("b", 1.0), "c": parameter("c", 0.0)}
     current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
     without = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
-    gone: list[str] = []
-    monkeypatch.setattr(last_fit, "_without", lambda _p, names: gone.extend(names) or without)
+    gone = removed(monkeypatch, without)
     monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
     monkeypatch.setattr(last_fit, "found_values", lambda _c, own, _m: {p.name: value for p in own})
     now, steps = update_to_last_fit(current, [step(name, parameters={name: value}) for name in "abc"])
@@ -94,6 +103,29 @@ def test_an_effect_that_a_later_one_explains_is_removed(monkeypatch: pytest.Monk
     assert steps[0].refusal == Refusal(kind="superfluous")
     assert gone == ["a"]
     assert now is without, "the answer's errors and its model are those of the fit without it"
+
+
+def test_a_joint_on_which_the_effect_of_a_step_may_be_absent_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    intervals = {"one": (0.0, 0.1), "two": (8.6, 9.4)}
+    joints = {"one": (1,), "two": (2,)}
+    known = {n: SimpleNamespace(name=n, null=0.0, low=0.0, effect="coulomb_friction", joints=joints[n]) for n in joints}
+    current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
+    gone = removed(monkeypatch, current)
+
+    def values(_current: Any, own: list[Any], _shift: Any) -> dict[str, FoundValue]:
+        return {
+            p.name: FoundValue(value=sum(intervals[p.name]) / 2, low=low, high=high, unit="N·m")
+            for p in own
+            for low, high in (intervals[p.name],)
+        }
+
+    monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
+    monkeypatch.setattr(last_fit, "found_values", values)
+    both = step("coulomb_friction", (1, 2), parameters=values(None, list(known.values()), None))
+    _, steps = update_to_last_fit(current, [both])
+    assert (steps[0].adopted, steps[0].joints, list(steps[0].parameters), gone) == (True, (2,), ["two"], ["one"])
+    intervals["two"] = (0.0, 0.1)
+    assert update_to_last_fit(current, [both])[1][0].joints == (1, 2), "it is not left without any"
 
 
 def test_the_parameters_of_a_step_are_those_of_the_last_fit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,7 +137,7 @@ def test_the_parameters_of_a_step_are_those_of_the_last_fit(monkeypatch: pytest.
     )
     taken = step("dead_zone", (2,), parameters={name: before})
     refused = taken.model_copy(update={"adopted": False})
-    known = {name: SimpleNamespace(name=name, null=0.0, low=0.0)}
+    known = {name: SimpleNamespace(name=name, null=0.0, low=0.0, joints=(2,))}
     current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
     monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
     monkeypatch.setattr(last_fit, "found_values", lambda _c, own, _m: {p.name: last for p in own})

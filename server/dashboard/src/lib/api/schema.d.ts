@@ -2403,7 +2403,7 @@ export interface components {
              * Verdict
              * @enum {string}
              */
-            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect" | "check-the-record";
+            verdict: "nothing-significant" | "named" | "ambiguous" | "partly" | "suspected" | "unknown-effect" | "check-the-record";
             /** Summary */
             summary: string;
             /** Significant */
@@ -5347,7 +5347,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            kind: "bursts" | "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "short" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
             /**
              * Consequence
              * @enum {string}

@@ -29,6 +29,7 @@ const TONES: Record<Verdict, Tone> = {
   'nothing-significant': 'good',
   named: 'good',
   ambiguous: 'warn',
+  partly: 'warn',
   suspected: 'warn',
   'unknown-effect': 'bad',
   'check-the-record': 'bad',

@@ -1,0 +1,125 @@
+"""Events on their way into the database: those that cannot be written wait, and are written later, in order."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy.exc import DatabaseError, IntegrityError, SQLAlchemyError
+
+from daq.contracts.service.events import ServiceEvent
+from server.database_errors import is_value, one_line
+from server.store.events import EventStore
+
+MOST_WAITING = 10_000
+"""Number of events that wait in memory; further ones are only in the log."""
+AGAIN_AFTER = 1.0
+"""Time (s) after which a failed write is tried again."""
+log = logging.getLogger("server")
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    robot: str
+    kind: str
+    text: str
+    at: datetime
+    actor: str | None
+    experiment: str | None
+
+
+class WaitingEvents:
+    """Writes events, from any thread. `written` is called with the robot's name and each event that has its row."""
+
+    def __init__(
+        self, store: EventStore, written: Callable[[str, ServiceEvent], None], again_after: float = AGAIN_AFTER
+    ) -> None:
+        self._store = store
+        self._written = written
+        self._again_after = again_after
+        self._events: deque[_Waiting] = deque()
+        self._changed = threading.Condition()
+        """Held for moments only."""
+        self._writing = threading.Lock()
+        """Held while rows are written, so that they keep their order."""
+        self._thread: threading.Thread | None = None
+        """Writes what waits; nobody else tries, and waits for the database, meanwhile."""
+        self._closing = False
+
+    def add(
+        self, robot: str, kind: str, text: str, at: datetime, actor: str | None = None, experiment: str | None = None
+    ) -> None:
+        """Writes an event, after those that wait. Never raises. Waits for the database only while it is
+        not known that others wait in vain."""
+        event = _Waiting(robot, kind, text, at, actor, experiment)
+        with self._changed:
+            if len(self._events) >= MOST_WAITING:
+                log.error("%s: %s: %s: only here: too many events wait for the database", robot, kind, text)
+                return
+            self._events.append(event)
+            if self._thread is not None:
+                return
+        with self._writing:
+            if self._thread is not None or self._write_all():
+                return
+            with self._changed:
+                self._thread = threading.Thread(target=self._catch_up, name="events", daemon=True)
+                try:
+                    self._thread.start()
+                except RuntimeError:  # the operating system has no further thread now: the next event tries again
+                    self._thread = None
+
+    def close(self, within: float) -> None:
+        """Writes what waits, within this time (s). What does not get its row is in the log alone."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+            thread = self._thread
+        if thread is not None:
+            thread.join(within)
+        if self._events:
+            log.error("%s events are only in the log: the database could not be written", len(self._events))
+
+    def _catch_up(self) -> None:
+        while True:
+            with self._changed:
+                is_last = self._changed.wait_for(lambda: self._closing, self._again_after)
+            with self._writing:
+                self._write_all()
+            with self._changed:
+                if not self._events or is_last:
+                    self._thread = None
+                    return
+
+    def _write_all(self) -> bool:
+        """Writes what waits, under the lock. Returns False if the database cannot be written now."""
+        while self._events:
+            event = self._events[0]
+            try:
+                made = self._store.add(event.robot, event.kind, event.text, event.at, event.actor, event.experiment)
+            except Exception as error:
+                if _may_pass(error):
+                    if self._thread is None:  # once
+                        log.warning("%s: %s: not written yet: %s", event.robot, event.kind, one_line(error))
+                    return False
+                # This one alone is refused. Only the log has it: without a row it has no number.
+                log.exception("%s: %s: could not be written", event.robot, event.kind)
+                made = None
+            self._events.popleft()
+            if made is not None:
+                try:
+                    self._written(event.robot, made)
+                except Exception:  # it has its row, and the others still wait for theirs
+                    log.exception("%s: %s: not published", event.robot, event.kind)
+        return True
+
+
+def _may_pass(error: Exception) -> bool:
+    """Whether the database may take the same row later, such as after a lock or on a disk with room again."""
+    if isinstance(error, DatabaseError) and (is_value(error) or isinstance(error, IntegrityError)):
+        return False
+    return isinstance(error, SQLAlchemyError | OSError)
