@@ -91,7 +91,7 @@ def test_a_fault_while_a_test_is_sent_is_one_line(
         raise RuntimeError("with the secret in its words")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("server.notifications.mail.Mail.send", fails)
+    monkeypatch.setattr("extras.lab.notifications.mail.Mail.send", fails)
     mail = '[notifications.smtp]\nhost = "localhost"\nsender = "arm@lab.example"\n[notifications.email.anna]\n'
     (tmp_path / "daq.toml").write_text(f'{mail}to = "anna@lab.example"\n', "utf-8")
     told = CommandLine(capsys)("notify", "test")
