@@ -4,6 +4,8 @@ Each container's address is one of the loopback network, so ports are those of t
 The images that are not built here have stand-ins: PostgreSQL is Debian's server, the object store is moto's.
 """
 
+from __future__ import annotations
+
 import json
 import os
 import re
