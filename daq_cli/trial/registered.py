@@ -37,6 +37,7 @@ REGISTERED = (
     "mock_controller",
     "firmware_protocol",
     "daq/contracts",
+    "daq/plugins.py",
     "daq/driver",
     "daq/trajectories",
     "daq/runner",

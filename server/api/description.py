@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cache
 from html import escape
 from importlib.metadata import version
-from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse
 
 from daq.contracts.service.problems import ProblemDetails
+from daq.plugins import plugins
 from server.api.examples import examples, untyped
 from server.api.problem_examples import PROBLEM_EXAMPLES
 from server.problems import MEDIA_TYPE, PATH, SCHEMA
@@ -112,12 +113,16 @@ class Described:
 
 
 def sources_digest() -> bytes:
-    """A digest of all that the description is made of: names, sizes and times of this program's files, and the versions
-    of the libraries that write it."""
+    """A digest of all that the description is made of: names, sizes and times of the files of this program and of the
+    plug-ins that add routes, and the versions of the libraries that write it."""
     digest = hashlib.sha256(repr([version(name) for name in ("fastapi", "pydantic", "ma2000-daq")]).encode())
-    for package in PACKAGES:
-        root = Path(str(files(package)))
-        for path in sorted(root.rglob("*.py")):
+    routes = [reference for plugin in plugins() for reference in plugin.routes]
+    digest.update(repr(routes).encode())
+    for package in (*PACKAGES, *sorted({reference.partition(":")[0].partition(".")[0] for reference in routes})):
+        spec = find_spec(package)
+        assert spec is not None, "its router was loaded"
+        root = Path((spec.submodule_search_locations or [spec.origin or ""])[0])
+        for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
             with suppress(OSError):
                 found = path.stat()
                 digest.update(f"{path.relative_to(root)} {found.st_size} {found.st_mtime_ns}\n".encode())

@@ -4,6 +4,8 @@ Each container's address is one of the loopback network, so ports are those of t
 The images that are not built here have stand-ins: PostgreSQL is Debian's server, the object store is moto's.
 """
 
+from __future__ import annotations
+
 import json
 import os
 import re
@@ -14,14 +16,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import httpx
 import yaml
 
-from tests.extras.lab.archive.store import ObjectStore, running_store
 from tests.repository.tracked import ROOT
 from tests.server.postgresql import programs, running_postgresql
+
+if TYPE_CHECKING:
+    from tests.extras.lab.archive.store import ObjectStore
 
 FILE = ROOT / "deploy" / "compose.yaml"
 CONTAINERFILE = ROOT / "deploy" / "Containerfile"
@@ -190,6 +194,8 @@ def _objects(here: Composition, name: str) -> ObjectStore:
     """moto's server, with the buckets that the folders of the volume stand for."""
     command = here.services[name]["command"]
     _host, _, port = command[command.index("--port") + 1].rpartition(":")
+    from tests.extras.lab.archive.store import running_store  # here: without the extras the tests are still collected
+
     store = here.ended.enter_context(running_store(here.address(name), int(port)))
     for bucket in here.folders(name)["/objects"].iterdir():
         store.client.create_bucket(Bucket=bucket.name)

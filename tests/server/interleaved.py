@@ -451,7 +451,6 @@ class Scene:
             jobs=None,
             models=None,
             unattended=True,
-            archive=None,
             audit=None,
         )
 

@@ -75,7 +75,6 @@ def _joint(body: Any, link: str, checked: CheckedUrdf) -> DescribedJoint | None:
         return None
     text = checked.joints[name]
     axis = np.array(body.joints[0].axis)
-    axis /= np.abs(axis).max()  # the square of a number beyond measure overflows
     return DescribedJoint(
         name,
         "prismatic" if MOVING[text.kind] == "prismatic" else "revolute",

@@ -12,6 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
+from daq.plugins import Plugin
 from server.api import description
 from server.app import bare_app
 from server.clock import SystemClock
@@ -160,6 +161,19 @@ def test_a_description_is_kept_for_the_next_start_until_the_program_changes(
     kept.unlink()
     kept.mkdir()
     assert told() == b'{"made":4}', "it cannot be kept"
+
+
+def test_the_routes_of_a_plug_in_and_its_files_are_of_the_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = tmp_path / "mine_of_a_lab.py"
+    module.write_text("router = 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = description.sources_digest()
+    monkeypatch.setattr(description, "plugins", lambda: (Plugin(routes=("mine_of_a_lab:router",)),))
+    added = description.sources_digest()
+    module.write_text("router = 12\n")
+    assert len({before, added, description.sources_digest()}) == 3
 
 
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"
