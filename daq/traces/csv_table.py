@@ -99,10 +99,10 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
     unit = description.time_unit or "s"
     table[:, 0] *= TIME_UNITS[unit]
     said += [f"Its times count from its first row, which is at {begins} {unit}."] if begins else []
-    if description.time_unit is None and description.period is None:
-        said += _looks_like_ms(table[:, 0])
     joints = _joints(path, header, description)
     _check_bounds(path, header, table, rows)
+    if description.time_unit is None and description.period is None:
+        said += _looks_like_ms(table[:, 0])
     description.check_period(table[:, 0], str(path))
     signals: dict[str, Any] = {}
     for name in SIGNALS:
