@@ -93,6 +93,7 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
     data = read_file(path, limits.file_bytes, "file_bytes")
     description, described = CsvDescription.read(path, limits)
     whole, said = _whole_rows(data)
+    is_cut = bool(said)
     header, table, rows, begins = _read_table(path, whole, limits)
     if said and not len(table):
         raise TraceError(f"{path}: {' '.join(said)} No row is left")
@@ -119,7 +120,10 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
         signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
         said.append(INTEGRATED)
-    record = record.model_copy(update={"notes": " ".join([record.notes, *said]).strip()})
+    update: dict[str, Any] = {"notes": " ".join([record.notes, *said]).strip()}
+    if is_cut and record.outcome in (None, "complete"):
+        update["outcome"] = "interrupted"
+    record = record.model_copy(update=update)
     if drive_unit is not None:
         record = record.model_copy(update={"drive_unit": drive_unit})
     bounds.check_record(record, (), str(path))

@@ -11,6 +11,8 @@ from daq.acquisition.stop_socket import StopAnswer, request_stop
 from daq.contracts.service.robot import FleetStopResult, StopResult
 from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, require_same
 
+SILENT = "the process that owns the port did not answer"
+
 
 @dataclass(frozen=True)
 class Reach:
@@ -79,7 +81,7 @@ def _ask(reach: Reach) -> StopAnswer:
         attempts, why = [], f"the process that owns the port cannot be asked: {error.strerror or error}"
     answers = [attempt.answer for attempt in attempts if attempt.answer is not None]
     if len(answers) < len(attempts):
-        why = "the process that owns the port did not answer"
+        why = SILENT
     elif answers:
         return next((answer for answer in answers if not answer.confirmed), answers[0])
     if reach.ask is not None and (answer := reach.ask()) is not None:
@@ -90,8 +92,7 @@ def _ask(reach: Reach) -> StopAnswer:
 def _ask_port(reach: Reach) -> StopAnswer:
     port = parse_port_url(reach.url)
     if reach.url.startswith("mock://"):
-        lost = "the process that owns the port has no stop socket"
-        return _undelivered(reach, "no robot is connected" if reach.owner is None else lost)
+        return _undelivered(reach, "no robot is connected" if reach.owner is None else SILENT)
     if isinstance(port, SerialPort):
         try:
             require_same(port.device, reach.terminal)

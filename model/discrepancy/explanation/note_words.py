@@ -191,7 +191,9 @@ def _torque_left(v: Values) -> str:
     given = f"{v['given']:.1%} of the recorded by the model as given, " if "given" in v else ""  # older answers lack it
     shares = f"{given}{v['before']:.1%} with its numbers fitted, {v['after']:.1%} at the end"
     doubt = "; that is more than there is: see whether units (s, rad, m) and signs (drive, gravity) suit the file"
-    return f"torque left unexplained on {records}: {shares}{doubt if v.get('given', 0.0) > 1.0 else ''}"
+    return (
+        f"torque left unexplained on {records}: {shares}{doubt if v.get('doubted', v.get('given', 0.0) > 1.0) else ''}"
+    )
 
 
 def _traces_contradict(v: Values) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Suspicion
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Suspicion, Verdict
 from model.discrepancy.explanation.notes import on_drives_at_limit, on_named_numbers, on_stated_numbers
 from model.discrepancy.grounds import Note
 from model.discrepancy.inverse_dynamics import holdout
@@ -68,13 +68,15 @@ def answer_of(outcome: Outcome, traces: Sequence[str], held_out: Sequence[str], 
     named = any(step.adopted for step in steps)
     missing = bool(shapes) or bool(joints_left_over(standing))
     fit_errors, held_errors = (_errors(standing, records) for records in (case.records, case.held_out))
+    shares = _torque_left(standing, outcome.first)
+    found = verdict(
+        (*proved, *steps),
+        unexplained=missing and not named,
+        suspected=outcome.suspicion is not None,
+        partly=shares["after"] > 1.0 or is_left_beside(standing),
+    )
     return Diagnosis(
-        verdict=verdict(
-            (*proved, *steps),
-            unexplained=missing and not named,
-            suspected=outcome.suspicion is not None,
-            partly=is_left_beside(standing),
-        ),
+        verdict=found,
         suspicion=None if named else outcome.suspicion,
         summary=UNWRITTEN,
         method="inverse-dynamics",
@@ -93,7 +95,7 @@ def answer_of(outcome: Outcome, traces: Sequence[str], held_out: Sequence[str], 
         seconds=0.0,
         robot_seconds=0.0,
         significant=case.options.least_evidence,
-        notes_data=_notes(outcome, cutoff),
+        notes_data=_notes(outcome, cutoff, _on_torque_left(shares, standing, found)),
     )
 
 
@@ -136,14 +138,14 @@ def _resulting_model(outcome: Outcome, traces: Sequence[str]) -> Model:
     return outcome.controller.with_findings(found).with_lineage(lineage)
 
 
-def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
-    """What an answer notes, below a cutoff in Hz."""
+def _notes(outcome: Outcome, cutoff: float, torque: tuple[Note, ...]) -> tuple[Note, ...]:
+    """What an answer notes, below a cutoff in Hz. torque: what of it is left."""
     standing = outcome.standing
     values = standing.now.values
     return (
         *on_stated_numbers((u.as_stated for u in outcome.unknowns if u.name not in outcome.added), values),
         *on_named_numbers((p for name, p in outcome.stated.items() if name in outcome.added), values),
-        *_torque_left(outcome),
+        *torque,
         *_assumptions(cutoff, outcome.controller.not_looked_for),
         *_at_limits(standing),
         *_timing(standing),
@@ -151,20 +153,26 @@ def _notes(outcome: Outcome, cutoff: float) -> tuple[Note, ...]:
     )
 
 
-def _torque_left(outcome: Outcome) -> tuple[Note, ...]:
+def _torque_left(standing: Standing, first: BalanceFit) -> dict[str, float]:
     """Residual as a share of the recorded torque, by the model as given, with its numbers fitted, and after: the figure
-    that the literature usually gives. None where nothing is driven; a warning where the model as given leaves more
-    than there is."""
-    standing = outcome.standing
-    held = standing.case.held_out
-    records = held or standing.case.records
-    given = holdout.relative_torque_error(standing.given, expected_timing(standing.given), records)
-    before = holdout.relative_torque_error(standing.given, outcome.first.values, records)
-    after = holdout.relative_torque_error(standing.model, standing.now.values, records)
-    if not math.isfinite(given):
+    that the literature usually gives. NaN where nothing is driven."""
+    records = standing.case.held_out or standing.case.records
+    fits = {
+        "given": (standing.given, expected_timing(standing.given)),
+        "before": (standing.given, first.values),
+        "after": (standing.model, standing.now.values),
+    }
+    return {name: holdout.relative_torque_error(*fit, records) for name, fit in fits.items()}
+
+
+def _on_torque_left(shares: Mapping[str, float], standing: Standing, found: Verdict) -> tuple[Note, ...]:
+    """These shares; none where nothing is driven. A warning where more is left than there is, and nothing explains why:
+    a spring that is named takes away a torque that the model as given has to supply."""
+    if not math.isfinite(shares["given"]):
         return ()
-    values = {"held_out": bool(held), "given": given, "before": before, "after": after}
-    return (Note(kind="torque-left", values=values, warning=given > 1.0),)
+    doubted = max(shares.values()) > 1.0 and found not in ("named", "ambiguous")
+    values = {"held_out": bool(standing.case.held_out), **shares, "doubted": doubted}
+    return (Note(kind="torque-left", values=values, warning=doubted),)
 
 
 def _assumptions(cutoff: float, not_looked_for: Mapping[str, str]) -> tuple[Note, ...]:

@@ -74,6 +74,11 @@ def test_the_end_of_a_table_that_was_cut_off_is_told(tmp_path: Path, data: bytes
     (tmp_path / "a.csv").write_bytes(b"time,position_1\n" + data)
     trace = import_csv(tmp_path / "a.csv")
     assert (len(trace), said in trace.record.notes, "INCOMPLETE" in trace.record.notes) == (rows, True, bool(said))
+    assert trace.record.outcome == ("interrupted" if said else None)
+    for stated in ("complete", "stopped"):
+        (tmp_path / "a.toml").write_text(f'outcome = "{stated}"\n')
+        cut = said and stated == "complete"
+        assert import_csv(tmp_path / "a.csv").record.outcome == ("interrupted" if cut else stated)
 
 
 def test_errors_of_a_table_are_short(tmp_path: Path) -> None:

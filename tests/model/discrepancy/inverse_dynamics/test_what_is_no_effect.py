@@ -2,6 +2,7 @@
 at no recorded speed, sizes at their bounds; and what is said of records that do not suit their file."""
 
 from dataclasses import replace
+from itertools import cycle
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis, FoundValue
 from model.discrepancy.excitation import own_frequencies
+from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.left_over import _starved, first_contradicted
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -118,8 +120,23 @@ def test_a_record_that_does_not_suit_its_file_is_doubted_first() -> None:
     trace = rigs.slide_trace(1, {})
     found = of_slide(replace(trace, drive=-trace.drive))
     (note,) = (note for note in found.notes_data if note.kind == "torque-left")
-    assert note.warning
+    assert (note.warning, found.verdict) == (True, "partly")
     assert "signs" in found.notes[list(found.notes_data).index(note)]
+
+
+@pytest.mark.parametrize(
+    ("shares", "verdict", "doubted"), [((0.9, 1.3, 1.2), "partly", True), ((1.3, 0.9, 0.2), "named", False)]
+)
+def test_no_effect_is_named_beside_more_torque_than_there_is(
+    monkeypatch: pytest.MonkeyPatch, shares: tuple[float, float, float], verdict: str, doubted: bool
+) -> None:
+    """shares: left of the recorded torque by the model as given, with its numbers fitted, and at the end."""
+    left = cycle(shares)
+    monkeypatch.setattr(holdout, "relative_torque_error", lambda *_: next(left))
+    found = of_slide(rigs.slide_trace(1, {"coulomb": 8.0}))
+    (note,) = (note for note in found.notes_data if note.kind == "torque-left")
+    assert (found.verdict, note.warning) == (verdict, doubted)
+    assert ("that is more than there is" in found.notes[list(found.notes_data).index(note)]) == doubted
 
 
 def test_times_in_another_unit_are_said_to_be_that() -> None:
