@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -212,12 +213,14 @@ def settings_type() -> type[Settings]:
 
 
 def config_files(explicit: Path | None = None) -> list[Path]:
-    """Candidates for the configuration file, in order: the one requested, ./daq.toml, the user's."""
+    """Candidates for the configuration file, in order: the one requested, ./daq.toml, that of a user who has a home."""
     if explicit is not None:
         return [explicit]
     if "DAQ_CONFIG" in os.environ:
         return [Path(os.environ["DAQ_CONFIG"])]
-    return [Path(LOCAL_FILE), Path(platformdirs.user_config_dir(APP)) / "config.toml"]
+    with suppress(RuntimeError):  # somebody of whom the system knows neither a name nor a home
+        return [Path(LOCAL_FILE), Path(platformdirs.user_config_dir(APP)) / "config.toml"]
+    return [Path(LOCAL_FILE)]
 
 
 def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:

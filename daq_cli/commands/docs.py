@@ -37,11 +37,10 @@ def _written() -> Path:
 
     from daq.config.documents import documents
 
-    cache = platformdirs.user_cache_path("ma2000-daq") / "documents"
     try:
-        return documents().write(cache)
-    except OSError:
+        return documents().write(platformdirs.user_cache_path("ma2000-daq") / "documents")
+    except (OSError, RuntimeError):  # or a user without a home
         try:
             return documents().write(Path(tempfile.mkdtemp(prefix="ma2000-documents-")))
         except OSError as error:
-            raise SpecError(f"the documents cannot be written to {cache}: {error.strerror}") from error
+            raise SpecError(f"the documents cannot be written to {tempfile.gettempdir()}: {error.strerror}") from error

@@ -14,6 +14,7 @@ import ast
 import hashlib
 import importlib
 import multiprocessing
+import os
 import shutil
 import sys
 import time
@@ -38,7 +39,18 @@ PACKAGES = ("model", "daq", "firmware_protocol")
 
 _ROOT = Path(__file__).resolve().parents[2]
 _numba_settings: Any = numba.config
-_PARENT = Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
+
+
+def _cache_folder() -> Path:
+    """The folder of compiled code: numba's own setting, or this user's; of a user without a home, one that cannot be
+    written."""
+    try:
+        return Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
+    except RuntimeError:
+        return Path(os.devnull) / "compiled"
+
+
+_PARENT = _cache_folder()
 
 
 def dependencies(module: str, root: Path = _ROOT) -> dict[str, Path]:

@@ -34,6 +34,14 @@ MAPPED = 256 << 20
 """Number of bytes of the file that are memory-mapped: a search through 100 000 traces takes a fifth less time."""
 
 
+def _require_not_emptied(file: Path) -> None:
+    """Raises DamagedError for a file without anything in it: SQLite would begin anew in it, and nobody would hear that
+    everything is gone. A file that is not there is a first start."""
+    with suppress(OSError):  # SQLite's own error, later, says more
+        if file.stat().st_size == 0 and not file.with_name(f"{file.name}-wal").exists():
+            raise DamagedError(f"database {file}: is empty; {BRING_BACK}; without one, delete it to begin anew")
+
+
 class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
@@ -45,6 +53,7 @@ class Store:
                 Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise StoreError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
+            _require_not_emptied(Path(parsed.database))
             with suppress(OSError):  # SQLite's own error, later, says more
                 # Other users must not read hashes of tokens. SQLite gives its files beside this one the same mode.
                 os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))

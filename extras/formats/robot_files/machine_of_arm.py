@@ -180,7 +180,7 @@ def _friction(joint: DescribedJoint, torque: float, source: str) -> Friction:
 
     def number(stated: float | None, expected: float, unit: str) -> Quantity:
         if stated:
-            return Quantity(value=abs(stated), unit=unit, source=source, low=0.0, deviation=abs(stated))
+            return Quantity(value=stated, unit=unit, source=source, low=0.0, deviation=stated)
         missing = "not in the URDF" if stated is None else "0 in the URDF"
         return Quantity(value=0.0, unit=unit, source=missing, assumed=True, low=0.0, deviation=expected)
 

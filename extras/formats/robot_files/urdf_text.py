@@ -156,6 +156,13 @@ def _number(element: Xml.Element | None, attribute: str, where: str) -> float | 
     return None if values is None else values[0]
 
 
+def _not_negative(element: Xml.Element | None, attribute: str, where: str) -> float | None:
+    value = _number(element, attribute, where)
+    if value is not None and value < 0:
+        raise SpecError(f"{where}: {attribute} is {value}; 0 or a positive number is needed")
+    return value
+
+
 def _check_inertial(link: Xml.Element, origin: str) -> None:
     where = f"{origin}: link {shown(link.get('name'))}"
     for tag in ("origin", "mass", "inertia"):
@@ -192,8 +199,8 @@ def _joint(joint: Xml.Element, origin: str) -> JointText:
         high if stated and high < NO_LIMIT else None,
         _largest(_number(limit, "velocity", where)),
         _largest(_number(limit, "effort", where)),
-        _number(dynamics, "damping", where),
-        _number(dynamics, "friction", where),
+        _not_negative(dynamics, "damping", where),
+        _not_negative(dynamics, "friction", where),
         None if leader is None else Follower(leader, 1.0 if ratio is None else ratio, offset or 0.0),
     )
 

@@ -67,6 +67,14 @@ def test_the_file_asked_for_goes_before_the_folders_and_that_before_the_users(
     assert config_files() == [Path("daq.toml"), users]
 
 
+def test_a_user_without_a_home_has_no_file_of_his_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless(_name: str) -> str:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr("daq.config.settings.platformdirs.user_config_dir", homeless)
+    assert config_files() == [Path("daq.toml")]
+
+
 def test_the_environment_goes_before_the_file_key_by_key(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("daq.toml").write_text('operator = "A"\n[robot]\nname = "here"\nport = "mock://?seed=1"\n')
     monkeypatch.setenv("DAQ_ROBOT__PORT", "mock://?seed=2")

@@ -3,6 +3,7 @@
 import json
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,7 @@ ONE_EXPERIMENT = (
     "VALUES ('a', 'ma2000', '{state}', '2026-01-01 00:00:00', 'anna', '', '{spec}', 0, 't')"
 )
 AT_THE_START = {
+    "nothing": lambda path: path.write_bytes(b""),
     "no database": _garble,
     "pages that are none": _garble_inside,
     "a half": _cut,
@@ -78,10 +80,8 @@ def test_a_damaged_database_is_one_line_at_the_start_that_offers_the_backup(tmp_
     for beside in tmp_path.glob(f"{FILE}-*"):
         beside.unlink()
     damage(path)
-    store = Store(f"sqlite:///{path}")
-    with pytest.raises(DaqError) as refused:
+    with pytest.raises(DaqError) as refused, closing(Store(f"sqlite:///{path}")) as store:
         _opened(store)
-    store.close()
     line = str(refused.value)
     assert "\n" not in line
     assert str(path) in line

@@ -129,6 +129,14 @@ def test_xacro_that_was_not_expanded_is_named(tmp_path: Path, declared: str) -> 
         machine_from_urdf(written(tmp_path, f'<robot name="a" {declared}><xacro:arm name="b"/></robot>'))
 
 
+@pytest.mark.parametrize("number", ["damping", "friction"])
+def test_a_joint_that_drives_itself_is_refused(tmp_path: Path, number: str) -> None:
+    text = re.sub(r'(<joint name="shoulder"[^>]*>)', rf'\1<dynamics {number}="-0.8"/>', TWO_JOINTS, count=1)
+    assert text != TWO_JOINTS
+    with pytest.raises(SpecError, match=rf"joint 'shoulder': {number} is -0\.8; 0 or a positive number is needed"):
+        machine_from_urdf(written(tmp_path, text))
+
+
 def test_a_default_namespace_changes_nothing(tmp_path: Path) -> None:
     plain = machine_from_urdf(written(tmp_path, TWO_JOINTS))
     spaced = TWO_JOINTS.replace("<robot ", '<robot xmlns="http://example.org/urdf" ', 1)
