@@ -144,6 +144,8 @@ def test_a_urdf_is_read_in_the_encoding_that_it_declares(tmp_path: Path) -> None
     for head, said in (
         ("", "it is not UTF-8 text"),
         ('<?xml version="1.0" encoding="klingon"?>', "'klingon', which is"),
+        ('<?xml version="1.0" encoding="cp037"?>', "its first line is not in encoding 'cp037'"),
+        ('<?xml version="1.0" encoding="punycode"?>', "it is not punycode text"),
     ):
         path.write_bytes((head + body).encode("latin-1"))
         with pytest.raises(SpecError, match=said):
@@ -155,4 +157,4 @@ def test_damaged_files_are_refused_in_one_line_or_read_as_a_whole(tmp_path: Path
     path.write_bytes(data)
     tally = campaign(300, 2, [Kind("URDF", path, path, read_urdf, data)])
     assert not tally.faults, "\n".join(tally.examples)
-    assert tally.ends["read"] > 30
+    assert tally.ends["read"] > 20
