@@ -316,7 +316,10 @@ class Services:
 
     def _tell(self, news: Callable[[Part], None]) -> None:
         for part in self.parts:
-            news(part)
+            try:
+                news(part)
+            except Exception:  # the thread that has the news goes on: it may be that of the queue
+                log.exception("%s", type(part).__name__)
 
     def attention(self) -> dict[str, Attention]:
         """Returns what needs somebody for as long as it lasts, by a key that stays the same meanwhile."""

@@ -238,7 +238,8 @@ class _Witnesses:
         found = factors(self.model, motion)
         known = [one for one in found if one.inertia is not None]
         named = {unit for joint in joints for unit in self.model.machine.joint(joint).drive_units}
-        units = {**THOUSANDS, **(UNITS.get(next(iter(named)), {}) if len(named) == 1 else {})}
+        others = UNITS.get(next(iter(named)), {}) if len(named) == 1 else {}
+        units = {**THOUSANDS, **others}
         power = 2 if motion.speed is None else 1
         ways: dict[str | float, Factors] = {unit: Factors(*[1 / size] * 4) for unit, size in units.items()}
         ways |= {ratio: Factors(None, ratio**power, 1.0, ratio ** (power - 1)) for ratio in RATIOS}
@@ -252,6 +253,9 @@ class _Witnesses:
         says = "drive and motion ask for another inertia than the machine file's: of a load, or times are false."
         unit = ", as in ms" if value == 1e3 else ""
         advice = f"Are times {value:.3g} times as long as they were{unit}? They are in s."
+        # A drive that was converted once too often is as large as one that moves a load: it is asked about, no more.
+        twice = [other for other, size in others.items() if _apart(known, Factors(*[size] * 4)) is not None]
+        advice += f" Or was the drive converted as if it were in {twice[0]}?" if twice else ""
         return [self._doubt("time-scale", None, says, advice, value=value, allowed=1.0, sure=bool(unit))]
 
     def _out_of_scale(self, motion: Motion, found: Sequence[Factors]) -> Iterator[RecordFinding]:

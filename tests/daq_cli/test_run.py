@@ -4,11 +4,17 @@ import json
 import os
 import signal
 import subprocess
+from contextlib import nullcontext
+from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from daq.contracts.experiment import ExperimentSpec
 from daq.traces.reader import read_trace
+from daq_cli.robot.experiment import RunOptions, carry_out, cron_of
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.person import at_a_terminal
 
@@ -129,3 +135,31 @@ def signal_of_end(handle: int) -> None:
     import select
 
     assert select.select([handle], [], [], 30)[0], "the acquisition process outlived its parent"
+
+
+@pytest.mark.parametrize(
+    ("words", "cron", "said"),
+    [
+        (("2:05", None), "5 2 * * *", "first on 2026-11-30 at 02:05"),
+        ((None, "0 2 * * 1-5"), "0 2 * * 1-5", "first on 2026-11-30 at 02:05"),
+        ((None, "0 2 1 * 1"), "0 2 1 * 1", "on days 1 of the month and on every weekday 1"),
+    ],
+)
+def test_a_schedule_says_when_it_runs_and_how_it_is_cancelled(
+    capsys: pytest.CaptureFixture[str], words: tuple[str | None, str | None], cron: str, said: str
+) -> None:
+    asked: list[str] = []
+
+    def create(_spec: object, *, cron: str) -> Any:
+        asked.append(cron)
+        first = datetime(2026, 11, 30, 2, 5).astimezone().astimezone(UTC)
+        return SimpleNamespace(id="7f", cron=cron, zone="Europe/London", next=first)
+
+    service = SimpleNamespace(schedules=SimpleNamespace(create=create))
+    robot: Any = SimpleNamespace(service=lambda _what: nullcontext(service))
+    carry_out(robot, ExperimentSpec(), RunOptions(None, dry_run=False, yes=False, json=False, cron=cron_of(*words)))
+    told = capsys.readouterr().out
+    assert asked == [cron]
+    assert told.startswith(f"schedule 7f: {cron} (Europe/London)")
+    assert said in told
+    assert told.endswith("`daq queue schedules` lists, `unschedule` cancels\n")

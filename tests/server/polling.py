@@ -1,10 +1,13 @@
 """Asks a service until it answers what a test waits for."""
 
+import time
 from collections.abc import Callable, Mapping
 from subprocess import Popen
 from typing import Any
 
 import httpx
+
+from server.access.limits import REQUESTS_A_SECOND
 
 
 def reset(
@@ -25,7 +28,8 @@ def until(
     process: Popen[Any] | None = None,
 ) -> Any:
     """Reads `path` until its JSON `is_so`, and returns that. A service that refuses to be asked so often (429) is asked
-    again. The test's own time limit ends the wait, and so does the end of `process`, without which it is in vain."""
+    again, and never so often that it would refuse the request behind these. The test's own time limit ends the wait,
+    and so does the end of `process`, without which it is in vain."""
     while True:
         answer = client.get(path, params=params)
         if answer.status_code != httpx.codes.TOO_MANY_REQUESTS:
@@ -33,3 +37,4 @@ def until(
             if is_so(body := answer.json()):
                 return body
         assert process is None or process.poll() is None, "the process has ended"
+        time.sleep(2 / REQUESTS_A_SECOND)

@@ -180,6 +180,7 @@ def test_a_spring_that_nobody_stated_is_no_other_unit_of_one_joint(seed: int, tm
 
 UNIT_FAULTS: dict[str, tuple[Callable[[Trace], Trace], str, str]] = {
     "lbf": (lambda t: replace(t, drive=None if t.drive is None else t.drive / 4.448), "drive-scale", "in lbf"),
+    "converted": (lambda t: replace(t, drive=None if t.drive is None else t.drive * 4.448), "time-scale", "in lbf?"),
     "slower": (lambda t: replace(t, time=1.5 * t.time), "time-scale", "1.5 times"),
     "slow": (lambda t: replace(t, time=3.0 * t.time), "time-scale", "3 times"),
     "milliseconds": (lambda t: replace(t, time=1e3 * t.time), "time-scale", "ms"),
@@ -190,7 +191,7 @@ UNIT_FAULTS: dict[str, tuple[Callable[[Trace], Trace], str, str]] = {
 def test_a_scale_is_said_of_what_has_it(fault: str, tmp_path: Path) -> None:
     changed, kind, words = UNIT_FAULTS[fault]
     axis, bench = example("linear_axis")(tmp_path), example("motor_bench")(tmp_path)
-    for machine, trace in [(rigs.slide_machine(), SLIDE), axis, *([] if fault == "lbf" else [bench])]:
+    for machine, trace in [(rigs.slide_machine(), SLIDE), axis, *([] if fault in ("lbf", "converted") else [bench])]:
         found = check_records(base_model(machine), [changed(trace)])
         (one,) = [one for one in found if one.kind != "no-sensor"]
         assert (one.kind, words in one.line) == (kind, True), one.line

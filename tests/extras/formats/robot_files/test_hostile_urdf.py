@@ -152,6 +152,8 @@ def test_a_urdf_is_read_in_the_encoding_that_it_declares(tmp_path: Path) -> None
     for head, said in (
         ("", "it is not UTF-8 text"),
         ('<?xml version="1.0" encoding="klingon"?>', "'klingon', which is"),
+        ('<?xml version="1.0" encoding="cp037"?>', "its first line is not in encoding 'cp037'"),
+        ('<?xml version="1.0" encoding="punycode"?>', "it is not punycode text"),
     ):
         path.write_bytes((head + body).encode("latin-1"))
         with pytest.raises(SpecError, match=said):
