@@ -26,6 +26,10 @@ GROUP = "ma2000_daq.plugins"
 log = logging.getLogger(__name__)
 
 
+Group = Literal["Run", "Look", "Model", "Service", "Set up"]
+"""Headings of the help, in its order."""
+
+
 @dataclass(frozen=True)
 class Command:
     """A subcommand of `daq`."""
@@ -40,6 +44,8 @@ class Command:
     that one service has, so that `--robot` is refused, too."""
     needs: Extra = "robot"
     """The extra whose packages it needs here."""
+    group: Group = "Set up"
+    """The heading below which the help lists it."""
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import Any, get_args
 
 import typer.core
 import typer.main
 
+from daq.plugins import Group
 from daq_cli.app.subcommands import subcommand, subcommands
 
 
@@ -25,6 +26,16 @@ class LazyGroup(typer.core.TyperGroup):
         if found is None and (known := subcommand(cmd_name)) is not None:
             return typer.core.TyperCommand(cmd_name, help=known.line)
         return found
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Writes the commands below their headings, each with its whole line."""
+        del ctx
+        known = subcommands().values()
+        for group in get_args(Group):
+            rows = [(command.name, command.line) for command in known if command.group == group]
+            if rows:
+                with formatter.section(group):
+                    formatter.write_dl(rows)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Imports the command that `args` names."""

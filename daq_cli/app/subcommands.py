@@ -10,14 +10,16 @@ from daq.plugins import Command, plugins
 CORE = {
     command.name: command
     for command in (
-        Command("run", "Run an experiment and record its trace.", "daq_cli.commands.run"),
-        Command("stop", "Stop every moving robot, at once.", "daq_cli.commands.stop"),
-        Command("reset", "End the freeze of a stop; nothing moves.", "daq_cli.commands.reset"),
-        Command("status", "Show posture, state and link of the robot.", "daq_cli.commands.status"),
+        Command("run", "Run an experiment and record its trace.", "daq_cli.commands.run", group="Run"),
+        Command("stop", "Stop every moving robot, at once.", "daq_cli.commands.stop", group="Run"),
+        Command("reset", "End the freeze of a stop; nothing moves.", "daq_cli.commands.reset", group="Run"),
+        Command("status", "Show posture, state and link of the robot.", "daq_cli.commands.status", group="Run"),
         Command("ports", "List serial ports that may lead to a robot.", "daq_cli.commands.ports", about="computer"),
-        Command("gains", "Show or set the controller's PID gains.", "daq_cli.commands.gains"),
-        Command("io", "Show and switch process signals, and the gripper.", "daq_cli.commands.process_io"),
-        Command("teach", "Jog the arm, lead it, make steps, and play back.", "daq_cli.commands.teach.motion"),
+        Command("gains", "Show or set the controller's PID gains.", "daq_cli.commands.gains", group="Run"),
+        Command("io", "Show and switch process signals, and the gripper.", "daq_cli.commands.process_io", group="Run"),
+        Command(
+            "teach", "Jog the arm, lead it, make steps, and play back.", "daq_cli.commands.teach.motion", group="Run"
+        ),
         Command(
             "robot",
             "Check what a controller promises; nothing moves.",
@@ -31,14 +33,18 @@ CORE = {
             "daq_cli.commands.serve",
             about="service",
             needs="server",
+            group="Service",
         ),
-        Command("queue", "Show, pause and resume the queue of a server's robot.", "daq_cli.commands.queue"),
+        Command(
+            "queue", "Show, pause and resume the queue of a server's robot.", "daq_cli.commands.queue", group="Service"
+        ),
         Command(
             "token",
             "Make, list and revoke tokens of the service.",
             "daq_cli.commands.token",
             about="service",
             needs="server",
+            group="Service",
         ),
         Command(
             "audit",
@@ -46,8 +52,9 @@ CORE = {
             "daq_cli.commands.audit",
             about="service",
             needs="server",
+            group="Service",
         ),
-        Command("traces", "List, show, plot, convert and verify traces.", "daq_cli.commands.traces"),
+        Command("traces", "List, show, plot, convert and verify traces.", "daq_cli.commands.traces", group="Look"),
         Command("config", "Show and check the configuration.", "daq_cli.commands.config", about="computer"),
         Command(
             "mock", "Start a mock controller that others can connect to.", "daq_cli.commands.mock", about="computer"
@@ -58,22 +65,31 @@ CORE = {
             "daq_cli.commands.check",
             about="computer",
             needs="model",
+            group="Look",
         ),
-        Command("fit", "Fit a model's parameters to traces.", "daq_cli.commands.fit", needs="model"),
+        Command("fit", "Fit a model's parameters to traces.", "daq_cli.commands.fit", needs="model", group="Model"),
         Command(
             "profile",
             "Show what traces bound: profile likelihoods of parameters.",
             "daq_cli.commands.profile",
             about="computer",
             needs="model",
+            group="Model",
         ),
-        Command("validate", "Validate a model against traces (Σλ²).", "daq_cli.commands.validate", needs="model"),
+        Command(
+            "validate",
+            "Validate a model against traces (Σλ²).",
+            "daq_cli.commands.validate",
+            needs="model",
+            group="Model",
+        ),
         Command(
             "sensitivity",
             "Show which parameter moves which joint, and when.",
             "daq_cli.commands.sensitivity",
             about="computer",
             needs="model",
+            group="Model",
         ),
         Command(
             "simulate",
@@ -81,19 +97,24 @@ CORE = {
             "daq_cli.commands.simulate",
             about="computer",
             needs="model",
+            group="Model",
         ),
-        Command("compare", "Compare models on the same traces.", "daq_cli.commands.compare", needs="model"),
+        Command(
+            "compare", "Compare models on the same traces.", "daq_cli.commands.compare", needs="model", group="Look"
+        ),
         Command(
             "diagnose",
-            "Name the effect that a model lacks, add it, show the gap shrink.",
+            "Name the effect that a model lacks, and show the gap shrink.",
             "daq_cli.commands.diagnose",
             needs="model",
+            group="Model",
         ),
         Command(
             "batch",
             "Fit, validate, simulate or diagnose many traces, on many cores.",
             "daq_cli.commands.batch",
             needs="model",
+            group="Model",
         ),
         Command(
             "design",
@@ -101,6 +122,7 @@ CORE = {
             "daq_cli.commands.design",
             about="computer",
             needs="model",
+            group="Model",
         ),
         Command(
             "thesis",
@@ -108,6 +130,7 @@ CORE = {
             "daq_cli.commands.thesis",
             about="computer",
             needs="model",
+            group="Model",
         ),
         Command(
             "blind",
@@ -115,10 +138,15 @@ CORE = {
             "daq_cli.commands.blind",
             about="computer",
             needs="model",
+            group="Model",
         ),
         Command("docs", "Open the documents in the browser.", "daq_cli.commands.docs", about="computer"),
         Command(
-            "demo", "Run the ramp step on the mock, from command to plot.", "daq_cli.commands.demo", about="computer"
+            "demo",
+            "Run the ramp step on the mock, from command to plot.",
+            "daq_cli.commands.demo",
+            about="computer",
+            group="Run",
         ),
     )
 }

@@ -15,6 +15,7 @@ PLUGIN = Plugin(
             "Watch the shared memory, and find out what lies where.",
             "extras.commissioning.memory_command",
             about="computer",
+            group="Look",
         ),
     )
 )

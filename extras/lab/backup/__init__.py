@@ -10,7 +10,15 @@ PLUGIN = Plugin(
             "extras.lab.backup.backup_command",
             about="service",
             needs="server",
+            group="Service",
         ),
-        Command("restore", "Restore a backup.", "extras.lab.backup.restore_command", about="service", needs="server"),
+        Command(
+            "restore",
+            "Restore a backup.",
+            "extras.lab.backup.restore_command",
+            about="service",
+            needs="server",
+            group="Service",
+        ),
     )
 )

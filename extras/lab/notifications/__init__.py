@@ -10,6 +10,7 @@ PLUGIN = Plugin(
             "extras.lab.notifications.command",
             about="service",
             needs="server",
+            group="Service",
         ),
     ),
     settings={"notifications": "extras.lab.notifications.settings:NotificationSettings"},
