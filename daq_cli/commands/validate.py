@@ -132,7 +132,7 @@ def _print_result(
     if details:
         _print_details(fidelity, three, in_time, machine)
     else:
-        console().print("--details: every parameter, and how each would vary with time; --report draws both")
+        console().print("--details: every parameter, and how each would vary in time; --report: figures")
 
 
 def _print_joints(fidelity: Fidelity, machine: Machine) -> None:

@@ -77,7 +77,8 @@ def validation() -> None:
     in_time = TimeDomain(
         model="m", trace="t", convention="source", smoothing=0.05, time=(), joints=(), parameters=(moving,)
     )
-    _print_result(fidelity, fidelity, [in_time], load_machine("ma2000"), as_json=False, details=True)
+    for details in (False, True):
+        _print_result(fidelity, fidelity, [in_time], load_machine("ma2000"), as_json=False, details=details)
 
 
 def gap() -> None:
