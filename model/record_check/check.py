@@ -26,6 +26,7 @@ from model.record_check.readings import (
     Jump,
     find_bounds,
     find_bursts,
+    find_dead,
     find_gaps,
     find_jumps,
     is_bridged,
@@ -114,7 +115,12 @@ def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
     source = trace.velocity if by_speed and trace.velocity is not None else trace.position
     reading = source[:, trace.column(joint)]
     jumps = find_jumps(trace.time, reading, 0.0 if by_speed else _step(machine, joint))
-    return sort_jumps(reading, jumps, () if by_speed else turns_of(machine, joint))
+    if by_speed:  # which stops changing as soon as its drive does
+        return sort_jumps(reading, jumps, ())
+    found = sort_jumps(reading, jumps, turns_of(machine, joint))
+    told = {jump.row for _, jump in found.stuck} | {last for _, last in find_bounds(reading)}
+    dead = [one for one in find_dead(reading, _step(machine, joint)) if one[1].row not in told]
+    return replace(found, stuck=(*found.stuck, *dead))
 
 
 def measures_speed(machine: Machine, joint: int) -> bool:
@@ -253,10 +259,10 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
         yield told.finding("jump", found.others, says, advice)
     for since, jump in found.stuck:
         begin, end = float(trace.time[since]), float(trace.time[jump.row])
-        says = (
-            f"its reading stands still from {begin:.2f} to {end:.2f} s ({number(end - begin)} s), then jumps by "
-            f"{number(abs(jump.size))} {told.unit}."
-        )
+        then = f", then jumps by {number(abs(jump.size))} {told.unit}"
+        if not jump.size:
+            then = f", the record's {'end' if since else 'beginning'}, and moves at speed right beside"
+        says = f"its reading stands still from {begin:.2f} to {end:.2f} s ({number(end - begin)} s){then}."
         advice = "The sensor or its line was stuck: use a piece without."
         yield told.finding("stuck", [replace(jump, row=since - 1)], says, advice)
 

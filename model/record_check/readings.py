@@ -35,6 +35,8 @@ STUCK = 5
 """Least samples with the same reading before a jump, for a reading that was stuck."""
 ENTRY = 3
 """Intervals before a bound, in each of which a reading that is cut off there moves on."""
+EVEN = 2.0
+"""Largest beside least speed in these, of a joint that they do not bring to rest: an even torque makes it 7/3."""
 MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
 BURST = 0.25
@@ -65,7 +67,7 @@ class Jump:
 @dataclass(frozen=True)
 class FalseReadings:
     """The jumps of a reading, sorted: wraps by one turn; spikes, pairs of jumps there and back; stuck, jumps after
-    readings that did not change, with the row since which; others."""
+    readings that did not change, with the row since which (of size 0 where no jump ends them); others."""
 
     wraps: tuple[Jump, ...]
     spikes: tuple[Jump, ...]
@@ -156,6 +158,30 @@ def find_bounds(reading: Floats) -> list[tuple[int, int]]:
             if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
                 found.append((int(first), int(last)))
     return sorted(found)
+
+
+def find_dead(reading: Floats, step: float) -> list[tuple[int, Jump]]:
+    """A position that stands still from the record's beginning, or up to its end, and that moves right beside: as stuck
+    ones, without a jump. step: of the sensor, in the reading's unit; 0 where it is not known."""
+    rates, last = np.diff(reading), len(reading) - 1
+    until, since = last - _unchanged_since(reading[::-1], last), _unchanged_since(reading, last)
+    found = []
+    if until + 1 >= STUCK and _stops_at_once(rates[::-1], last - until, step):
+        found.append((0, Jump(until, 0.0, 0.0)))
+    if last - since + 1 >= STUCK and _stops_at_once(rates, since, step):
+        found.append((since, Jump(last, 0.0, 0.0)))
+    return found
+
+
+def _stops_at_once(rates: Floats, row: int, step: float) -> bool:
+    """Whether a reading with these steps (k - 1,) comes to `row` at a speed that no torque of this record has stopped
+    from one sample to the next, and does not slow down before."""
+    speeds = np.abs(before := rates[max(0, row - 1 - ENTRY) : max(0, row - 1)])  # the last step may be cut short
+    elsewhere = rates[: max(0, row - ISOLATED)]
+    if int(np.count_nonzero(elsewhere)) < 4 * ISOLATED or abs(float(np.sign(before).sum())) < ENTRY:
+        return False
+    changes = float(np.abs(np.diff(median_filter(elsewhere, ISOLATED, mode="nearest"))).max())
+    return float(speeds.min()) > max(KINK * max(changes, step), float(speeds.max()) / EVEN)
 
 
 def find_bursts(time: Floats) -> tuple[float, float] | None:

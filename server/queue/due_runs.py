@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from datetime import datetime
 
 from daq.contracts.service.experiments import ExperimentRequest
@@ -10,7 +11,25 @@ from server.catalogue.room import require_room
 from server.problems import ProblemError
 from server.queue.context import QueueContext
 
+LEAP = 1.0
+"""Time (s) by which the wall clock runs ahead between two looks only where it was set, or the computer was asleep."""
+TRIES = 2
+"""Looks in a row, the first at its time, at which a run may fail to be submitted before it counts as missed: a database
+may be locked for a moment."""
 log = logging.getLogger("server.queue")
+
+
+@dataclass
+class Hindered:
+    """A schedule whose run is due and cannot be submitted.
+
+    Args:
+        error: the last one. tries: those of the run that is due. skipped: whether it is reported that runs are skipped.
+    """
+
+    error: type[Exception]
+    tries: int = 0
+    skipped: bool = False
 
 
 class DueRuns:
@@ -18,33 +37,83 @@ class DueRuns:
 
     def __init__(self, context: QueueContext) -> None:
         self._context = context
-        self._hindered: dict[str, type[Exception]] = {}
-        """The last error of each schedule whose run is due and cannot be submitted; it is reported once."""
+        self._hindered: dict[str, Hindered] = {}
+        """Schedules whose runs cannot be submitted; each error is reported once."""
         self._left_out: set[str] = set()
         """Schedules whose runs are skipped while the previous one waits; this is reported once."""
+        self._missed_while = ""
+        """Why runs that are due by now are missed; empty where they are not."""
+        self._failed_looks = 0
+        self._seen = (context.clock.monotonic(), context.clock.utc())
+        """Both clocks at the last look."""
 
-    def leave_out_missed(self) -> None:
-        """Skips the runs that were due while the service was not running. Called at the start."""
+    def leave_out_missed(self, meanwhile: str = "the service was off") -> None:
+        """Skips the runs that were due meanwhile, while none could be submitted. Called at the start."""
         context = self._context
         for identity in context.schedules.leave_out_missed(context.robot.name, context.clock.utc()):
-            line = "runs that were due while the service was off were skipped"
+            line = f"runs that were due while {meanwhile} were skipped"
             context.record_event("schedule", f"schedule {identity}: {line}")
 
+    def watch_clock(self) -> None:
+        """Notes whether the wall clock has leapt ahead since the last look: what became due by that is missed. Needs no
+        database, and is called during experiments too, since runs that are due meanwhile only wait."""
+        clock, (since, at) = self._context.clock, self._seen
+        before, now = clock.monotonic(), clock.utc()
+        # read on both sides of the wall clock, so that a thread that is held up between two readings sees no leap
+        if (now - at).total_seconds() - (clock.monotonic() - since) > LEAP:
+            self._missed_while = "the computer's clock leapt ahead"
+        self._seen = (before, now)
+
+    def look_failed(self) -> None:
+        """Notes that the queue failed at this look. If it does so again before it can look, what is due is missed."""
+        self._failed_looks += 1
+        if self._failed_looks >= TRIES:
+            self._missed_while = "the queue could not look at them"
+
     def submit(self) -> None:
-        """Submits all runs that are due. A run that cannot be submitted stays due and is tried again; it delays neither
-        other runs nor the queue."""
+        """Submits all runs that are due. A run that cannot be submitted at its time is left out as missed; it delays
+        neither other runs nor the queue."""
+        self.watch_clock()
+        if self._missed_while:
+            self.leave_out_missed(self._missed_while)
         now = self._context.clock.utc()
-        for identity in self._context.schedules.due(self._context.robot.name, now):
+        due = self._context.schedules.due(self._context.robot.name, now)
+        self._missed_while, self._failed_looks = "", 0
+        for identity in due:
             try:
+                hindered = self._hindered.get(identity)
+                if hindered is not None and hindered.tries >= TRIES:  # it could not even be left out
+                    self._leave_out(identity, hindered, now)
+                    continue
                 self._submit_one(identity, now)
                 self._hindered.pop(identity, None)
             except Exception as error:
-                if self._hindered.get(identity) is type(error):
-                    continue  # it has been reported
-                self._hindered[identity] = type(error)
-                log.exception("schedule %s", identity)
-                why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
-                self._context.record_event("schedule", f"schedule {identity}: its run has to wait: {why}")
+                if self._hinder(identity, error, now):
+                    log.exception("schedule %s", identity)
+
+    def _hinder(self, identity: str, error: Exception, now: datetime) -> bool:
+        """Leaves out a run that has been tried often enough, and tells of an error once: returns whether it is new."""
+        hindered = self._hindered.setdefault(identity, Hindered(Exception))
+        hindered.tries += 1
+        new = hindered.error is not type(error)
+        if new:
+            hindered.error = type(error)
+            why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
+            self._context.record_event("schedule", f"schedule {identity}: its run has to wait: {why}")
+        if hindered.tries == TRIES:
+            try:
+                self._leave_out(identity, hindered, now)
+            except Exception:
+                log.exception("schedule %s: its run is not left out yet", identity)
+        return new
+
+    def _leave_out(self, identity: str, hindered: Hindered, now: datetime) -> None:
+        self._context.schedules.leave_out_missed(self._context.robot.name, now, identity)
+        hindered.tries = 0
+        if not hindered.skipped:
+            hindered.skipped = True
+            line = "its run could not be submitted at its time: runs are skipped until they can be"
+            self._context.record_event("schedule", f"schedule {identity}: {line}")
 
     def _submit_one(self, identity: str, now: datetime) -> None:
         context = self._context

@@ -328,6 +328,7 @@ class QueueService:
                 if (fault := f"{type(error).__name__}: {error.args[:1]}") != told:
                     log.exception("queue")
                 told = fault
+                self._runs.look_failed()
                 self._waiting_for = "an error occurred in the queue: see the log"
             self._changed.wait(self._look_every)
 
@@ -507,6 +508,7 @@ class QueueService:
             try:
                 return answer.result(self._look_every)
             except TimeoutError:
+                self._runs.watch_clock()
                 if self._needs_attendance() and not self._attendance.left:
                     running = self._running
                     if running is not None and running.cancelled_by is None:

@@ -112,10 +112,12 @@ class ScheduleStore:
             rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
             return [row.id for row in rows if is_due(row.next, now) and not broken(_plan(row))]
 
-    def leave_out_missed(self, robot: str, now: datetime) -> list[str]:
-        """Leaves out all runs that were due up to now, without counting them. Returns the schedules concerned."""
+    def leave_out_missed(self, robot: str, now: datetime, identity: str | None = None) -> list[str]:
+        """Leaves out all runs that were due up to now (of one schedule, if it is named), without counting them. Returns
+        the schedules concerned."""
+        which = {"robot": robot, "active": True, **({} if identity is None else {"id": identity})}
         with self._store.writing() as session:
-            rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
+            rows = session.scalars(select(ScheduleRow).filter_by(**which))
             return [row.id for row in rows if _leave_out_missed(row, now)]
 
     def leave_out(self, robot: str, identity: str, now: datetime) -> None:

@@ -113,6 +113,30 @@ def stuck(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
     return Faulty(_with(trace, name, joint, signal), ("stuck",), joint, float(trace.time[row]))
 
 
+def dead_from_the_middle(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """An encoder that dies while its joint moves fast, in the middle half of the record, and stays dead."""
+    return _dead(trace, machine, draw, slice(None))
+
+
+def dead_at_the_beginning(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
+    """The same from the beginning: it wakes up while its joint moves fast."""
+    return _dead(trace, machine, draw, slice(None, None, -1))
+
+
+def _dead(trace: Trace, machine: Machine, draw: Generator, order: slice) -> Faulty | None:
+    joint = _joint(machine, draw)
+    name, signal = _source(trace, machine, joint)
+    if name == "velocity":
+        return None
+    passed = signal[order].copy()
+    quarter, around = len(passed) // 4, 4
+    speeds = np.abs(passed[2 * around :] - passed[: -2 * around])[quarter - around : -quarter]
+    row = quarter + int(draw.choice(np.flatnonzero(speeds >= np.quantile(speeds, 0.95))))
+    passed[row:] = passed[row]
+    first = row if order.step is None else 0
+    return Faulty(_with(trace, name, joint, passed[order]), ("stuck", "saturated"), joint, float(trace.time[first]))
+
+
 def saturated(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:
     """Readings that end at a value which the motion passes at speed, and goes beyond for a while."""
     joint = _joint(machine, draw)
@@ -234,6 +258,8 @@ FAULTS: dict[str, Fault] = {
         wraps,
         slipped,
         stuck,
+        dead_from_the_middle,
+        dead_at_the_beginning,
         saturated,
         cut_out,
         bursts,

@@ -25,7 +25,7 @@ from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import base_model
 from model.record_check.check import check_records, repaired
 from model.record_check.finding import doubts_in
-from model.record_check.readings import find_bounds, find_jumps
+from model.record_check.readings import find_bounds, find_dead, find_jumps
 from model.reports.diagnosis_report import diagnosis_report
 from model.reports.page import html
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -106,6 +106,32 @@ def test_a_joint_that_rests_on_the_edge_of_a_count_is_at_no_bound() -> None:
     assert find_bounds(rests) == []
     comes = np.minimum(0.05 * np.arange(400.0), 10.0)
     assert find_bounds(comes) == [(200, 399)]
+
+
+def test_an_encoder_that_dies_for_good_or_wakes_up_late_is_stuck(tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    middle = len(trace) // 2
+    for rows, since, words in (
+        (slice(middle, None), 4.5, "stands still from 4.50 to 8.99 s (4.49 s), the record's end, and moves at speed"),
+        (slice(None, middle), 0.0, "stands still from 0.00 to 4.50 s (4.5 s), the record's beginning, and moves at"),
+    ):
+        position = trace.position.copy()
+        position[rows] = position[middle]
+        (one,) = doubts_in(check_records(base_model(machine), [replace(trace, position=position)]))[:1]
+        assert (one.kind, one.joint, one.times) == ("stuck", 1, (since,))
+        assert words in one.says
+        assert "then jumps by" not in one.says
+
+
+@pytest.mark.parametrize("period", [0.001, 0.005, 0.02])
+def test_a_joint_that_rests_at_both_ends_of_a_record_is_not_dead(period: float) -> None:
+    time = np.arange(0.0, 6.0, period)
+    asked = np.clip(time - 1.0, 0.0, 3.0)  # at a constant speed from rest to rest
+    step = 2 * np.pi / 2**14
+    for lag in (0.0, 0.01, 0.05):  # s, in which a torque brings the joint to that speed and to rest
+        width = max(1, round(lag / period))
+        position = np.convolve(np.pad(asked, (width, width), mode="edge"), np.ones(width) / width, "same")[width:-width]
+        assert find_dead(np.round(position / step) * step, step) == []
 
 
 def test_one_turn_is_a_wrap_however_uneven_the_stamps_are_and_any_other_jump_is_one() -> None:

@@ -13,23 +13,84 @@ from server.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
 from tests.server.meanwhile import raising
-from tests.server.queue.bench import AT_ONCE, CALM, FULL, LOCKED, REAL, SPEC, Bench, done
+from tests.server.queue.bench import AT_ONCE, CALM, FULL, LOCKED, REAL, SPEC, TOO_LONG, Bench, done
+
+SKIPPED = "its run could not be submitted at its time: runs are skipped until they can be"
 
 
-def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_room(
+def test_a_run_that_a_full_disk_refuses_is_missed_and_the_next_comes_when_there_is_room(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    bench.queue = bench.begun_anew(look_every=AT_ONCE)
     schedule = bench.schedule()
     usage = shutil.disk_usage
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: (10**9, 10**9 - 10**6, 10**6))
     bench.queue.start()
     line = "1 MB are free for traces, 20 MB stay free"
     bench.until(lambda event: event == f"schedule: schedule {schedule.id}: its run has to wait: {line}")
-    assert (bench.runs(schedule), bench.counted(schedule)) == ([], 0)
+    bench.until(lambda event: event == f"schedule: schedule {schedule.id}: {SKIPPED}")
     monkeypatch.setattr(shutil, "disk_usage", usage)
-    bench.queue.wake()
+    bench.schedule()
     bench.until(lambda event: "queued by schedule" in event)
+    assert (bench.runs(schedule), bench.counted(schedule)) == ([], 0)
+    bench.clock.turn(3600)
+    bench.until(lambda event: event == f"experiment: queued by schedule {schedule.id}")
     assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
+
+
+@pytest.mark.parametrize("where", ["submit_run", "due"])
+def test_a_run_that_is_due_while_the_database_fails_is_missed_when_it_works_again(bench: Bench, where: str) -> None:
+    schedule = bench.schedule()
+    bench.schedules.before(where, *[raising(FULL)] * 2)
+    bench.schedules.before("leave_out_missed", *[raising(FULL)] * 2)
+    runs = bench.queue._runs
+    for _ in range(5):
+        try:
+            runs.submit()
+        except OperationalError:
+            runs.look_failed()
+        bench.clock.turn(1)
+    unseen = "runs that were due while the queue could not look at them were skipped"
+    skipped = [event for event in bench.events if "skipped" in event]
+    assert skipped == [f"schedule: schedule {schedule.id}: {SKIPPED if where == 'submit_run' else unseen}"]
+    assert (bench.runs(schedule), bench.counted(schedule)) == ([], 0)
+    bench.clock.turn(3600)
+    runs.submit()
+    assert bench.counted(schedule) == 1
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_run_that_a_leap_of_the_clock_makes_due_is_missed(bench: Bench, moves: bool) -> None:
+    bench.queue, bench.answer = bench.begun_anew(look_every=AT_ONCE), None
+    schedule = bench.schedule()
+    bench.queue.start()
+    assert bench.moves.wait(TOO_LONG)
+    if not moves:
+        bench.asked.set_result(done())
+        bench.until(lambda event: event == "experiment: completed")
+    bench.clock.sleep(7200 + 1800)
+    if moves:
+        for _ in range(3):
+            assert bench.asked.looks.acquire(timeout=TOO_LONG)
+        bench.clock.turn(1)
+        bench.asked.set_result(done())
+    line = "runs that were due while the computer's clock leapt ahead were skipped"
+    bench.until(lambda event: event == f"schedule: schedule {schedule.id}: {line}")
+    assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
+    assert bench.schedules.get("ma2000", schedule.id).next == schedule.starts + timedelta(hours=3)
+
+
+def test_a_run_that_is_due_while_another_experiment_runs_is_late_and_not_missed(bench: Bench) -> None:
+    bench.queue, bench.answer = bench.begun_anew(look_every=AT_ONCE), None
+    schedule = bench.schedule()
+    bench.queue.start()
+    assert bench.moves.wait(TOO_LONG)
+    bench.clock.turn(9000)
+    assert bench.asked.looks.acquire(timeout=TOO_LONG)
+    bench.moves.clear()
+    bench.asked.set_result(done())
+    assert bench.moves.wait(TOO_LONG)
+    assert bench.counted(schedule) == 2
 
 
 def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench) -> None:
