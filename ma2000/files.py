@@ -36,6 +36,8 @@ def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) ->
     folder = Path(folder)
     try:
         folder.stat()  # a pattern finds nothing in a folder that is not there, and a name is soon misspelled
+        if not folder.is_dir():
+            raise TraceError(f"{folder}: is no folder; `read_trace` reads one file")
     except OSError as error:
         raise TraceError(f"{folder}: cannot be read: {disk.reason(error)}") from error
     paths = _sorted(folder.glob(pattern))

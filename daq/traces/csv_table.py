@@ -113,6 +113,8 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
             raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
+    if not len(table):
+        raise TraceError(f"{path}: has no row below its header")
     record = description.record(path, description.load_machine(path), trace_id_of(data, *described))
     if description.created is None:
         said.append(FILE_TIME)

@@ -24,10 +24,10 @@ def export_table(trace: Trace, path: Path) -> Path:
     Raises TraceError for another suffix or a file that cannot be written, MissingExtraError.
     """
     path = Path(path)
-    if path.suffix not in (PARQUET, NETCDF):
+    if path.suffix.lower() not in (PARQUET, NETCDF):
         raise TraceError(f"{path}: tables are written as {PARQUET} and {NETCDF}")
     try:
-        if path.suffix == PARQUET:
+        if path.suffix.lower() == PARQUET:
             require_extra("tables", f"{path}: Parquet", "pandas", "pyarrow")
             trace.to_pandas().to_parquet(path, engine="pyarrow")
         else:

@@ -25,15 +25,16 @@ def write_csv(trace: Trace, path: Path) -> Path:
 
 
 def check_csv(path: Path) -> None:
-    """Raises SpecError when the TOML beside the CSV would replace another one, such as a machine or a configuration."""
+    """Raises SpecError for another kind of file, such as the trace itself, and when the TOML beside it would replace
+    another one, such as a machine or a configuration."""
     from pydantic import ValidationError
 
     from daq.traces.csv_table import CsvDescription
     from daq.traces.description import toml_path
 
+    if path.suffix.lower() != ".csv":
+        raise SpecError(f"{path}: is no .csv file; a .toml of its name is put beside it")
     toml = toml_path(path)
-    if toml == path:
-        raise SpecError(f"{path}: a .toml of this name is put beside the CSV; name a .csv file")
     if not toml.exists():
         return
     try:

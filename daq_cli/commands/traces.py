@@ -170,7 +170,7 @@ def export(
     from daq_cli.app.csv_output import write_csv
 
     path, found = _read(context, trace, folder)
-    write = export_table if output is not None and output.suffix in (PARQUET, NETCDF) else write_csv
+    write = export_table if output is not None and output.suffix.lower() in (PARQUET, NETCDF) else write_csv
     if output is None and path.suffix.lower() == ".csv":
         raise SpecError(f"{path}: is CSV already; name the file to write with -o")
     _print_file(path, write(found, output or path.with_suffix(".csv")), as_json=json)

@@ -29,8 +29,9 @@ def file_of(model: Model) -> ModelFile:
     return ModelFile(identity=model.identity, text=_text(model), parent=lineage.parent, traces=lineage.traces)
 
 
-def save_model(model: Model, path: Path) -> Path:
+def save_model(model: Model, path: Path | str) -> Path:
     """Writes a model. Returns `path`. Raises SpecError when the file cannot be written."""
+    path = Path(path)
     try:
         path.write_text(_text(model), "utf-8")
     except OSError as error:
@@ -38,12 +39,12 @@ def save_model(model: Model, path: Path) -> Path:
     return path
 
 
-def load_model(path: Path) -> Model:
+def load_model(path: Path | str) -> Model:
     """The model in a file: a model of its own, or the one that a saved fit carries.
 
     Raises SpecError, in one line, for no such file, another kind of file, or a model of a newer version.
     """
-    return model_of(parse_json(read_text(path, f"model {path}"), f"model {path}"), str(path))
+    return model_of(parse_json(read_text(Path(path), f"model {path}"), f"model {path}"), str(path))
 
 
 def model_of(data: Any, called: str) -> Model:

@@ -30,6 +30,9 @@ class ScheduleStore:
         """Creates an active schedule. Raises a 422 if it would never run."""
         zone = None if request.cron is None else request.zone or zone_here()
         plan = Plan(request.starts or now, request.every or 0.0, request.count, request.cron, zone)
+        begins = first(plan)
+        if begins is not None and begins < now:  # times that have passed are not caught up with
+            begins = following(plan, 0, begins, now)
         row = ScheduleRow(
             id=secrets.token_hex(6),
             robot=robot,
@@ -42,7 +45,7 @@ class ScheduleStore:
             priority=request.priority,
             active=True,
             submitted_runs=0,
-            next=first(plan),
+            next=begins,
             created=now,
             created_by=by,
         )

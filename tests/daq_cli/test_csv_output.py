@@ -26,6 +26,18 @@ def test_the_same_trace_is_exported_again(daq: CommandLine, tmp_path: Path) -> N
         assert daq("traces", "export", trace, "-o", tmp_path / "a.csv").code == 0
 
 
-def test_a_csv_does_not_have_the_name_of_its_toml(daq: CommandLine, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["a.toml", "a.mcap", "a.xlsx", "a"])
+def test_a_csv_is_named_as_one_so_that_it_replaces_neither_its_trace_nor_its_toml(
+    daq: CommandLine, tmp_path: Path, name: str
+) -> None:
     trace = write(tmp_path / "a.mcap", 3)
-    daq("traces", "export", trace, "-o", tmp_path / "a.toml").complains(2, "a.toml", "name a .csv")
+    before = trace.read_bytes()
+    daq("traces", "export", trace, "-o", tmp_path / name).complains(2, name, "is no .csv file")
+    assert trace.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.mcap"]
+
+
+def test_a_table_in_capitals_is_one_all_the_same(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    assert daq("traces", "export", trace, "-o", tmp_path / "a.PARQUET").code == 0
+    assert (tmp_path / "a.PARQUET").read_bytes()[:4] == b"PAR1"

@@ -112,3 +112,9 @@ def test_bytes_that_were_not_salvaged_are_named_with_their_file(daq: CommandLine
         "a.mcap: salvaged from a.mcap.part up to its damage; the 13 bytes after it are in a.mcap.part.damaged"
     )
     assert second.endswith("b.mcap.part: holds no trace; it was renamed to b.mcap.part.unreadable")
+
+
+def test_a_csv_of_a_header_alone_is_refused_in_one_line(daq: CommandLine, tmp_path: Path) -> None:
+    file = tmp_path / "header.csv"
+    file.write_text("time,position_1\n")
+    daq("traces", "import", file).complains(2, "header.csv", "has no row below its header")

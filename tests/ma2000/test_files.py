@@ -20,5 +20,13 @@ def test_traces_of_a_folder_are_selected_by_what_they_say_of_themselves(tmp_path
         ma2000.read_traces(tmp_path, outcome="completed")
     with pytest.raises(TraceError, match="elsewhere: cannot be read: No such file or directory"):
         ma2000.read_traces(tmp_path / "elsewhere", kind="ramp")
+    with pytest.raises(TraceError, match=r"a\.mcap: is no folder; `read_trace` reads one file"):
+        ma2000.read_traces(tmp_path / "a.mcap")
     with pytest.raises(SpecError, match="read_traces: robo: traces are selected by path, state, size, trace_id"):
         ma2000.read_traces(tmp_path, robo="left")
+
+
+def test_a_model_is_saved_and_loaded_by_a_path_or_its_text(tmp_path: Path) -> None:
+    model = ma2000.base_model(ma2000.load_machine("ma2000"))
+    assert ma2000.save_model(model, f"{tmp_path}/m.json") == tmp_path / "m.json"
+    assert ma2000.load_model(f"{tmp_path}/m.json") == ma2000.load_model(tmp_path / "m.json") == model

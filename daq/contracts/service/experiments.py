@@ -9,7 +9,7 @@ from pydantic import AwareDatetime, Field, StrictBool, model_validator
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.in_unit import InUnit
 from daq.contracts.labels import Outcome
-from daq.contracts.service.base import Moment, Wire
+from daq.contracts.service.base import Moment, SpokenWire, Wire
 from daq.contracts.trace import EventKind
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
@@ -35,7 +35,7 @@ Submission = TypeVar("Submission", "ExperimentRequest", "ScheduleRequest")
 PresetName = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class ExperimentRequest(Wire):
+class ExperimentRequest(SpokenWire):
     """An experiment to run, not before the time `at` (with its time zone); None for as soon as possible."""
 
     spec: ExperimentSpec = ExperimentSpec()
@@ -120,7 +120,7 @@ class Experiment(Wire):
     """The number of its trace, once there is one."""
 
 
-class ScheduleRequest(Wire):
+class ScheduleRequest(SpokenWire):
     """An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
     clock (`cron`)."""
 
@@ -134,7 +134,7 @@ class ScheduleRequest(Wire):
     zone: Annotated[str, Field(pattern=r"^[A-Za-z0-9_+/-]{1,64}$")] | None = None
     """Time zone of `cron`, such as Europe/London; None for that of the service's computer."""
     starts: Moment | None = None
-    """Time of the first run, with `cron` the earliest time of it; None for now."""
+    """Time of the first run, with `cron` the earliest time of it; None for now. Times that have passed are left out."""
     count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     """Number of runs; None for no end."""
     priority: Priority = 0

@@ -112,6 +112,8 @@ def _write(
     """Writes a model's text to a file or to standard output."""
     if output is not None:
         check_folder(output, "--output")
+        if output.suffix.lower() not in (f".{kind}", ".xml"):
+            raise SpecError(f"{output}: name a .{kind} or .xml file")
     text, left_out = writer(model)
     if output is not None:
         with replacing(output) as part:

@@ -3,6 +3,7 @@
 import shutil
 import threading
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from sqlalchemy import text
@@ -283,6 +284,21 @@ def test_what_was_due_while_the_service_was_off_is_left_out(bench: Bench) -> Non
     assert bench.schedules.due("ma2000", bench.clock.utc()) == []
     found = bench.schedules.get("ma2000", schedule.id)
     assert (found.next, found.submitted_runs) == (schedule.starts + timedelta(hours=4), 0)
+
+
+@pytest.mark.parametrize(
+    ("rule", "hours"), [({"every": 86400}, 24 - 7), ({"cron": "0 2 * * *", "zone": "UTC"}, None)], ids=["every", "cron"]
+)
+def test_a_schedule_that_starts_in_the_past_runs_at_its_next_time(
+    bench: Bench, rule: dict[str, Any], hours: int | None
+) -> None:
+    now = bench.clock.utc()
+    request = ScheduleRequest(spec=SPEC, starts=now - timedelta(days=20, hours=7), **rule)
+    made = bench.schedules.create("ma2000", request, now, "anna")
+    assert made.next is not None
+    assert now < made.next <= now + timedelta(days=1)
+    assert made.next == now + timedelta(hours=hours) if hours is not None else made.next.hour == 2
+    assert bench.schedules.due("ma2000", now) == []
 
 
 def test_a_schedule_whose_time_zone_is_no_longer_known_is_shown_as_broken(bench: Bench) -> None:
