@@ -214,7 +214,8 @@ def _clear(given: Floats, parts: list[Floats], free: list[Floats], width: int) -
     if rank < table.shape[1]:
         return [None] * len(parts)
     spread = float(np.mean((given - given.mean() - table @ line) ** 2)) * width
-    deviations = np.sqrt(spread * np.diag(np.linalg.inv(table.T @ table)))
+    triangle = np.linalg.inv(np.linalg.qr(table, mode="r"))  # its rows' squares are the diagonal of (AᵀA)⁻¹
+    deviations = np.sqrt(spread * np.sum(triangle**2, axis=1))
     return [float(line[k]) / scales[k] if line[k] > CLEAR * deviations[k] else None for k in range(len(parts))]
 
 

@@ -17,7 +17,7 @@ from tests.server.polling import reset
 from tests.server.service import Service
 
 JSON = ("application/json", "application/problem+json")
-SERVER = Path(__file__).parents[3] / "server"
+ROOT = Path(__file__).parents[3]
 OF_SIGN_IN = {
     "name-taken",
     "no-name",
@@ -81,7 +81,7 @@ def test_every_kind_of_problem_has_an_example_at_an_address_that_knows_it(descri
     }
     kinds = {example.problem.kind for example in PROBLEM_EXAMPLES}
     made = re.compile(r'(?:ProblemError\(\s*(?:\d+|error\.status_code),|conflict\()\s*"([a-z-]+)"')
-    text = "\n".join(path.read_text("utf-8") for path in SERVER.rglob("*.py"))
+    text = "\n".join(path.read_text("utf-8") for part in ("server", "extras") for path in (ROOT / part).rglob("*.py"))
     assert set(made.findall(text)) | set(re.findall(r'40[45]: "([a-z-]+)"', text)) | {"http"} == kinds
     assert kinds - NO_ADDRESS <= met | {"Health"}
 
