@@ -22,13 +22,14 @@ async function newestAudit(): Promise<readonly AuditEntry[] | null> {
 export async function lookAtService(): Promise<Seen> {
   const path = here();
   const ofJobs = { path, query: { state: ['queued', 'running'] as ('queued' | 'running')[], limit: 50 } };
-  const [system, health, jobs, events, audit, notifications] = await Promise.all([
+  const health = await readiness();
+  const notifies = 'notifications' in health.checks; // where that plug-in is installed
+  const [system, jobs, events, audit, notifications] = await Promise.all([
     ask(api.GET('/api/v1/system')),
-    readiness(),
     ask(api.GET('/api/v1/robots/{robot}/jobs', { params: ofJobs })),
     ask(api.GET('/api/v1/robots/{robot}/events', { params: { path, query: { limit: EVENTS } } })),
     newestAudit(),
-    ask(api.GET('/api/v1/notifications')),
+    notifies ? ask(api.GET('/api/v1/notifications')) : null,
   ]);
   return {
     system,
@@ -36,6 +37,6 @@ export async function lookAtService(): Promise<Seen> {
     jobs: jobs.items,
     events: events.items,
     audit,
-    destinations: notifications.destinations,
+    destinations: notifications?.destinations ?? null,
   };
 }

@@ -14,7 +14,8 @@ export interface Seen {
   /** The newest rows of the audit log, the newest first; null for whoever may not read it. */
   readonly audit: readonly AuditEntry[] | null;
   /** Who is told what, and how far that is. */
-  readonly destinations: readonly Destination[];
+  /** Null where nobody can be told. */
+  readonly destinations: readonly Destination[] | null;
 }
 
 export class ServiceLook {
