@@ -19,7 +19,9 @@ from sqlalchemy import select
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
-from extras.lab.backup.database import head_of_audit, revision_of
+from daq.teaching import Program
+from daq.teaching.program import Absolute
+from extras.lab.backup.database import copy_database, head_of_audit, revision_of
 from extras.lab.backup.manifest import MANIFEST, verify
 from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
 from extras.lab.backup.restore import restore
@@ -31,6 +33,7 @@ from server.store.archived import Archived, ArchivedStore
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
+from server.store.programs import ProgramStore
 from server.store.queues import QueueState, QueueStore
 from server.store.schema import VERSION, migrations
 from server.store.tables import TraceRow
@@ -536,3 +539,14 @@ def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: 
     store.close()
     assert revision_of(places.database) == ScriptDirectory.from_config(migrations()[VERSION]).get_current_head()
     assert head_of_audit(places.database) == "nothing"
+
+
+def test_a_copy_holds_the_taught_programs(tmp_path: Path) -> None:
+    program = Program(name="pick", instructions=(Absolute(angles={1: 3.1}),))
+    with closing(Store(f"sqlite:///{tmp_path / DATABASE}")) as store:
+        store.migrate()
+        ProgramStore(store).put("ma2000", "pick", program, None, datetime.now(UTC), "anna")
+        copy_database(tmp_path / DATABASE, tmp_path / "copy.sqlite")
+    with closing(Store(f"sqlite:///{tmp_path / 'copy.sqlite'}")) as restored:
+        restored.migrate()
+        assert ProgramStore(restored).get("ma2000", "pick").program == program
