@@ -129,7 +129,7 @@ class ScheduleRequest(SpokenWire):
     """Name of a preset, in place of `spec`."""
     every: Interval | None = None
     """Time (s) from one run to the next."""
-    cron: Annotated[str, Field(min_length=9, max_length=100)] | None = None
+    cron: Annotated[str, Field(max_length=100)] | None = None
     """When to run, as minute, hour, day, month and weekday of a cron table: `0 2 * * *` is daily at 02:00."""
     zone: Annotated[str, Field(pattern=r"^[A-Za-z0-9_+/-]{1,64}$")] | None = None
     """Time zone of `cron`, such as Europe/London; None for that of the service's computer."""

@@ -40,7 +40,7 @@ def try_all(
     destinations = destinations_of(invocation(context).configuration.section(NotificationSettings))
     chosen = [one for one in destinations if name in (None, one.name)]
     if not destinations:
-        raise SpecError("notifications: nobody is told; name somebody in [notifications] (docs/notifications.md)")
+        raise SpecError("no notifications are configured; add recipients under [notifications] (docs/notifications.md)")
     if not chosen:
         there = ", ".join(one.name for one in destinations)
         raise SpecError(f"notifications: no destination {shown(str(name))}; there is {there}")

@@ -81,7 +81,7 @@ def test_a_command_tries_every_destination(
     daq("notify", "test", "nobody").complains(2, "no destination 'nobody'", "there is lab, far")
     assert PATH not in daq("config", "show").out
     (tmp_path / "daq.toml").write_text("")
-    daq("notify", "test").complains(2, "nobody is told", "[notifications]")
+    daq("notify", "test").complains(2, "no notifications are configured", "[notifications]")
 
 
 def test_a_fault_while_a_test_is_sent_is_one_line(
