@@ -78,10 +78,15 @@ class OwnedRobot:
     def number_stop(self) -> None:
         """Reads the number of the newest stop where it is not known; of an arm that is not idle once a second, since
         somebody else may stop it again, which no sample shows. Raises LinkError."""
-        now, freezes = time.monotonic(), self.control.freezes
-        due = self.control.arm.state is not State.IDLE and now - self._stop[2] >= REPORT_EVERY
+        due = self.control.arm.state is not State.IDLE and time.monotonic() - self._stop[2] >= REPORT_EVERY
         if due or self.newest_stop is None:
-            self._stop = (self.controller.status().stop, freezes, now)
+            self.read_stop()
+
+    def read_stop(self) -> int:
+        """Returns the number of the newest stop on the board, which the next report has too. Raises LinkError."""
+        now, freezes = time.monotonic(), self.control.freezes
+        self._stop = (self.controller.status().stop, freezes, now)
+        return self._stop[0]
 
     def say(self, line: str) -> None:
         """Reports a line for the operator who teaches."""

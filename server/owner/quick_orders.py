@@ -124,7 +124,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     control, here = robot.control, order.here
     if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
         return "was not stopped"
-    if robot.controller.status().stop != order.stop:  # before anything changes; the board looks once more
+    if robot.read_stop() != order.stop:  # before anything changes; the board looks once more
         raise _overtaken(order.kind)
     try:
         _release(robot, order)

@@ -1,5 +1,10 @@
 """The command line as a person types it, in this process: output, complaints, exit code."""
 
+import logging
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pytest
@@ -26,6 +31,17 @@ class Said:
             assert word in lines[0], lines[0]
 
 
+@contextmanager
+def _own_log() -> Iterator[None]:
+    """`daq serve` takes over the log and standard error of its process, which here is that of the tests to come."""
+    taken = ((sys, "stderr"), (sys, "excepthook"), (sys, "unraisablehook"), (threading, "excepthook"))
+    with pytest.MonkeyPatch.context() as undone:
+        undone.setattr(logging.root, "handlers", list(logging.root.handlers))
+        for place, name in taken:
+            undone.setattr(place, name, getattr(place, name))
+        yield
+
+
 class CommandLine:
     """`daq(...)` runs a command."""
 
@@ -34,7 +50,7 @@ class CommandLine:
 
     def __call__(self, *words: object) -> Said:
         self._capture.readouterr()
-        with pytest.raises(SystemExit) as ended:
+        with _own_log(), pytest.raises(SystemExit) as ended:
             main([str(word) for word in words])
         said = self._capture.readouterr()
         code = ended.value.code

@@ -13,11 +13,16 @@ from server.access.limits import REQUESTS_A_SECOND
 def reset(
     robot: httpx.Client, *, here: bool = False, headers: Mapping[str, str] | None = None, name: str = ""
 ) -> httpx.Response:
-    """Ends the stop that is in force, as soon as the service knows its number. `name`: the robot's address, where
-    `robot` speaks to the whole service."""
+    """Ends the stop that is in force, as soon as the service knows its number; if that was the number of an earlier
+    stop, once more. `name`: the robot's address, where `robot` speaks to the whole service."""
     path = name or str(robot.base_url).rstrip("/")
-    found = until(robot, path, lambda status: status["stop"] is not None or status["arm"] == "disconnected")
-    return robot.post(f"{name}/reset", json={"stop": found["stop"] or 0, "here": here}, headers=headers)
+    earlier: object = None
+    while True:
+        found = until(robot, path, lambda status: status["stop"] is not None or status["arm"] == "disconnected")
+        answer = robot.post(f"{name}/reset", json={"stop": found["stop"] or 0, "here": here}, headers=headers)
+        if answer.status_code != httpx.codes.CONFLICT or found["stop"] == earlier:
+            return answer
+        earlier = found["stop"]
 
 
 def until(
