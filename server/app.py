@@ -17,7 +17,6 @@ from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
-    audit,
     controller,
     description,
     experiments,
@@ -108,7 +107,6 @@ def bare_app(services: Services | None) -> FastAPI:
         queue,
         traces,
         jobs,
-        audit,
         live,
         login,
         system,

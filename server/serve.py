@@ -22,7 +22,6 @@ from server.access.origin import is_loopback
 from server.access.session_cookie import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
-from server.audit.words import line_of
 from server.descriptors import most_connections
 from server.ending import EndInTime
 from server.listening import listening
@@ -121,7 +120,7 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         metrics.count_request,
         metrics.count_refusal,
         cookie=session_cookie(section.oidc.address),
-        audit=services.audit,
+        parts=services.parts,
     )
 
 
@@ -147,19 +146,18 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
 
 
 def _note_of_stop(news: Stopped) -> AuditNote:
-    """Returns the audit log's note of a stop at the listener. It is done, whatever the arm has answered: `detail` says
-    that."""
+    """Returns what plug-ins are told of a stop at the listener. It is done; `detail` says what the arm answered."""
     return AuditNote(
         at=news.at,
         actor=news.actor,
         role=news.role,
         origin=news.origin,
         action="stop_fleet" if news.address.endswith("/fleet/stop") else "stop_robot",
-        request=line_of(f"POST {news.address} at the stop listener"),
+        request=f"POST {news.address} at the stop listener",
         robot=news.robot,
         outcome="done",
         status=200,
-        detail=line_of(news.text),
+        detail=news.text,
     )
 
 
@@ -170,7 +168,8 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
         services.robot(news.robot).queue.stop_asked(news.actor)
         with suppress(RuntimeError):  # the service is ending, and records no more events
             services.record_event_later(news.robot, "stop", news.text, actor=news.actor)
-        services.audit.writer.note(_note_of_stop(news))
+        note = _note_of_stop(news)
+        services.tell(lambda part: part.acted(note))
 
     services.stop_port = listener.getsockname()[1]
     door.stopped = stopped

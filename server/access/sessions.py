@@ -10,10 +10,9 @@ from sqlalchemy import delete, select
 
 from daq.contracts.service.queue import Role, role_of
 from server.access.caller import LOCAL, Caller
+from server.access.commands import note_command
 from server.access.digest import digest_of
 from server.access.session_cookie import STOPS_FOR
-from server.audit.command import by_command
-from server.audit.log import append_in
 from server.problems import ProblemError
 from server.store.engine import Store
 from server.store.tables import PersonRow, SessionRow
@@ -64,13 +63,13 @@ class SessionStore:
             session.execute(delete(SessionRow).where(SessionRow.digest == digest))
 
     def end_all(self, name: str, now: datetime, by: str = "unknown") -> int:
-        """Ends all sessions of a person, and returns how many there were. `by`: who does it, for the audit log."""
+        """Ends all sessions of a person, and returns how many there were. `by`: who does it."""
         with self._store.writing() as session:
             rows = list(session.scalars(select(SessionRow).filter_by(name=name)))
             for row in rows:
                 session.delete(row)
             if rows:
-                append_in(session, [by_command(now, by, "sign_out", "daq token sign-out", name)])
+                note_command(session, now, by, "sign_out", "daq token sign-out", name)
             return len(rows)
 
     def all(self, now: datetime) -> list[Caller]:

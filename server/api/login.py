@@ -75,7 +75,8 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
         return _told(request, services, problem)
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
-    services.audit.writer.note(_of_sign_in(request, caller, services))
+    note = _of_sign_in(request, caller, services)
+    services.tell(lambda part: part.acted(note))
     answer = RedirectResponse(f"{HOME}?robot={way.robot}" if way.robot else HOME, 303)
     _forget_cookie(answer, services, sign_in_cookie(_address(services)))
     _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict")
@@ -132,20 +133,19 @@ def _forget_cookie(answer: Response, services: Services, name: str) -> None:
 
 
 def _told(request: Request, services: Services, problem: ProblemError) -> Response:
-    """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details. The
-    audit log counts them, since anybody can cause them without end."""
+    """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details.
+    Anybody can cause them without end."""
     log.warning("sign-in: %s: %s", problem.kind, problem.detail)
     services.metrics.count_refusal(problem.kind)
-    services.audit.writer.count(
-        AuditNote(
-            at=services.clock.utc(),
-            actor=None,
-            origin=request.client.host if request.client else "unknown",
-            action=request.scope["route"].name,
-            request=f"GET {request.scope['path']}",
-            outcome="refused",
-            status=303,
-            detail=problem.kind,
-        )
+    note = AuditNote(
+        at=services.clock.utc(),
+        actor=None,
+        origin=request.client.host if request.client else "unknown",
+        action=request.scope["route"].name,
+        request=f"GET {request.scope['path']}",
+        outcome="refused",
+        status=303,
+        detail=problem.kind,
     )
+    services.tell(lambda part: part.acted(note, again=True))
     return RedirectResponse(f"{HOME}?sign-in={problem.kind}", 303)
