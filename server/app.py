@@ -23,7 +23,6 @@ from server.api import (
     fleet,
     jobs,
     live,
-    login,
     presets,
     programs,
     queue,
@@ -108,7 +107,6 @@ def bare_app(services: Services | None) -> FastAPI:
         traces,
         jobs,
         live,
-        login,
         system,
     ):
         api.include_router(part.router)

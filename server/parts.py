@@ -44,6 +44,9 @@ class Part:
     they start, and found again as `services.part(Class)`. It overrides what it needs of the following. The name of its
     log begins with `server.`, so that it is written as the others are."""
 
+    lets_people_in = False
+    """Whether people may come in without a token (`services.sessions`)."""
+
     def robots_made(self, robots: Sequence[Any]) -> None:
         """Is given the `RobotServices` of every robot, before anything starts."""
 

@@ -101,7 +101,8 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     """Makes the gate. Raises SpecError if tokens are needed and there is none."""
     loopback = is_loopback(section.host)
     local = _is_open_here(section)
-    if not local and section.oidc.issuer is None and all(token.revoked is not None for token in services.tokens.all()):
+    let_in = any(part.lets_people_in for part in services.parts)
+    if not local and not let_in and all(token.revoked is not None for token in services.tokens.all()):
         why, instead = 'server.tokens is "always"', 'say "remote"'
         if not loopback:
             why = f"server.host {section.host}: people at other computers could reach the robot"
@@ -119,7 +120,7 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         stop_port,
         metrics.count_request,
         metrics.count_refusal,
-        cookie=session_cookie(section.oidc.address),
+        cookie=session_cookie(section.address),
         parts=services.parts,
     )
 
@@ -138,7 +139,7 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         service_port=listener.getsockname()[1],
         open_on_loopback=_is_open_here(section),
         names=tuple(name.lower() for name in section.names),
-        cookie=session_cookie(section.oidc.address),
+        cookie=session_cookie(section.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
         database_url=database.render_as_string(hide_password=False),
         sqlite=sqlite_file(database),

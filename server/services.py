@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from daq.config.oidc import OidcSettings
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import Settings
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
-from daq.contracts.extras import require_extra
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
@@ -31,7 +29,6 @@ from daq.trajectories import control_period
 from server.access.caller import Caller
 from server.access.lanes import Lanes
 from server.access.sessions import SessionStore
-from server.access.sign_in import SignIns
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.bounded.messages import Limits
@@ -69,9 +66,6 @@ from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
 from server.store.waiting_events import WaitingEvents
-
-if TYPE_CHECKING:
-    from server.access.openid import Provider
 
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
@@ -177,8 +171,6 @@ class Services:
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self.sessions = SessionStore(self.store)
-        self.provider = _provider(settings.server.oidc)
-        self.sign_ins = SignIns(self.clock)
         self.signed_in: Callable[[Caller], None] = lambda _caller: None
         """Called when a session has begun, and when one was left, with its caller."""
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
@@ -425,16 +417,6 @@ def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
         thread.start()
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
-
-
-def _provider(settings: OidcSettings) -> Provider | None:
-    """Returns the provider of OpenID Connect. Raises SpecError, and MissingExtraError without Authlib."""
-    if settings.issuer is None:
-        return None
-    require_extra("oidc", "server.oidc", "authlib")
-    from server.access.openid import open_provider
-
-    return open_provider(settings)
 
 
 def _place(settings: Settings) -> RobotPlace:

@@ -272,18 +272,6 @@ class SessionRow(Table):
     expires: Mapped[datetime] = mapped_column(index=True)
 
 
-class PersonRow(Table):
-    """Somebody who has signed in, by the name of their first session. `subject`: the provider's number for them."""
-
-    __tablename__ = "people"
-    __table_args__ = (UniqueConstraint("issuer", "subject"),)
-
-    name: Mapped[str] = mapped_column(String(64), primary_key=True)
-    issuer: Mapped[str] = mapped_column(String(500))
-    subject: Mapped[str] = mapped_column(String(255))
-    since: Mapped[datetime]
-
-
 class TokenRow(Table):
     """A token's hash; the token itself is shown only once, when it is made."""
 
