@@ -17,14 +17,12 @@ from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
-    audit,
     controller,
     description,
     experiments,
     fleet,
     jobs,
     live,
-    login,
     presets,
     programs,
     queue,
@@ -108,9 +106,7 @@ def bare_app(services: Services | None) -> FastAPI:
         queue,
         traces,
         jobs,
-        audit,
         live,
-        login,
         system,
     ):
         api.include_router(part.router)

@@ -8,7 +8,7 @@ from server.clock import SystemClock
 from tests.daq_cli.invoke import CommandLine
 from tests.server.inside import service_inside
 
-PAGE = Path(__file__).parents[3] / "docs" / "audit.md"
+PAGE = Path(__file__).parents[4] / "docs" / "audit.md"
 
 
 def test_the_commands_of_the_page(

@@ -12,11 +12,11 @@ from sqlalchemy import text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.audit import AuditEntry, AuditNote
-from server.audit.chain import FIRST, Head, chained, first_misfit
-from server.audit.log import AuditLog, AuditSearch
+from extras.lab.audit.chain import FIRST, Head, chained, first_misfit
+from extras.lab.audit.log import AuditLog, AuditSearch
+from extras.lab.audit.tables import AuditRow
 from server.store.engine import Store
-from server.store.tables import AuditRow
-from tests.server.audit.notes import BEGUN, made_note
+from tests.extras.lab.audit.notes import BEGUN, made_note
 
 WHAT = "the audit log is append-only"
 COLUMNS = [column.name for column in AuditRow.__table__.columns if column.name != "sequence"]

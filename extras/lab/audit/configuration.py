@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from daq.config.section import Section
 from daq.config.settings import Settings
 from daq.contracts.service.audit import AuditNote
-from server.audit.log import AuditLog
+from extras.lab.audit.log import AuditLog
 from server.store.address import address_of, masked
 
 STARTED = "start_service"

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 from starlette.types import Message, Receive, Scope, Send
 
 from daq.contracts.service.audit import AuditNote, Outcome
-from server.audit.words import content_of, line_of
-from server.audit.writer import AuditWriter
+from extras.lab.audit.words import content_of, line_of
+from extras.lab.audit.writer import AuditWriter
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 CHANGE_NOTHING = frozenset(["preview_experiment"])
@@ -47,27 +47,22 @@ class Asker(Protocol):
         ...
 
 
-class Audit:
-    """Makes a note of every request that may change something."""
-
-    def __init__(self, writer: AuditWriter, utc: Callable[[], datetime]) -> None:
-        self.writer = writer
-        self.utc = utc
-
-    def watched(self, scope: Scope, *, with_content: bool) -> AskedRequest | None:
-        """Returns a watch over a request; None for one that only asks. `with_content`: whether its body is kept; a file
-        has its digest alone."""
-        return None if scope["method"] in SAFE_METHODS else AskedRequest(self, scope, with_content=with_content)
+def asked_request(
+    writer: AuditWriter, utc: Callable[[], datetime], scope: Scope, *, with_content: bool
+) -> AskedRequest | None:
+    """Returns a watch over a request; None for one that only asks. `with_content`: whether its body is kept; a file
+    has its digest alone."""
+    return None if scope["method"] in SAFE_METHODS else AskedRequest(writer, utc(), scope, with_content=with_content)
 
 
 class AskedRequest:
     """One request. Wrap what it receives and what it is sent; the row is noted with the end of the answer."""
 
-    def __init__(self, audit: Audit, scope: Scope, *, with_content: bool) -> None:
-        self._audit = audit
+    def __init__(self, writer: AuditWriter, at: datetime, scope: Scope, *, with_content: bool) -> None:
+        self._writer = writer
         self._scope = scope
         self._with_content = with_content
-        self._at = audit.utc()
+        self._at = at
         self._body, self._size, self._sha256 = b"", 0, hashlib.sha256()
         self._answer, self._status, self._noted = b"", 500, False
 
@@ -115,9 +110,9 @@ class AskedRequest:
         self._noted = True
         note = self._made(action)
         if action in COUNTED or self._status in COUNTED_REFUSALS:
-            self._audit.writer.count(note)
+            self._writer.count(note)
             return None
-        return self._audit.writer.note(note)
+        return self._writer.note(note)
 
     def _action(self) -> str:
         return str(getattr(self._scope.get("route"), "name", "unknown"))[:64]

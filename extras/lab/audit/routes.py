@@ -8,8 +8,9 @@ from fastapi import APIRouter, Query
 
 from daq.contracts.service.audit import AuditEntry, Outcome
 from daq.contracts.service.base import Moment, Page
-from server.api.dependencies import Auditor, CursorOf, Limit, ServicesDep
-from server.audit.log import AuditSearch
+from extras.lab.audit.log import AuditSearch
+from extras.lab.audit.part import AuditPart
+from server.api.dependencies import CursorOf, Limit, Operator, ServicesDep
 from server.problems import PROBLEMS
 
 router = APIRouter(tags=["system"], responses=PROBLEMS)
@@ -24,7 +25,7 @@ def _equals(what: str, longest: int = 200) -> object:
 @router.get("/audit")
 def list_audit(
     services: ServicesDep,
-    _: Auditor,
+    _: Operator,
     actor: Annotated[str | None, _equals("name of a token")] = None,
     robot: Annotated[str | None, _equals("robot")] = None,
     action: Annotated[str | None, _equals("action", 64)] = None,
@@ -39,6 +40,7 @@ def list_audit(
 
     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
     """
-    services.audit.writer.flush(FLUSHED_WITHIN)
+    audit = services.part(AuditPart)
+    audit.writer.flush(FLUSHED_WITHIN)
     search = AuditSearch(actor, robot, action, subject, outcome, since, until)
-    return services.audit_log.page(search, cursor, limit)
+    return audit.log.page(search, cursor, limit)

@@ -10,9 +10,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from server.clock import SystemClock
+from tests.extras.lab.oidc.provider import Provider, running_provider
+from tests.extras.lab.oidc.test_sign_in import OPERATORS, service_of_people
 from tests.server.access.people import SPEC, people_at
-from tests.server.access.provider import Provider, running_provider
-from tests.server.access.test_sign_in import OPERATORS, service_of_people
 from tests.server.dashboard.browser import PATIENCE_MS, WIDE
 from tests.server.inside import service_inside
 from tests.server.queue.test_review import seems_real

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import ipaddress
 from pathlib import Path
 from typing import Annotated, Self
-from urllib.parse import urlsplit
 
 from pydantic import Field, field_validator, model_validator
 
-from daq.contracts.frozen import FrozenRecord
+from daq.config.section import Section
+from daq.config.service import ServiceSettings, protected
+from daq.config.settings import Settings
+from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role
 
 Claim = Annotated[str, Field(min_length=1, max_length=200)]
 
 
-class OidcSettings(FrozenRecord):
-    """Section `[server.oidc]`. Without an issuer there is none, and people use tokens."""
+class OidcSettings(Section):
+    """Section `[oidc]`. Without an issuer there is none, and people use tokens. The provider sends people back to
+    /api/v1/login/callback below `server.address`."""
+
+    SHOWN = frozenset(["issuer", "client_id", "label", "scopes", "name_claim", "role_claim", "roles", "hours"])
 
     issuer: Annotated[str, Field(max_length=500)] | None = None
     """Address of the provider, exactly as it names itself. Its keys and endpoints are found below it."""
@@ -24,8 +28,6 @@ class OidcSettings(FrozenRecord):
     """Name by which the provider knows this service."""
     client_secret: Path | None = None
     """File with the secret that the provider gave this service; None for a public client, which has PKCE alone."""
-    address: Annotated[str, Field(max_length=500)] | None = None
-    """Address at which browsers reach this service. The provider sends people back to /api/v1/login/callback there."""
     label: Annotated[str, Field(min_length=1, max_length=60)] = "single sign-on"
     """What the page calls the provider: "Sign in with …"."""
     scopes: tuple[Annotated[str, Field(pattern=r"^[\x21\x23-\x5b\x5d-\x7e]{1,100}$")], ...] = ("openid", "profile")
@@ -39,22 +41,10 @@ class OidcSettings(FrozenRecord):
     hours: Annotated[float, Field(gt=0, le=720)] = 12.0
     """Time (h) after which people must sign in again. A role that the provider takes away lasts until then."""
 
-    @field_validator("issuer", "address")
+    @field_validator("issuer")
     @classmethod
     def _is_protected(cls, address: str | None) -> str | None:
-        """Raises ValueError for an address that is none, or over which a code could be read on the way."""
-        if address is None:
-            return None
-        try:
-            parts = urlsplit(address)
-            _ = parts.port
-        except ValueError:
-            raise ValueError("is no address; write https://host") from None
-        if not parts.hostname or parts.username is not None or parts.query or parts.fragment:
-            raise ValueError("is no address; write https://host")
-        if parts.scheme != "https" and not (parts.scheme == "http" and _is_loopback(parts.hostname)):
-            raise ValueError("must begin with https://, unless it is on this computer")
-        return address
+        return protected(address)
 
     @field_validator("client_secret")
     @classmethod
@@ -65,14 +55,21 @@ class OidcSettings(FrozenRecord):
     def _is_complete(self) -> Self:
         """Raises ValueError for a provider without what is needed to use it."""
         if self.issuer is not None:
-            for name in ("client_id", "address", "roles"):
+            for name in ("client_id", "roles"):
                 if not getattr(self, name):
                     raise ValueError(f"{name} is missing, which an issuer needs")
         return self
 
 
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+def check(settings: Settings) -> None:
+    """Raises SpecError where people are to sign in, and the service's own address is not said."""
+    section = settings.section(OidcSettings)
+    if section.issuer is not None:
+        require_address(section, settings.server)
+
+
+def require_address(section: OidcSettings, server: ServiceSettings) -> str:
+    """Returns the address at which browsers reach the service. Raises SpecError where it is not said."""
+    if server.address is None:
+        raise SpecError(f"server.address is missing, which oidc.issuer {section.issuer} needs")
+    return server.address

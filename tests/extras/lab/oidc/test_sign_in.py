@@ -20,8 +20,8 @@ from websockets.sync.client import connect
 
 from server.access.sessions import SessionStore
 from server.store.engine import Store
+from tests.extras.lab.oidc.provider import Provider, running_provider
 from tests.server.access.people import LATER, SPEC, kind_of
-from tests.server.access.provider import Provider, running_provider
 from tests.server.service import Service, running_service
 
 OPERATORS = {"preferred_username": "anna", "groups": ["staff", "robot-operators"]}
@@ -44,11 +44,11 @@ def _configure(folder: Path, issuer: str, port: int, **more: object) -> None:
 tokens = "always"
 stop_port = 0
 connect_at_start = false
+address = "http://127.0.0.1:{port}"
 
-[server.oidc]
+[oidc]
 issuer = "{issuer}"
 client_id = "ma2000"
-address = "http://127.0.0.1:{port}"
 roles = {{ robot-operators = "operator", robot-owners = "owner", robot-guests = "viewer", robot-admins = "admin" }}
 label = "the laboratory"
 {chr(10).join(lines)}

@@ -6,6 +6,8 @@ import json
 import re
 from typing import Any
 
+from daq.contracts.service.audit import AuditNote
+
 LONGEST_LINE = 600
 """Length of an address or a reason in the log."""
 HIDDEN = "(not in the log)"
@@ -23,6 +25,12 @@ def line_of(text: object) -> str:
         sign if sign.isprintable() else sign.encode("unicode_escape", "backslashreplace").decode() for sign in whole
     )
     return shown if len(shown) <= LONGEST_LINE else shown[: LONGEST_LINE - 1] + "…"
+
+
+def cleaned(note: AuditNote) -> AuditNote:
+    """Returns a note whose texts may stand in the log."""
+    short = {name: line_of(said)[:200] for name in ("actor", "origin", "subject") if (said := getattr(note, name))}
+    return note.model_copy(update={**short, "request": line_of(note.request), "detail": line_of(note.detail)})
 
 
 def content_of(body: bytes) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from datetime import timedelta
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -12,12 +12,17 @@ from fastapi.responses import RedirectResponse
 
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import LoginWays, OpenIdWay, SignedOut
+from extras.lab.oidc.part import SigningIn
+from extras.lab.oidc.people import name_of
+from extras.lab.oidc.sign_in import GOOD_FOR
 from server.access.caller import Caller
 from server.access.session_cookie import is_over_tls, session_cookie, sign_in_cookie
-from server.access.sign_in import GOOD_FOR
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS, ProblemError, not_found
 from server.services import Services
+
+if TYPE_CHECKING:
+    from extras.lab.oidc.provider import Provider
 
 START = "/api/v1/login/start"
 HOME = "../../../"
@@ -29,9 +34,10 @@ log = logging.getLogger("server.access")
 @router.get("/login")
 async def get_login_ways(services: ServicesDep) -> LoginWays:
     """Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token."""
-    if services.provider is None:
+    signing_in = services.part(SigningIn)
+    if signing_in.provider is None:
         return LoginWays()
-    return LoginWays(openid=OpenIdWay(label=services.settings.server.oidc.label, start=START))
+    return LoginWays(openid=OpenIdWay(label=signing_in.settings.label, start=START))
 
 
 @router.get("/login/start", include_in_schema=False)
@@ -41,10 +47,8 @@ async def start_login(
     robot: Annotated[str, Query(pattern=r"^([a-z0-9][a-z0-9_-]{0,31})?$", description="What to show afterwards.")] = "",
 ) -> Response:
     """Sends the browser to the provider of OpenID Connect."""
-    provider = services.provider
-    if provider is None:
-        raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
-    asked, cookie = services.sign_ins.begin(robot)
+    signing_in, provider = _signing_in(services)
+    asked, cookie = signing_in.sign_ins.begin(robot)
     try:
         address = await provider.ask(asked, services.clock.monotonic())
     except ProblemError as problem:
@@ -61,21 +65,23 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
 
     A refused answer leads to the page's sign-in, with the problem's kind in the address.
     """
-    provider = services.provider
-    if provider is None:
-        raise not_found("sign-in by OpenID Connect", "the section [server.oidc] of the configuration names a provider")
+    signing_in, provider = _signing_in(services)
     given = dict(request.query_params)
     cookie = request.cookies.get(sign_in_cookie(_address(services)), "")
-    lasts = timedelta(hours=services.settings.server.oidc.hours)
+    lasts = timedelta(hours=signing_in.settings.hours)
     try:
-        with services.sign_ins.answer(given.get("state", ""), cookie) as way:
+        with signing_in.sign_ins.answer(given.get("state", ""), cookie) as way:
             person = await provider.answered(way.asked, given, services.clock.monotonic())
-            secret, caller = await run_in_threadpool(services.sessions.begin, person, services.clock.utc(), lasts)
+            now = services.clock.utc()
+            secret, caller = await run_in_threadpool(
+                services.sessions.begin, lambda session: name_of(session, person, now), person.role, now, lasts
+            )
     except ProblemError as problem:
         return _told(request, services, problem)
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
-    services.audit.writer.note(_of_sign_in(request, caller, services))
+    note = _of_sign_in(request, caller, services)
+    services.tell(lambda part: part.acted(note))
     answer = RedirectResponse(f"{HOME}?robot={way.robot}" if way.robot else HOME, 303)
     _forget_cookie(answer, services, sign_in_cookie(_address(services)))
     _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict")
@@ -90,8 +96,8 @@ async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> 
         await run_in_threadpool(services.sessions.end, caller.token)
         await run_in_threadpool(services.signed_out, caller)
         log.info("%s has signed out", caller.name)
-        if services.provider is not None:
-            address = await services.provider.sign_out_address(services.clock.monotonic())
+        if (provider := services.part(SigningIn).provider) is not None:
+            address = await provider.sign_out_address(services.clock.monotonic())
     _forget_cookie(response, services, session_cookie(_address(services)))
     return SignedOut(provider=address)
 
@@ -110,8 +116,16 @@ def _of_sign_in(request: Request, caller: Caller, services: Services) -> AuditNo
     )
 
 
+def _signing_in(services: Services) -> tuple[SigningIn, Provider]:
+    """Returns the part and its provider. Raises a 404 where there is none."""
+    found = services.part(SigningIn)
+    if found.provider is None:
+        raise not_found("sign-in by OpenID Connect", "the section [oidc] of the configuration names a provider")
+    return found, found.provider
+
+
 def _address(services: Services) -> str | None:
-    return services.settings.server.oidc.address
+    return services.settings.server.address
 
 
 def _set_cookie(answer: Response, services: Services, name: str, value: str, seconds: int, same_site: str) -> None:
@@ -132,20 +146,19 @@ def _forget_cookie(answer: Response, services: Services, name: str) -> None:
 
 
 def _told(request: Request, services: Services, problem: ProblemError) -> Response:
-    """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details. The
-    audit log counts them, since anybody can cause them without end."""
+    """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details.
+    Anybody can cause them without end."""
     log.warning("sign-in: %s: %s", problem.kind, problem.detail)
     services.metrics.count_refusal(problem.kind)
-    services.audit.writer.count(
-        AuditNote(
-            at=services.clock.utc(),
-            actor=None,
-            origin=request.client.host if request.client else "unknown",
-            action=request.scope["route"].name,
-            request=f"GET {request.scope['path']}",
-            outcome="refused",
-            status=303,
-            detail=problem.kind,
-        )
+    note = AuditNote(
+        at=services.clock.utc(),
+        actor=None,
+        origin=request.client.host if request.client else "unknown",
+        action=request.scope["route"].name,
+        request=f"GET {request.scope['path']}",
+        outcome="refused",
+        status=303,
+        detail=problem.kind,
     )
+    services.tell(lambda part: part.acted(note, again=True))
     return RedirectResponse(f"{HOME}?sign-in={problem.kind}", 303)

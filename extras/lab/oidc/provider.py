@@ -22,11 +22,11 @@ from joserfc.errors import JoseError
 from joserfc.jwk import KeySet
 from joserfc.jws import JWSRegistry
 
-from daq.config.oidc import OidcSettings
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import ROLES
-from server.access.sessions import Person
-from server.access.sign_in import Asked
+from extras.lab.oidc.people import Person
+from extras.lab.oidc.settings import OidcSettings
+from extras.lab.oidc.sign_in import Asked
 from server.problems import ProblemError
 
 ANSWER_WITHIN = 10.0
@@ -44,12 +44,11 @@ log = logging.getLogger("server.access")
 class Provider:
     """One provider. Its endpoints and keys are read when somebody first signs in. Use it on the event loop only."""
 
-    def __init__(self, settings: OidcSettings, secret: str | None) -> None:
+    def __init__(self, settings: OidcSettings, address: str, secret: str | None) -> None:
         assert settings.issuer is not None
         assert settings.client_id is not None
-        assert settings.address is not None
         self.issuer, self.client_id = settings.issuer, settings.client_id
-        self.address = settings.address.rstrip("/")
+        self.address = address.rstrip("/")
         self._settings = settings
         self._secret = secret
         self._found: dict[str, Any] = {}
@@ -170,11 +169,9 @@ class Provider:
         )
 
 
-def open_provider(settings: OidcSettings) -> Provider | None:
-    """Returns the configured provider, None if there is none. It is asked for nothing yet. Raises SpecError for a file
-    of the secret that cannot be read."""
-    if settings.issuer is None:
-        return None
+def open_provider(settings: OidcSettings, address: str) -> Provider:
+    """Returns the configured provider, which is asked for nothing yet. `address`: where browsers reach this service.
+    Raises SpecError for a file of the secret that cannot be read."""
     secret = None
     if settings.client_secret is not None:
         try:
@@ -182,10 +179,10 @@ def open_provider(settings: OidcSettings) -> Provider | None:
         except (OSError, UnicodeDecodeError) as error:
             # Without the value: whoever writes the secret itself there shall not find it in a log.
             why = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise SpecError(f"server.oidc.client_secret: names a file that cannot be read: {why}") from None
+            raise SpecError(f"oidc.client_secret: names a file that cannot be read: {why}") from None
         if not secret:
-            raise SpecError("server.oidc.client_secret: names a file that is empty")
-    return Provider(settings, secret)
+            raise SpecError("oidc.client_secret: names a file that is empty")
+    return Provider(settings, address, secret)
 
 
 def person_of(claims: Mapping[str, Any], settings: OidcSettings) -> Person:
@@ -193,12 +190,12 @@ def person_of(claims: Mapping[str, Any], settings: OidcSettings) -> Person:
     name, given = claims.get(settings.name_claim), claims.get(settings.role_claim)
     if not isinstance(name, str) or not 1 <= len(name) <= 64 or not name.isprintable():
         line = f"the claim {settings.name_claim!r} has no name of 1 to 64 printable characters"
-        raise ProblemError(403, "no-name", line, "choose another claim: server.oidc.name_claim")
+        raise ProblemError(403, "no-name", line, "choose another claim: oidc.name_claim")
     groups = [given] if isinstance(given, str) else given if isinstance(given, list) else []
     held = {settings.roles[group] for group in groups if isinstance(group, str) and group in settings.roles}
     if not held:
         line = f"{name} is in no group that has a role here"
-        raise ProblemError(403, "no-role", line, "ask whoever looks after the service: server.oidc.roles")
+        raise ProblemError(403, "no-role", line, "ask whoever looks after the service: oidc.roles")
     return Person(str(claims["iss"]), str(claims["sub"]), name, max(held, key=ROLES.index))
 
 

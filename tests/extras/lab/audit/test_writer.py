@@ -9,11 +9,11 @@ import pytest
 from sqlalchemy import text
 
 from daq.contracts.service.audit import AuditEntry
-from server.audit.log import AuditLog, AuditSearch
-from server.audit.repeats import COUNTED_FOR, MOST_KEYS, Repeats
-from server.audit.writer import AuditWriter
+from extras.lab.audit.log import AuditLog, AuditSearch
+from extras.lab.audit.repeats import COUNTED_FOR, MOST_KEYS, Repeats
+from extras.lab.audit.writer import AuditWriter
 from server.store.engine import Store
-from tests.server.audit.notes import made_note
+from tests.extras.lab.audit.notes import made_note
 
 WITHIN = 60.0
 
@@ -76,7 +76,7 @@ def test_what_could_not_be_written_before_the_end_is_written_after_the_next_star
 def test_rows_that_find_no_room_in_memory_are_in_the_log_and_counted(
     sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("server.audit.writer.MOST_WAITING", 2)
+    monkeypatch.setattr("extras.lab.audit.writer.MOST_WAITING", 2)
     with writing(sqlite_store, tmp_path) as writer, caplog.at_level(logging.ERROR, "server.audit"):
         with away(sqlite_store):
             for n in range(5):

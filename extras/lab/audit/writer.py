@@ -16,8 +16,8 @@ from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.audit import AuditNote
-from server.audit.log import AuditLog
-from server.audit.repeats import Repeats
+from extras.lab.audit.log import AuditLog
+from extras.lab.audit.repeats import Repeats
 from server.database_errors import is_value, one_line
 
 AT_ONCE = 200

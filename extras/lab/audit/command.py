@@ -15,7 +15,7 @@ from daq_cli.app.database import service_database
 
 if TYPE_CHECKING:
     from daq.contracts.service.audit import AuditEntry
-    from server.audit.chain import Head
+    from extras.lab.audit.chain import Head
 
 app = typer.Typer(add_completion=False, help="Show who asked the service for what; check the log of it.")
 
@@ -36,7 +36,7 @@ def audit(
     """Show the newest rows of the audit log, the newest last."""
     if context.invoked_subcommand is not None:
         return
-    from server.audit.log import AuditLog, AuditSearch
+    from extras.lab.audit.log import AuditLog, AuditSearch
 
     search = AuditSearch(actor, robot, action, outcome=outcome, since=None if since is None else since.astimezone())
     found: list[AuditEntry] = []
@@ -64,7 +64,7 @@ def verify(
     json: JsonOption = False,
 ) -> None:
     """Check every row of the audit log. Names the first row that is not as it was written; exit code 5, then."""
-    from server.audit.log import AuditLog
+    from extras.lab.audit.log import AuditLog
 
     known = None if head is None else _parse_head(head)
     store = service_database(invocation(context))
@@ -91,7 +91,7 @@ def _line(entry: AuditEntry) -> str:
 
 
 def _parse_head(text: str) -> Head:
-    from server.audit.chain import Head
+    from extras.lab.audit.chain import Head
 
     number, _, digest = text.partition(":")
     if not (number.isascii() and number.isdecimal() and len(digest) == 64 and set(digest) <= set("0123456789abcdef")):

@@ -11,11 +11,12 @@ from sqlalchemy.orm import Session
 
 from daq.contracts.service.audit import AuditEntry, AuditNote, Outcome
 from daq.contracts.service.base import Page
-from server.audit.chain import Head, Misfit, chained, first_misfit
+from extras.lab.audit.chain import Head, Misfit, chained, first_misfit
+from extras.lab.audit.tables import AuditRow
+from extras.lab.audit.words import cleaned
 from server.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.pages import newest_first
-from server.store.tables import AuditRow
 
 AT_ONCE = 1000
 """Number of rows that are read at a time when the whole log is read."""
@@ -121,6 +122,11 @@ def append_in(session: Session, notes: Iterable[AuditNote]) -> Head:
         session.execute(insert(AuditRow), rows)
         head = Head(entries[-1].number, entries[-1].digest)
     return head
+
+
+def append_command(session: Session, note: AuditNote) -> None:
+    """Adds the row of a command on the service's own computer, within its transaction."""
+    append_in(session, [cleaned(note)])
 
 
 def _head(session: Session) -> Head:

@@ -1,4 +1,4 @@
-"""`python -m tests.server.access.provider PORT`: a provider of OpenID Connect, the package oidc-provider-mock, in a
+"""`python -m tests.extras.lab.oidc.provider PORT`: a provider of OpenID Connect, the package oidc-provider-mock, in a
 process of its own. That one does not look at PKCE; here Authlib's server side does, as it would in a real provider."""
 
 import os
@@ -47,7 +47,7 @@ class Provider:
 def running_provider(port: int = 0) -> Iterator[Provider]:
     """A provider with a new key."""
     environment = os.environ | {"AUTHLIB_INSECURE_TRANSPORT": "1"}
-    command = [sys.executable, "-W", "ignore", "-m", "tests.server.access.provider", str(port)]
+    command = [sys.executable, "-W", "ignore", "-m", "tests.extras.lab.oidc.provider", str(port)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment)
     try:
         assert process.stdout is not None
