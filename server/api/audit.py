@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 
 from daq.contracts.service.audit import AuditEntry, Outcome
 from daq.contracts.service.base import Moment, Page
 from server.api.dependencies import Auditor, CursorOf, Limit, ServicesDep
 from server.audit.log import AuditSearch
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+router = Router(tags=["system"], responses=PROBLEMS)
 FLUSHED_WITHIN = 1.0
 """Time (s) to write the rows that wait, so that a list has what was asked before it."""
 
