@@ -26,7 +26,7 @@ def serve(
     from daq.transport.url import parse_port_url
     from server import logs
 
-    require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "alembic", "prometheus_client")
+    require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "prometheus_client")
     logs.begin()  # first, so that errors of the configuration are lines of the log, too
     call = invocation(context)
     settings = call.configuration

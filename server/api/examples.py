@@ -85,8 +85,7 @@ from daq.contracts.service.teaching import (
 )
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 from daq.contracts.trace import TraceEvent, TraceRecord
-from daq.teaching import Program
-from daq.teaching.program import Absolute, Gripper, Wait
+from daq.teaching.program import Absolute, Gripper, Program, Wait
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement
 from model.comparison.difference import ParameterDifference
 from model.machine_model.model import base_model

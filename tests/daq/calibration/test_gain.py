@@ -15,7 +15,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace, TraceRecord
 from daq.safety import check_plan
-from daq.trajectories import plan, start_angles
+from daq.trajectories.planner import plan, start_angles
 
 MA2000 = load_machine("ma2000")
 ROUNDINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {

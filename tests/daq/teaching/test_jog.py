@@ -8,9 +8,18 @@ from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
 from daq.contracts.sample import SampleRow
-from daq.runner import StoppedError
-from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, TeachingError, jog
-from daq.teaching.jog import SLIDE_JOG_SPEED, require_step_speed, top_speed
+from daq.runner.arm_control import StoppedError
+from daq.teaching.arm import TeachingError
+from daq.teaching.jog import (
+    DEAD_MAN,
+    JOG_SPEED,
+    SLIDE_JOG_SPEED,
+    JogCommand,
+    Jogger,
+    jog,
+    require_step_speed,
+    top_speed,
+)
 from daq_cli.robot.pendant import Pendant
 from tests.daq.sliding_axis import slide_and_turn
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, PERIOD, REST, StandIn

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
-from daq.trajectories import control_period, make_plan, plan, plan_move, representable_angles, start_angles
+from daq.trajectories.move import plan_move
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.set_points import control_period, make_plan, representable_angles
 from firmware_protocol.errors import UnitsError
 from tests.daq.trajectories.machines import MA2000, PERIOD, motion, planned
 

@@ -9,7 +9,9 @@ import pytest
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Cubic, ExperimentSpec, Multisine, Ramp, Sine, SlowRamp, Staircase, Step, Trajectory
 from daq.safety import check_plan
-from daq.trajectories import PRESETS, Plan, plan, preset, start_angles
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.presets import PRESETS, preset
+from daq.trajectories.set_points import Plan
 from tests.daq.trajectories.machines import MA2000
 
 
