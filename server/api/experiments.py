@@ -75,7 +75,7 @@ def submit_experiment(
 
 
 @router.get("")
-async def list_experiments(
+def list_experiments(
     rig: RobotDep,
     services: ServicesDep,
     _: Viewer,
@@ -86,7 +86,7 @@ async def list_experiments(
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
     """Lists experiments, the last submitted or the last ended first."""
-    page = await services.experiments.page.fetch(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
+    page = services.experiments.page(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
     return page.model_copy(update={"items": tuple(rig.queue.with_progress(item) for item in page.items)})
 
 
