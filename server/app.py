@@ -16,14 +16,12 @@ from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
-    audit,
     controller,
     description,
     experiments,
     fleet,
     jobs,
     live,
-    login,
     presets,
     programs,
     queue,
@@ -106,9 +104,7 @@ def bare_app(services: Services | None) -> FastAPI:
         queue,
         traces,
         jobs,
-        audit,
         live,
-        login,
         system,
     ):
         include(app, part.router, API)

@@ -272,18 +272,6 @@ class SessionRow(Table):
     expires: Mapped[datetime] = mapped_column(index=True)
 
 
-class PersonRow(Table):
-    """Somebody who has signed in, by the name of their first session. `subject`: the provider's number for them."""
-
-    __tablename__ = "people"
-    __table_args__ = (UniqueConstraint("issuer", "subject"),)
-
-    name: Mapped[str] = mapped_column(String(64), primary_key=True)
-    issuer: Mapped[str] = mapped_column(String(500))
-    subject: Mapped[str] = mapped_column(String(255))
-    since: Mapped[datetime]
-
-
 class TokenRow(Table):
     """A token's hash; the token itself is shown only once, when it is made."""
 
@@ -295,31 +283,3 @@ class TokenRow(Table):
     digest: Mapped[str] = mapped_column(String(64), unique=True)
     created: Mapped[datetime]
     revoked: Mapped[datetime | None]
-
-
-class AuditRow(Table):
-    """One row of the audit log. Triggers refuse to change or delete it, and to insert one anywhere but at the end."""
-
-    __tablename__ = "audit"
-    __table_args__ = (
-        Index("audit_by_actor", "actor", "sequence"),
-        Index("audit_by_robot", "robot", "sequence"),
-    )
-
-    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    at: Mapped[datetime]
-    actor: Mapped[str | None]
-    role: Mapped[str | None] = mapped_column(String(16))
-    origin: Mapped[str]
-    action: Mapped[str] = mapped_column(String(64))
-    request: Mapped[str] = mapped_column(Text)
-    robot: Mapped[str | None] = mapped_column(String(64))
-    subject: Mapped[str | None]
-    outcome: Mapped[str] = mapped_column(String(16))
-    status: Mapped[int | None]
-    detail: Mapped[str] = mapped_column(Text)
-    content: Mapped[str | None] = mapped_column(Text)
-    request_id: Mapped[str | None] = mapped_column(String(16))
-    count: Mapped[int]
-    previous: Mapped[str] = mapped_column(String(64))
-    digest: Mapped[str] = mapped_column(String(64))

@@ -452,7 +452,7 @@ class Scene:
             jobs=None,
             models=None,
             unattended=True,
-            audit=None,
+            jogged=None,
         )
 
     def _stopped_here(self) -> StopResult:
