@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 from typing import Annotated
 
@@ -39,6 +40,7 @@ def serve(
         raise SpecError("--port: several robots are configured, each with a port of its own: robots.NAME.port")
     for own in settings.each_robot():  # an invalid port is refused now, instead of being retried
         parse_port_url(own.port)
+    gc.disable()  # collections would be a tenth of the start, and find nothing; `keep_steady` lets them begin
     from server.serve import serve as run
 
     run(settings.model_copy(update={"server": section}), _announce)
