@@ -88,6 +88,8 @@ class Plugin:
     migrations: Mapping[str, str] = field(default_factory=dict)
     """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
     database, each named so that it begins with this name."""
+    databases: Mapping[str, str] = field(default_factory=dict)
+    """Kinds of databases beside SQLite, by SQLAlchemy's name: `server.store.databases.Database`, as "module:object"."""
     noted: tuple[str, ...] = ()
     """Functions of a session of the database and an `AuditNote`, as "module:function". They are called for each command
     beside the service that changes who may use it, within the command's transaction."""
