@@ -86,8 +86,8 @@ class Plugin:
     """Functions of the `Settings`, as "module:function", that `daq config check` calls: each raises SpecError for what
     cannot be used."""
     migrations: Mapping[str, str] = field(default_factory=dict)
-    """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
-    database, each named so that it begins with this name."""
+    """Packages of migrations (`server/store/schema.py`), by a name that no other plug-in uses. They make tables of the
+    service's database, each named so that it begins with this name."""
     databases: Mapping[str, str] = field(default_factory=dict)
     """Kinds of databases beside SQLite, by SQLAlchemy's name: `server.store.databases.Database`, as "module:object"."""
     noted: tuple[str, ...] = ()
@@ -96,7 +96,7 @@ class Plugin:
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     routes: tuple[str, ...] = ()
-    """Routers of FastAPI below /api/v1, as "module:router"."""
+    """Routers below /api/v1, as "module:router": of `server.routes`, or FastAPI's."""
 
 
 @cache

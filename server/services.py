@@ -25,7 +25,7 @@ from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
 from daq.plugins import named, plugins
-from daq.trajectories import control_period
+from daq.trajectories.set_points import control_period
 from server.access.caller import Caller
 from server.access.lanes import Lanes
 from server.access.sessions import SessionStore

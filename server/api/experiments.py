@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
@@ -38,13 +38,14 @@ from server.catalogue.room import require_room
 from server.experiments.length import LONGEST, least_length, points_of
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
+from server.routes import Router
 from server.services import RobotServices, Services
 
 MOST_SHOWN = 5000
 """Most set points in a preview; of a longer motion every second, third, … is returned."""
 SHORT, FEW_POINTS = 60.0, 5000
 """Longest motion (s) and most given set points that are planned here, in a moment; others are planned by a process."""
-router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
 StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only experiments in one of these states.")]
 
 

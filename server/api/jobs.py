@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from fastapi.responses import FileResponse
 
 from daq.contracts.service.base import Page
@@ -40,8 +40,9 @@ from server.jobs.results import JobResult
 from server.jobs.service import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
 """A report is a single page with inline styles and no script."""
 MOST_OF_A_LINEAGE = 500

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
@@ -31,9 +31,10 @@ from server.api.dependencies import (
 from server.api.upload import store_upload
 from server.catalogue.thinning import thinned
 from server.problems import PROBLEMS, TITLES
+from server.routes import Router
 from server.store.traces import TraceSearch
 
-router = APIRouter(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
 
 MCAP = "application/octet-stream"
 CSV = "text/csv"

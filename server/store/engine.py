@@ -11,7 +11,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from alembic import command
 from pydantic import ValidationError
 from sqlalchemy import URL, Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
@@ -20,7 +19,7 @@ from sqlalchemy.orm import Session, sessionmaker
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
-from server.store.schema import migrations
+from server.store.schema import upgrade
 
 BUSY_TIMEOUT_MS = 5000
 """Time to wait for a lock: another process (`daq token`, a backup) may hold the write lock for a moment."""
@@ -67,9 +66,7 @@ class Store:
         """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version."""
         try:
             with self.engine.connect() as connection:
-                for config in migrations().values():
-                    config.attributes["connection"] = connection
-                    command.upgrade(config, "head")
+                upgrade(connection)
                 connection.commit()
         except OperationalError as error:
             line = f"database {self.place}: cannot be opened: {line_of(error)}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 
 from daq.contracts.service.audit import AuditEntry, Outcome
 from daq.contracts.service.base import Moment, Page
@@ -12,8 +12,9 @@ from extras.lab.audit.log import AuditSearch
 from extras.lab.audit.part import AuditPart
 from server.api.dependencies import CursorOf, Limit, Operator, ServicesDep
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+router = Router(tags=["system"], responses=PROBLEMS)
 FLUSHED_WITHIN = 1.0
 """Time (s) to write the rows that wait, so that a list has what was asked before it."""
 

@@ -8,8 +8,6 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from alembic.script import ScriptDirectory
-from alembic.util import CommandError
 from sqlalchemy.exc import DatabaseError
 
 from daq_cli.app.database import computers_user
@@ -20,6 +18,7 @@ from server.store.address import file_address
 from server.store.engine import BUSY_TIMEOUT_MS, Store
 from server.store.schema import (
     VERSION,
+    UnknownRevisionError,
     difference,
     expected_schema,
     foreign,
@@ -73,7 +72,7 @@ def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
             strange = foreign(found, own)
             for kind, name in strange:
                 remove(connection.execute, kind, name)
-    except CommandError as error:
+    except UnknownRevisionError as error:
         raise BackupError(f"database {database.name}: {one_line(error)}: the backup is damaged") from error
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
@@ -176,6 +175,5 @@ def _has_table(connection: sqlite3.Connection, name: str) -> bool:
 
 def require_known(revision: str | None) -> None:
     """Raises BackupError for tables that no migration of this program makes."""
-    known = {script.revision for script in ScriptDirectory.from_config(migrations()[VERSION]).walk_revisions()}
-    if revision is not None and revision not in known:
+    if revision is not None and revision not in migrations()[VERSION]:
         raise BackupError(f"the backup's tables are of another version ({revision}): install that version first")

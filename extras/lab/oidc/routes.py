@@ -6,7 +6,7 @@ import logging
 from datetime import timedelta
 from typing import TYPE_CHECKING, Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import RedirectResponse
 
@@ -19,6 +19,7 @@ from server.access.caller import Caller
 from server.access.session_cookie import is_over_tls, session_cookie, sign_in_cookie
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS, ProblemError, not_found
+from server.routes import Router
 from server.services import Services
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 START = "/api/v1/login/start"
 HOME = "../../../"
 """The page, from the addresses below. A relative one: a proxy may serve the service below a path of its own."""
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+router = Router(tags=["system"], responses=PROBLEMS)
 log = logging.getLogger("server.access")
 
 

@@ -5,14 +5,9 @@ After a release it is written out, and a change is a migration of its own.
 
 from __future__ import annotations
 
-from alembic import op
+from sqlalchemy import Connection
 
 from extras.lab.audit.tables import AuditTable
-
-revision = "0001"
-down_revision = None
-branch_labels = None
-depends_on = None
 
 REFUSED = "the audit log is append-only"
 NEXT = "new.sequence = COALESCE((SELECT MAX(sequence) FROM audit), 0) + 1"
@@ -39,9 +34,8 @@ POSTGRESQL = (
 )
 
 
-def upgrade() -> None:
+def upgrade(connection: Connection) -> None:
     """Makes the table."""
-    connection = op.get_bind()
     AuditTable.metadata.create_all(connection, checkfirst=False)
     for statement in SQLITE if connection.dialect.name == "sqlite" else POSTGRESQL:
-        op.execute(statement)
+        connection.exec_driver_sql(statement)

@@ -6,16 +6,11 @@ the tables is a migration of its own.
 
 from __future__ import annotations
 
-from alembic import op
+from sqlalchemy import Connection
 
 from server.store.tables import Table
 
-revision = "0001"
-down_revision = None
-branch_labels = None
-depends_on = None
 
-
-def upgrade() -> None:
+def upgrade(connection: Connection) -> None:
     """Makes the tables."""
-    Table.metadata.create_all(op.get_bind(), checkfirst=False)
+    Table.metadata.create_all(connection, checkfirst=False)
