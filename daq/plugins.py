@@ -95,6 +95,8 @@ class Plugin:
     beside the service that changes who may use it, within the command's transaction."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
+    routes_at_root: tuple[str, ...] = ()
+    """Routers whose addresses begin at the root, as "module:router"."""
     routes: tuple[str, ...] = ()
     """Routers below /api/v1, as "module:router": of `server.routes`, or FastAPI's."""
 

@@ -42,13 +42,12 @@ from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
 from server.live.history import History
 from server.live.hub import Hub
-from server.monitoring.metrics import Metrics
-from server.monitoring.readiness import Readiness
 from server.owner.messages import Answer
 from server.parts import Attention, Part
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
+from server.readiness import Readiness
 from server.robot.control import ControlService
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
@@ -163,7 +162,6 @@ class Services:
         """Port of the stop listener; 0 until it is known."""
         self.lanes = Lanes()
         self.readiness = Readiness(self.clock)
-        self.metrics = Metrics()
         limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
         self.uploads = Workers(limits, 1)
         self.motions = Workers(limits, 1)
@@ -255,7 +253,6 @@ class Services:
 
         hub = Hub(self.clock, history, status)
         robot.listeners.append(hub.on_report)
-        robot.listeners.append(lambda report: self.metrics.count_report(name, report))
         robot.listeners.append(lambda report: self.tell(lambda part: part.arm_reported(name, report)))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
@@ -369,7 +366,7 @@ class Services:
         event has already been carried out. Its row is written as soon as the database can be.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
-        self.metrics.count_event(robot, kind)
+        self.tell(lambda part: part.event_recorded(robot, kind))
         self._recorded.add(robot, kind, text, at or self.clock.utc(), actor, experiment)
         rig = self._robots.get(robot)
         if rig is not None:
@@ -381,7 +378,6 @@ class Services:
             rig.hub.publish("events", EventMessage(event=event))
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
-        self.metrics.count_job(job)
         self.tell(lambda part: part.job_changed(job))
         hub.publish("jobs", JobMessage(job=job))
 
