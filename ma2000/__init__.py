@@ -58,9 +58,6 @@ if TYPE_CHECKING:
     from ma2000.running import run as run
     from ma2000.studies import design as design
     from ma2000.studies import diagnose as diagnose
-    from ma2000.studies import feedforward as feedforward
-    from ma2000.studies import followed as followed
-    from ma2000.studies import learn as learn
     from ma2000.studies import validate as validate
     from ma2000.thesis import reproduce_thesis as reproduce_thesis
     from model.base_parameters.result import BaseParameters as BaseParameters
@@ -68,7 +65,6 @@ if TYPE_CHECKING:
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
-    from model.feedforward.tracking import Followed as Followed
     from model.fitting.options import FitOptions as FitOptions
     from model.fitting.profile import Profile as Profile
     from model.fitting.result import FitResult as FitResult
@@ -100,7 +96,6 @@ _HOME = {
     "FitOptions": "model.fitting.options",
     "FitRequest": "daq.contracts.service.jobs",
     "FitResult": "model.fitting.result",
-    "Followed": "model.feedforward.tracking",
     "LocalService": "ma2000.local_service",
     "Machine": "daq.contracts.machine",
     "Model": "model.machine_model.model",
@@ -122,11 +117,8 @@ _HOME = {
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
-    "feedforward": "ma2000.studies",
     "fit": "ma2000.fitting",
     "fit_torques": "ma2000.fitting",
-    "followed": "ma2000.studies",
-    "learn": "ma2000.studies",
     "list_traces": "ma2000.files",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
@@ -159,11 +151,8 @@ _WITH_MODELS = {
     "batch",
     "design",
     "diagnose",
-    "feedforward",
     "fit",
     "fit_torques",
-    "followed",
-    "learn",
     "profile",
     "reproduce_thesis",
     "simulate",

@@ -17,6 +17,7 @@ RUN: Mapping[tuple[str, str], str] = {
     ("audit.md", "console"): "tests/server/audit/test_page.py",
     ("batches.md", "console"): "tests/daq_cli/test_batches_page.py",
     ("batches.md", "python"): "tests/daq_cli/test_batches_page.py",
+    ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_page.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",

@@ -11,7 +11,7 @@ from daq.contracts.experiment import ExperimentSpec, parse_spec
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.safety.planned import motion_of, planned
-from model.feedforward.tracking import Followed, followed
+from extras.motion.tracking import Followed, followed
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy.recording import recorded
 

@@ -10,9 +10,9 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import NoController
+from extras.motion.posture_units import Scale, scale_of
+from extras.motion.response import REACH, Response, response_of
 from model.arrays import Floats
-from model.feedforward.posture_units import Scale, scale_of
-from model.feedforward.response import REACH, Response, response_of
 from model.machine_model.model import Model
 from model.simulation.batch import BatchRun
 from model.simulation.inputs import RunInputs, gains_of

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import fftconvolve
 
+from extras.motion.response import REACH, Response, response_of
 from model.arrays import Floats
-from model.feedforward.response import REACH, Response, response_of
 
 SLOWEST, FASTEST = 0.5, 60.0
 """Bounds (rad/s) of the loop's natural frequency; the second is that of a loop sampled about five times a period."""

@@ -16,14 +16,14 @@ from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
+from extras.motion.arm_in_loop import arm_in_loop
+from extras.motion.best_set_points import Task, best_set_points, rounded_set_points
+from extras.motion.estimated_response import estimated_loop
+from extras.motion.inverse import require_same
+from extras.motion.motion import Motion, Planner, and_rest, computed_experiment, gains_for, motion_of
+from extras.motion.response import REACH, Response
+from extras.motion.tracking import errors_of
 from model.arrays import Floats
-from model.feedforward.arm_in_loop import arm_in_loop
-from model.feedforward.best_set_points import Task, best_set_points, rounded_set_points
-from model.feedforward.estimated_response import estimated_loop
-from model.feedforward.inverse import require_same
-from model.feedforward.motion import Motion, Planner, and_rest, computed_experiment, gains_for, motion_of
-from model.feedforward.response import REACH, Response
-from model.feedforward.tracking import errors_of
 from model.machine_model.model import Model
 from model.simulation.inputs import RunInputs, inputs_of
 
@@ -42,13 +42,12 @@ up to twice that may grow by chance, which is no divergence."""
 
 def learn(
     trace: Trace,
-    asked: ExperimentSpec,
     machine: Machine,
     plan: Planner,
     model: Model | None = None,
     share: float = 1.0,
 ) -> ExperimentSpec:
-    """The experiment that corrects the set points of a recorded attempt at the same motion.
+    """The experiment that corrects the set points of a recorded attempt at a motion.
 
     Args:
         trace: of the plain experiment, or of one with computed set points.
@@ -60,8 +59,8 @@ def learn(
     """
     if model is not None:
         require_same(model, machine)
+    asked = asked_of(trace, machine)
     motion = motion_of(asked, machine, plan)
-    require_attempt(trace, asked, machine)
     inputs = inputs_of(trace, machine)
     if len(inputs) != len(motion):
         raise TraceError(f"{_called(trace)}: has {len(inputs)} periods, the motion {len(motion)}: repeat the run")
@@ -107,13 +106,12 @@ def _require_converging(trace: Trace, reached: Mapping[int, TrackingError], moti
         )
 
 
-def require_attempt(trace: Trace, asked: ExperimentSpec, machine: Machine) -> None:
-    """Raises TraceError for a trace that is no whole attempt at this motion on this machine."""
+def asked_of(trace: Trace, machine: Machine) -> ExperimentSpec:
+    """The experiment whose motion a trace attempted. Raises TraceError for a trace that is no whole attempt on this
+    machine."""
     record, called = trace.record, _called(trace)
     if record.spec is None or record.machine is None:
         raise TraceError(f"{called}: does not say which experiment it is of: learn from one that `daq run` recorded")
-    if different := _difference(record.spec.plain, asked):
-        raise TraceError(f"{called}: is of another motion: its {different} differs; learn from one of the same motion")
     if record.machine.name != machine.name or record.machine.controller != machine.controller:
         raise TraceError(f"{called}: is of {record.machine.name}, or of another controller than that of {machine.name}")
     if record.outcome != "complete":
@@ -125,11 +123,7 @@ def require_attempt(trace: Trace, asked: ExperimentSpec, machine: Machine) -> No
             raise TraceError(f"{called}: {what}, so it does not show what its set points do: repeat the run")
     if trace.missing > MOST_MISSING * len(trace):
         raise TraceError(f"{called}: lacks {trace.missing} of {len(trace) + trace.missing} samples: repeat the run")
-
-
-def _difference(one: ExperimentSpec, other: ExperimentSpec) -> str:
-    fields = ("trajectory", "joints", "start", "gains", "settle", "hold", "repeats")
-    return next((name for name in fields if getattr(one, name) != getattr(other, name)), "")
+    return record.spec.plain
 
 
 def _called(trace: Trace) -> str:

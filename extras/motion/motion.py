@@ -11,8 +11,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Feedforward, Gain, Path
 from daq.contracts.machine import BoardPid, Machine, NoController
 from daq.contracts.trace import Floats
-from model.feedforward.posture_units import Allowed, Scale, allowed_postures, effective_postures, scale_of
-from model.feedforward.response import REACH
+from extras.motion.posture_units import Allowed, Scale, allowed_postures, effective_postures, scale_of
+from extras.motion.response import REACH
 
 Planner = Callable[[ExperimentSpec], Floats]
 """A function that gives the set points (k, joints of the machine) of an experiment in rad, one row per control period.

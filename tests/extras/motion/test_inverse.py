@@ -12,9 +12,9 @@ from daq.contracts.machine import load_machine
 from daq.safety.check_plan import check_plan
 from daq.trajectories import plan as plan_of
 from daq.trajectories import start_angles
-from model.feedforward.inverse import feedforward
+from extras.motion.inverse import feedforward
 from model.machine_model.model import base_model
-from tests.model.feedforward.motions import RAMP, arm, attempts, judged, machine, plan, rms
+from tests.extras.motion.motions import RAMP, arm, attempts, judged, machine, plan, rms
 
 
 def computed(asked: ExperimentSpec = RAMP) -> ExperimentSpec:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError, TraceError
-from daq.contracts.experiment import ExperimentSpec, TrackingError, parse_spec
+from daq.contracts.experiment import ExperimentSpec, TrackingError
 from daq.contracts.trace import Trace, TraceEvent
-from model.feedforward.learning import learn
-from tests.model.feedforward.motions import RAMP, arm, attempts, machine, plan, rms
+from extras.motion.learning import learn
+from tests.extras.motion.motions import RAMP, arm, attempts, machine, plan, rms
 
 HEAVY = ("payload:mass=0.5", "coulomb_friction:joint=2,torque=5")
 
@@ -23,8 +23,8 @@ def attempt(tmp_path_factory: pytest.TempPathFactory) -> Trace:
     return attempts([RAMP], tmp_path_factory.mktemp("attempt"), HEAVY)[0]
 
 
-def learned(trace: Trace, asked: ExperimentSpec = RAMP, **options: Any) -> ExperimentSpec:
-    return learn(trace, asked, machine(), plan, **options)
+def learned(trace: Trace, **options: Any) -> ExperimentSpec:
+    return learn(trace, machine(), plan, **options)
 
 
 def test_errors_fall_from_attempt_to_attempt(attempt: Trace, tmp_path: Path) -> None:
@@ -90,7 +90,6 @@ def test_a_set_point_that_came_late_is_not_caught_up_with_in_a_jump(attempt: Tra
         ({"outcome": "stopped"}, "ended as stopped"),
         ({"every": 2}, "a sample only every 2 periods"),
         ({"spec": None}, "does not say which experiment"),
-        ({"spec": parse_spec({"trajectory": {"kind": "cubic"}})}, "of another motion: its trajectory differs"),
     ],
 )
 def test_a_trace_of_something_else_is_refused_in_one_line(attempt: Trace, changes: dict[str, Any], line: str) -> None:

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import LinearConstraint, lsq_linear, minimize
 
-from model.feedforward.best_set_points import ROUGHNESS, Task, best_set_points, rounded_set_points
-from model.feedforward.posture_units import Allowed
-from model.feedforward.response import Response, response_of
+from extras.motion.best_set_points import ROUGHNESS, Task, best_set_points, rounded_set_points
+from extras.motion.posture_units import Allowed
+from extras.motion.response import Response, response_of
 
 Floats = NDArray[np.float64]
 FREE = Allowed(low=0.0, high=999.0, step=np.inf, ahead=np.inf)

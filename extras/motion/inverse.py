@@ -10,12 +10,12 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
 from daq.contracts.machine import Machine
 from daq.contracts.progress import Progress, silent
+from extras.motion.arm_in_loop import ArmInLoop, arm_in_loop
+from extras.motion.best_set_points import Task, best_set_points, rounded_set_points
+from extras.motion.motion import Motion, Planner, computed_experiment, gains_for, motion_of, with_rest
+from extras.motion.response import Response
+from extras.motion.tracking import errors_of
 from model.arrays import Floats, Mask
-from model.feedforward.arm_in_loop import ArmInLoop, arm_in_loop
-from model.feedforward.best_set_points import Task, best_set_points, rounded_set_points
-from model.feedforward.motion import Motion, Planner, computed_experiment, gains_for, motion_of, with_rest
-from model.feedforward.response import Response
-from model.feedforward.tracking import errors_of
 from model.machine_model.model import Model
 
 MOST_STEPS = 12

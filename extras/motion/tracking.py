@@ -9,7 +9,7 @@ import numpy as np
 from daq.contracts.experiment import TrackingError
 from daq.contracts.trace import Floats, Integers, Trace
 from daq.contracts.with_arrays import WithArrays
-from model.feedforward.motion import Planner
+from extras.motion.motion import Planner
 
 
 @dataclass(frozen=True, eq=False)

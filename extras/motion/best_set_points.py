@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from extras.motion.posture_units import Allowed
+from extras.motion.response import Response
 from model.arrays import Floats, Mask
-from model.feedforward.posture_units import Allowed
-from model.feedforward.response import Response
 
 ROUGHNESS = 0.01
 """Weight of the squared second difference of a correction beside the squared error: keeps set points smooth at
