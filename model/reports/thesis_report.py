@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from model.blocks import Cell, Picture, Points, Report, Section, Table, Text, cells
 from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells
 from model.reports.thesis_torques import torque_section
 from model.thesis.control_cases import ControlCase, ControlChapter
 from model.thesis.ladder import Ladder

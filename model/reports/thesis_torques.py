@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.analysis.torques import TorqueAnalysis
+from model.blocks import Picture, Section
 from model.reports.figures import COLOURS, baseline, drawn, panels
-from model.reports.page import Picture, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ from pathlib import Path
 from daq.contracts.service.jobs import Study
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces.catalogue import summary_of
-from model.reports.page import Report
+from model.blocks import Report
 from server.batches.choice import chosen_of
 from server.batches.folder import PARQUET, BatchFolder
 from server.batches.run import Chosen, Standing
