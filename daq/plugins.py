@@ -71,23 +71,6 @@ class Importer:
 
 
 @dataclass(frozen=True)
-class Executor:
-    """Computes jobs on other processes and computers: `--executor KIND://PLACE?OPTION=VALUE`."""
-
-    kind: str
-    example: str
-    """A URL that an error shows."""
-    checked: str
-    """"module:function" of a parsed `daq.executors.address.Address`: returns it as it is used; raises SpecError."""
-    opened: str
-    """"module:function" of an `Address` and a patience in s, which may be None: returns `daq.executors.Workers`."""
-    needs: tuple[Extra, str]
-    """The extra that installs what it needs, and a module of it."""
-    options: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """The form of each option's value, as a regular expression, and an example of it."""
-
-
-@dataclass(frozen=True)
 class Plugin:
     """What a plug-in adds."""
 
@@ -97,19 +80,21 @@ class Plugin:
     dialects: Mapping[str, str] = field(default_factory=dict)
     """Line protocols by the name that a port's URL has: "module:function" of the joints' numbers on the bus, which
     makes a `firmware_protocol.dialect.LinkDialect`."""
-    executors: tuple[Executor, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     """Sections of daq.toml by name: classes `daq.config.section.Section`, as "module:Class"."""
     checks: tuple[str, ...] = ()
     """Functions of the `Settings`, as "module:function", that `daq config check` calls: each raises SpecError for what
     cannot be used."""
     migrations: Mapping[str, str] = field(default_factory=dict)
-    """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
-    database, each named so that it begins with this name."""
+    """Packages of migrations (`server/store/schema.py`), by a name that no other plug-in uses. They make tables of the
+    service's database, each named so that it begins with this name."""
+    noted: tuple[str, ...] = ()
+    """Functions of a session of the database and an `AuditNote`, as "module:function". They are called for each command
+    beside the service that changes who may use it, within the command's transaction."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     routes: tuple[str, ...] = ()
-    """Routers of FastAPI below /api/v1, as "module:router"."""
+    """Routers below /api/v1, as "module:router": of `server.routes`, or FastAPI's."""
 
 
 @cache

@@ -7,9 +7,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
 from fastapi.concurrency import run_in_threadpool
-from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from daq.config.documents import site_index
@@ -17,14 +16,12 @@ from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
-    audit,
     controller,
     description,
     experiments,
     fleet,
     jobs,
     live,
-    login,
     presets,
     programs,
     queue,
@@ -34,7 +31,8 @@ from server.api import (
     traces,
 )
 from server.api.state_metrics import StateMetrics
-from server.page import page_router
+from server.page import Page
+from server.routes import include
 from server.services import Services
 from server.site import serve_site
 
@@ -92,11 +90,9 @@ def bare_app(services: Services | None) -> FastAPI:
         openapi_url=None,
         docs_url=None,
         redoc_url=None,
-        generate_unique_id_function=_name,
         redirect_slashes=False,
     )
     problems.install(app)
-    api = APIRouter(prefix=API)
     for part in (
         robots,
         fleet,
@@ -108,25 +104,17 @@ def bare_app(services: Services | None) -> FastAPI:
         queue,
         traces,
         jobs,
-        audit,
         live,
-        login,
         system,
     ):
-        api.include_router(part.router)
+        include(app, part.router, API)
     for plugin in plugins():
         for reference in plugin.routes:
-            api.include_router(named(reference))
-    app.include_router(api)
-    app.include_router(system.plain)
-    app.include_router(page_router())
+            include(app, named(reference), API)
+    include(app, system.plain)
+    app.routes.append(Page())
     serve_site(app, site_index())
     description.install(app)
     kept = None if services is None else services.folder / description.KEPT
     described = description.serve(app, f"{API}/openapi.json", kept)
     return app
-
-
-def _name(route: APIRoute) -> str:
-    """Names an operation like its function, since clients are generated from these names."""
-    return route.name

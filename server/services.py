@@ -11,33 +11,26 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from daq.config.oidc import OidcSettings
 from daq.config.robot_files import load_memory_map
 from daq.config.settings import Settings
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
-from daq.contracts.extras import require_extra
+from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
-from daq.executors.address import parse_service_address
 from daq.plugins import named, plugins
-from daq.trajectories import control_period
+from daq.trajectories.set_points import control_period
 from server.access.caller import Caller
 from server.access.lanes import Lanes
 from server.access.sessions import SessionStore
-from server.access.sign_in import SignIns
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
-from server.audit.configuration import begun
-from server.audit.log import AuditLog
-from server.audit.request import Audit
-from server.audit.writer import AuditWriter
 from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
@@ -74,18 +67,11 @@ from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
 from server.store.waiting_events import WaitingEvents
 
-if TYPE_CHECKING:
-    from server.access.openid import Provider
-
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
 robot's port finishes alone if it needs longer."""
-AUDIT_KEPT = "audit-waiting.jsonl"
-"""File of the rows of the audit log that could not be written before the service ended."""
 ENDING = 0.5
-"""Time (s) to write the last rows of the audit log and of the outbox when the service ends."""
-KEEPING = 0.3
-"""Share (s) of that time in which rows that could not be written are kept in a file."""
+"""Time (s) for events and plug-ins to write their last rows when the service ends."""
 log = logging.getLogger("server")
 P = TypeVar("P", bound=Part)
 
@@ -105,7 +91,8 @@ class RobotServices:
     jobs: JobService
     models: Models
     unattended: bool
-    audit: Audit
+    jogged: Callable[[AuditNote], None]
+    """Tells plug-ins of a command to jog."""
     owners: tuple[str, ...] = ()
     """Names of this robot's owners; empty: every owner."""
 
@@ -156,7 +143,6 @@ class Services:
     def __init__(self, settings: Settings, clock: Clock | None = None) -> None:
         self.settings = settings
         self.clock = clock or SystemClock()
-        parse_service_address(settings.server.executor)
         self.closed = False
         """Whether `close` has done everything."""
         self.store = Store(address_of(settings.server))
@@ -171,8 +157,6 @@ class Services:
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
         self._recorded = WaitingEvents(self.events, self._publish)
-        self.audit_log = AuditLog(self.store)
-        self.audit = Audit(AuditWriter(self.audit_log, self.folder / AUDIT_KEPT), self.clock.utc)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
         self.stop_port = 0
@@ -187,18 +171,15 @@ class Services:
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self.sessions = SessionStore(self.store)
-        self.provider = _provider(settings.server.oidc)
-        self.sign_ins = SignIns(self.clock)
         self.signed_in: Callable[[Caller], None] = lambda _caller: None
         """Called when a session has begun, and when one was left, with its caller."""
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
-        self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
+        self.workers = SharedWorkers(settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own) for own in settings.each_robot()}
         for part in self.parts:
             part.robots_made(self.robots())
-        self.audit.writer.note(begun(settings, self.audit_log, self.clock.utc()))
 
     def robots(self) -> list[RobotServices]:
         """Returns all robots, in the order of the configuration."""
@@ -246,8 +227,7 @@ class Services:
             TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
         last = [partial(part.close, ENDING) for part in self.parts]
-        last += [partial(self._recorded.close, ENDING), partial(self.audit.writer.close, ENDING - KEEPING)]
-        _all_within(ENDING, last)
+        _all_within(ENDING, [*last, partial(self._recorded.close, ENDING)])
         self.store.close()
         self.closed = True
 
@@ -276,7 +256,7 @@ class Services:
         hub = Hub(self.clock, history, status)
         robot.listeners.append(hub.on_report)
         robot.listeners.append(lambda report: self.metrics.count_report(name, report))
-        robot.listeners.append(lambda report: self._tell(lambda part: part.arm_reported(name, report)))
+        robot.listeners.append(lambda report: self.tell(lambda part: part.arm_reported(name, report)))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobService(
@@ -290,7 +270,6 @@ class Services:
                 clock=self.clock,
                 changed=lambda job: self._job_changed(hub, job),
                 at_once=settings.server.jobs_at_once,
-                executor=settings.server.executor,
                 workers=self.workers,
             )
         )
@@ -306,7 +285,7 @@ class Services:
             jobs=jobs,
             models=models,
             unattended=settings.server.unattended,
-            audit=self.audit,
+            jogged=lambda note: self.tell(lambda part: part.acted(note, again=True)),
             owners=settings.robot.owners,
         )
 
@@ -314,7 +293,8 @@ class Services:
         """Returns what will need somebody soon, one line each."""
         return self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
 
-    def _tell(self, news: Callable[[Part], None]) -> None:
+    def tell(self, news: Callable[[Part], None]) -> None:
+        """Tells every part some news, on this thread."""
         for part in self.parts:
             try:
                 news(part)
@@ -365,8 +345,8 @@ class Services:
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
                 reviewer=None if settings.robot.review == "off" else settings.robot.review,
-                paused=lambda reason: self._tell(lambda part: part.queue_paused(robot.name, reason)),
-                ended=lambda *end: self._tell(lambda part: part.experiment_ended(robot.name, *end)),
+                paused=lambda reason: self.tell(lambda part: part.queue_paused(robot.name, reason)),
+                ended=lambda *end: self.tell(lambda part: part.experiment_ended(robot.name, *end)),
             )
         )
         robot.listeners.append(queue.on_report)
@@ -402,7 +382,7 @@ class Services:
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
         self.metrics.count_job(job)
-        self._tell(lambda part: part.job_changed(job))
+        self.tell(lambda part: part.job_changed(job))
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
@@ -437,16 +417,6 @@ def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
         thread.start()
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
-
-
-def _provider(settings: OidcSettings) -> Provider | None:
-    """Returns the provider of OpenID Connect. Raises SpecError, and MissingExtraError without Authlib."""
-    if settings.issuer is None:
-        return None
-    require_extra("oidc", "server.oidc", "authlib")
-    from server.access.openid import open_provider
-
-    return open_provider(settings)
 
 
 def _place(settings: Settings) -> RobotPlace:

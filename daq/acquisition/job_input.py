@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from daq.acquisition.messages import Job
 from daq.contracts.errors import SpecError
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from firmware_protocol.invalid import first_invalid
 
 LONGEST_JOB = 256 << 20

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from daq.acquisition.session import PortSession, port_session
 from daq.driver import Controller
-from daq.runner import ArmControl, Consent, StoppedError, require_not_stopped
+from daq.runner.arm_control import ArmControl, StoppedError
+from daq.runner.preparation import Consent, require_not_stopped
 from firmware_protocol.memory_map import MemoryMap
 
 

@@ -15,15 +15,9 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.driver import Controller
 from daq.link import LinkState
-from daq.runner import (
-    Consent,
-    MissingConsentError,
-    RunResult,
-    RunSetup,
-    StoppedError,
-    StopRequests,
-    run_experiment,
-)
+from daq.runner.arm_control import StoppedError
+from daq.runner.experiment import RunResult, RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent, MissingConsentError
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 

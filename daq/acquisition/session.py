@@ -16,7 +16,7 @@ from daq.acquisition.freezer import Freezer
 from daq.acquisition.guardian import Guardian
 from daq.acquisition.stop_socket import stop_listener
 from daq.driver import Controller
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from firmware_protocol.memory_map import MemoryMap
 
 C = TypeVar("C", bound=Controller)

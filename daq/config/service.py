@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ipaddress
 from pathlib import Path
 from typing import Annotated, Literal
+from urllib.parse import urlsplit
 
 from pydantic import BeforeValidator, Field, field_validator
 
-from daq.config.oidc import OidcSettings
 from daq.contracts.frozen import FrozenRecord
 
 DEFAULT_PORT = 8300
@@ -22,6 +23,29 @@ def _true_or_false(given: object) -> object:
 
 TrueOrFalse = Annotated[bool, BeforeValidator(_true_or_false)]
 """Consent that may move an arm: `true`, and no other value that is merely truthy."""
+
+
+def protected(address: str | None) -> str | None:
+    """Raises ValueError for an address that is none, or over which a code could be read on the way."""
+    if address is None:
+        return None
+    try:
+        parts = urlsplit(address)
+        _ = parts.port
+    except ValueError:
+        raise ValueError("is no address; write https://host") from None
+    if not parts.hostname or parts.username is not None or parts.query or parts.fragment:
+        raise ValueError("is no address; write https://host")
+    if parts.scheme != "https" and not (parts.scheme == "http" and _is_loopback(parts.hostname)):
+        raise ValueError("must begin with https://, unless it is on this computer")
+    return address
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 class ServiceSettings(FrozenRecord):
@@ -46,9 +70,6 @@ class ServiceSettings(FrozenRecord):
     """Whether the queue may move a real arm while no operator has confirmed being present."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits and diagnoses; short jobs have one of their own."""
-    executor: Annotated[str, Field(max_length=500)] = "local://"
-    """Who computes fits, diagnoses and the traces of batches: URL of an executor (docs/batches.md), which starts no
-    cluster. `local://` is processes of this computer, `jobs_at_once` of them."""
     history: Annotated[float, Field(ge=10, le=3600)] = 300.0
     """Time span (s) of live samples that a client receives when it joins."""
     upload_size: Annotated[int, Field(ge=1, le=65536)] = 512
@@ -59,7 +80,13 @@ class ServiceSettings(FrozenRecord):
     """Time limit (s) of that process."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service, beside its address: others are refused."""
-    oidc: OidcSettings = OidcSettings()
+    address: Annotated[str, Field(max_length=500)] | None = None
+    """Address at which browsers reach this service, where people sign in."""
+
+    @field_validator("address")
+    @classmethod
+    def _is_protected(cls, address: str | None) -> str | None:
+        return protected(address)
 
     @field_validator("folder")
     @classmethod

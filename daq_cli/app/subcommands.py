@@ -46,14 +46,6 @@ CORE = {
             needs="server",
             group="Service",
         ),
-        Command(
-            "audit",
-            "Show who asked the service for what; check the log of it.",
-            "daq_cli.commands.audit",
-            about="service",
-            needs="server",
-            group="Service",
-        ),
         Command("traces", "List, show, plot, convert and verify traces.", "daq_cli.commands.traces", group="Look"),
         Command("config", "Show and check the configuration.", "daq_cli.commands.config", about="computer"),
         Command(
@@ -106,13 +98,6 @@ CORE = {
             "diagnose",
             "Name the effect that a model lacks, and show the gap shrink.",
             "daq_cli.commands.diagnose",
-            needs="model",
-            group="Model",
-        ),
-        Command(
-            "batch",
-            "Fit, validate, simulate or diagnose many traces, on many cores.",
-            "daq_cli.commands.batch",
             needs="model",
             group="Model",
         ),

@@ -105,7 +105,7 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
     """Prints the planned motion and the limits that it violates. Raises SafetyError when it violates any."""
     from daq.contracts.joint_text import position_text, speed_text
     from daq.safety import check_plan, unchecked
-    from daq.trajectories import plan, start_angles
+    from daq.trajectories.planner import plan, start_angles
 
     motion = plan(spec, machine, start_angles(spec, machine))
     shown = motion.preview()

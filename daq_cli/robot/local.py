@@ -248,8 +248,8 @@ def _report(call: Invocation, machine: Machine, controller: Controller, limp: li
     """The state of the board, in the form of a service's status. Raises SafetyError for another machine's file."""
     from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
     from daq.contracts.status import StatusReport
-    from daq.runner import require_fitting
     from daq.runner.line_status import with_rates
+    from daq.runner.preparation import require_fitting
     from daq.runner.rows import RowMaker
     from firmware_protocol.commands import Capability, StatusFlag
 

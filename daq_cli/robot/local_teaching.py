@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from daq.acquisition.owned import OwnedRobot
     from daq.contracts.machine import Machine
     from daq.contracts.sample import SampleRow
-    from daq.teaching import RecordedPath
     from daq.teaching.controller_arm import ControllerArm
     from daq.teaching.jog import JogCommand
     from daq.teaching.program import Program
     from daq.teaching.program_plan import PlannedInstruction
+    from daq.teaching.recording import RecordedPath
 
 Made = TypeVar("Made")
 
@@ -39,7 +39,7 @@ class LocalTeaching:
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
         """Drives until the pendant has ended."""
-        from daq.teaching import jog as jog_arm
+        from daq.teaching.jog import jog as jog_arm
 
         with open_keyboard() as keyboard, self.owned(self._arm) as (robot, arm):
             line.tell(HELP)
@@ -83,7 +83,7 @@ class LocalTeaching:
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
         """Records until `seconds` are over, or Enter is pressed."""
-        from daq.teaching import lead_by_nose
+        from daq.teaching.lead import lead_by_nose
 
         with self.owned(self._arm) as (robot, arm):
             begun = robot.controller.clock.now()
@@ -104,7 +104,7 @@ class LocalTeaching:
         """
         from daq.acquisition.owned import owned_robot
         from daq.config.robot_files import load_memory_map
-        from daq.runner import Consent, MissingConsentError
+        from daq.runner.preparation import Consent, MissingConsentError
 
         robot, memory_map = self.call.settings.robot.name, load_memory_map(self.call.settings.robot.memory_map)
         with ExitStack() as held:

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
 RUN: Mapping[tuple[str, str], str] = {
-    ("audit.md", "console"): "tests/server/audit/test_page.py",
-    ("batches.md", "console"): "tests/daq_cli/test_batches_page.py",
-    ("batches.md", "python"): "tests/daq_cli/test_batches_page.py",
+    ("audit.md", "console"): "tests/extras/lab/audit/test_page.py",
+    ("batches.md", "console"): "tests/extras/lab/batches/test_batches_page.py",
+    ("batches.md", "python"): "tests/extras/lab/batches/test_batches_page.py",
     ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_page.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",

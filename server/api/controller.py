@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
@@ -12,8 +12,9 @@ from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, Se
 from server.owner.messages import Answer, MoveGripper, ReadGains, ReadProcess, WriteGains, WriteOutput
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", tags=["controller"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", tags=["controller"], responses=PROBLEMS)
 OutputNumber = Annotated[int, Path(ge=0, le=7)]
 
 

@@ -79,8 +79,6 @@ Arrived = Annotated[float, Depends(_arrived)]
 """When the request's first byte arrived (s, monotonic), before it waited for anything."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
-Auditor = Operator
-"""Who may read the audit log, which names people and their computers: whoever may change something."""
 
 
 def _require_cursor(cursor: str | None) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
@@ -38,13 +38,14 @@ from server.catalogue.room import require_room
 from server.experiments.length import LONGEST, least_length, points_of
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
+from server.routes import Router
 from server.services import RobotServices, Services
 
 MOST_SHOWN = 5000
 """Most set points in a preview; of a longer motion every second, third, … is returned."""
 SHORT, FEW_POINTS = 60.0, 5000
 """Longest motion (s) and most given set points that are planned here, in a moment; others are planned by a process."""
-router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
 StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only experiments in one of these states.")]
 
 
@@ -74,7 +75,7 @@ def submit_experiment(
 
 
 @router.get("")
-async def list_experiments(
+def list_experiments(
     rig: RobotDep,
     services: ServicesDep,
     _: Viewer,
@@ -85,7 +86,7 @@ async def list_experiments(
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
     """Lists experiments, the last submitted or the last ended first."""
-    page = await services.experiments.page.fetch(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
+    page = services.experiments.page(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
     return page.model_copy(update={"items": tuple(rig.queue.with_progress(item) for item in page.items)})
 
 

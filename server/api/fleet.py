@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 
-from fastapi import APIRouter
-
 from daq.contracts.service.fleet import (
     FleetRobot,
     FleetStatus,
@@ -13,10 +11,11 @@ from daq.contracts.service.fleet import (
 from daq.contracts.service.robot import FleetStopResult
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS
+from server.routes import Router
 from server.services import RobotServices
 from server.stopping.arm import together
 
-router = APIRouter(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
+router = Router(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
 
 
 @router.get("")

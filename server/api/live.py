@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, WebSocket
+from fastapi import WebSocket
 
 from daq.contracts.service.live import LiveFrame, Ticket
 from server.access.caller import require_viewer
 from server.api.dependencies import RobotDep, ServicesDep, Viewer, services_of
 from server.api.stream import stream
 from server.problems import PROBLEMS, ProblemError
+from server.routes import Router
 
-router = APIRouter(tags=["live"])
+router = Router(tags=["live"])
 NOT_ALLOWED = 1008
 """Close code: policy."""
 

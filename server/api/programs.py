@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import Path, Query, Response
 
 from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
-from daq.teaching import Program
-from daq.teaching.program import NAME
+from daq.teaching.program import NAME, Program
 from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, ServicesDep, Viewer
 from server.problems import PROBLEMS
+from server.routes import Router
 from server.store.programs import StoredProgram
 
-router = APIRouter(prefix="/robots/{robot}/programs", tags=["teaching"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/programs", tags=["teaching"], responses=PROBLEMS)
 ProgramName = Annotated[str, Path(pattern=f"^{NAME}$", description="Name of the program.")]
 Revision = Annotated[
     int | None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Response
 
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import ApprovalRequest, Experiment, Schedule, ScheduleChange, ScheduleRequest
@@ -25,9 +25,10 @@ from server.api.dependencies import (
 from server.api.experiments import require_possible
 from server.api.presets import with_preset
 from server.problems import PROBLEMS
+from server.routes import Router
 from server.services import RobotServices, Services
 
-router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
 
 
 @router.get("/queue", tags=["queue"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-
 from daq.contracts.machine import Machine
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
@@ -12,8 +10,9 @@ from server.api.dependencies import Arrived, CursorOf, LeaseHeader, Limit, Opera
 from server.owner.messages import Reset
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
+from server.routes import Router
 
-router = APIRouter(prefix="/robots", tags=["robots"], responses=PROBLEMS)
+router = Router(prefix="/robots", tags=["robots"], responses=PROBLEMS)
 
 
 @router.get("")

@@ -36,7 +36,6 @@ class StateMetrics(Collector):
         yield from self._of_experiments()
         yield from self._of_jobs()
         yield from self._of_disks()
-        yield from self._of_records()
 
     def _of_robots(self) -> Iterable[Metric]:
         link = CounterMetricFamily("daq_link", "Counts of the link since it was opened.", labels=("robot", "counter"))
@@ -99,10 +98,3 @@ class StateMetrics(Collector):
         yield GaugeMetricFamily("daq_storage_warnings", warnings, value=len(self._services.warnings()))
         reserve = "Free room on the disk of traces below which no experiment is taken."
         yield GaugeMetricFamily("daq_disk_reserve_bytes", reserve, value=RESERVE)
-
-    def _of_records(self) -> Iterable[Metric]:
-        writer = self._services.audit.writer
-        written = CounterMetricFamily("daq_audit_rows", "Rows of the audit log written since the service started.")
-        written.add_metric((), writer.written)
-        yield written
-        yield GaugeMetricFamily("daq_audit_waiting", "Rows of the audit log not written yet.", value=writer.waiting)

@@ -8,7 +8,7 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from sqlalchemy import func, select
 from sqlalchemy.engine import make_url
@@ -22,11 +22,12 @@ from server.catalogue.room import room_of
 from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
+from server.routes import Router
 from server.services import Services
 from server.store.tables import TraceRow
 
-plain = APIRouter(tags=["system"])
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+plain = Router(tags=["system"])
+router = Router(tags=["system"], responses=PROBLEMS)
 VERSION = version("ma2000-daq")
 NOT_WELL = "not well: details need a token"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 
 from daq.calibration import gain_experiment, gains_from_trace
 from daq.contracts.errors import SpecError
@@ -15,9 +15,8 @@ from daq.contracts.service.teaching import (
     StepRequest,
     TeachingStatus,
 )
-from daq.teaching import Program
 from daq.teaching.jog import require_step_speed
-from daq.teaching.program import Absolute, Instruction, Relative
+from daq.teaching.program import Absolute, Instruction, Program, Relative
 from daq.traces.reader import read_trace
 from server.api.dependencies import (
     Arrived,
@@ -32,8 +31,9 @@ from server.api.dependencies import (
 )
 from server.api.experiments import submit_experiment
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
 
 
 @router.get("/teaching")

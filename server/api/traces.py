@@ -6,7 +6,8 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
@@ -30,9 +31,10 @@ from server.api.dependencies import (
 from server.api.upload import store_upload
 from server.catalogue.thinning import thinned
 from server.problems import PROBLEMS, TITLES
+from server.routes import Router
 from server.store.traces import TraceSearch
 
-router = APIRouter(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
 
 MCAP = "application/octet-stream"
 CSV = "text/csv"
@@ -63,10 +65,10 @@ async def list_traces(
     """Lists traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
     if q is None:
-        return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
+        return await run_in_threadpool(services.traces.page, rig.robot.name, search, cursor, limit)
     let_others_ask(connection)
     async with services.lanes.turn(caller.name):
-        return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
+        return await run_in_threadpool(services.traces.page, rig.robot.name, search, cursor, limit)
 
 
 @router.post(

@@ -11,10 +11,14 @@ from daq.contracts.errors import DaqError, SafetyError
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
-from daq.runner import Consent, RunSetup, StoppedError, StopRequests, run_experiment
-from daq.teaching import JogCommand, RecordedPath, check_program, jog, lead_by_nose, plan_program, run_program
-from daq.teaching.jog import top_speed
+from daq.runner.arm_control import StoppedError
+from daq.runner.experiment import RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent
+from daq.teaching.jog import JogCommand, jog, top_speed
+from daq.teaching.lead import lead_by_nose
 from daq.teaching.performer import FollowingPerformer
+from daq.teaching.program_plan import check_program, plan_program, run_program
+from daq.teaching.recording import RecordedPath
 from firmware_protocol.errors import ProtocolError
 from server.owner.messages import (
     Answer,

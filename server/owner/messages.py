@@ -13,7 +13,7 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
-from daq.teaching import Program
+from daq.teaching.program import Program
 
 WAITS_AT_MOST = 2.0
 """Time (s) after which a quick order is refused: less than the service waits for the answer (an assumption)."""

@@ -14,7 +14,7 @@ from daq.contracts.limp import limp_joints
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity
 from daq.driver import BoardSnapshot
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from daq.safety import State
 from daq.teaching.controller_arm import ControllerArm
 from server.owner.inbox import Inbox

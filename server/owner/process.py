@@ -8,7 +8,7 @@ from daq.acquisition.session import port_session
 from daq.acquisition.speaker import Speaker
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
-from daq.runner import require_fitting
+from daq.runner.preparation import require_fitting
 from daq.transport import PortBusyError
 from firmware_protocol.commands import Capability
 from firmware_protocol.errors import ProtocolError

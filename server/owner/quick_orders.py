@@ -7,7 +7,7 @@ import time
 from daq.contracts.errors import ReachError, SafetyError
 from daq.contracts.limp import doubts_line, require_no_jump
 from daq.link import RequestRefusedError, StopCameFirstError
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from daq.safety import Event, State
 from firmware_protocol.commands import Refusal
 from server.owner.messages import (

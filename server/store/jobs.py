@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, String, cast, or_, select
 from sqlalchemy.orm import Session
 
+from daq.contracts.frozen import WHEN_USED
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import (
     CompareRequest,
@@ -33,7 +34,7 @@ _FAILURES: dict[Event, JobFailure] = {
     Event.FAULT: "program-fault",
     Event.LOST: "lost",
 }
-_REQUEST: TypeAdapter[JobRequest] = TypeAdapter(JobRequest)
+_REQUEST: TypeAdapter[JobRequest] = TypeAdapter(JobRequest, config=WHEN_USED)
 
 
 def traces_of(request: JobRequest) -> tuple[str, ...]:
@@ -66,20 +67,16 @@ class JobStore:
         by: str,
         key: str | None,
         prepare: Callable[[str], None] = lambda _identity: None,
-        found: Sequence[str] | None = None,
     ) -> tuple[Job, bool]:
         """Queues a new job, and returns it with True; or returns the one that the key made before, with False.
 
         `prepare` is given the number that the job will have, and writes what its worker needs; if it raises, no job is
-        made. `found`: the traces of a batch whose request has a filter. Raises a 409 if the key was used for another
-        request, and a 404 if a trace no longer exists.
+        made. Raises a 409 if the key was used for another request, and a 404 if a trace no longer exists.
         """
         digest = digest_of(request)
         with self._store.writing() as session:
             if (before := made_before(session, JobRow, robot, key, digest)) is not None:
                 return as_job(before), False
-            if found is not None:
-                request = request.model_copy(update={"traces": tuple(found)})
             row = JobRow(
                 **new_columns(robot, key, digest, now, by),
                 kind=request.kind,

@@ -28,7 +28,8 @@ from daq.contracts.service.robot import RobotIdentity, StopResult
 from daq.driver import Controller
 from daq.driver.set_point_watch import SetPointWatch
 from daq.link import LinkState, RequestRefusedError, StopCameFirstError
-from daq.runner import ArmControl, require_not_stopped
+from daq.runner.arm_control import ArmControl
+from daq.runner.preparation import require_not_stopped
 from daq.teaching.controller_arm import ControllerArm
 from firmware_protocol import commands as c
 from server.experiments.order import Waiting
@@ -451,7 +452,7 @@ class Scene:
             jobs=None,
             models=None,
             unattended=True,
-            audit=None,
+            jogged=None,
         )
 
     def _stopped_here(self) -> StopResult:

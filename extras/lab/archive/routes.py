@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body
+from fastapi import Body
 
 from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive
 from extras.lab.archive.part import Archives
 from server.api.dependencies import Identity, Operator, RobotDep, ServicesDep, Viewer
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", tags=["traces"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", tags=["traces"], responses=PROBLEMS)
 
 
 @router.get("/archive")

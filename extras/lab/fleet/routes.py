@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.fleet import FleetComparison, FleetExperimentRequest, FleetExperiments
@@ -16,9 +16,10 @@ from server.api.presets import with_preset
 from server.catalogue.room import require_room
 from server.jobs.mailbox import RESULT
 from server.problems import PROBLEMS, ProblemError
+from server.routes import Router
 from server.services import RobotServices, Services
 
-router = APIRouter(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
+router = Router(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
 
 
 @router.post("/experiments", status_code=201)

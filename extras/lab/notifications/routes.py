@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-
 from daq.contracts.service.notifications import NotificationStatus
 from extras.lab.notifications.part import Notifications
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+router = Router(tags=["system"], responses=PROBLEMS)
 
 
 @router.get("/notifications")

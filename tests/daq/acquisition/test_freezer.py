@@ -10,7 +10,7 @@ import pytest
 from daq.acquisition import freezer as module
 from daq.acquisition.freezer import Freezer
 from daq.driver import StopConfirmation
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 
 
 class SlowControl:

@@ -11,7 +11,7 @@ import pytest
 
 from daq.acquisition.job_input import read_job
 from daq.contracts.errors import SpecError
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from tests.daq.acquisition.jobs import job, text_of
 
 

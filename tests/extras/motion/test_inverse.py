@@ -10,8 +10,8 @@ from daq.contracts.experiment import ExperimentSpec, parse_spec
 from daq.contracts.experiment import Path as PathOfAngles
 from daq.contracts.machine import load_machine
 from daq.safety.check_plan import check_plan
-from daq.trajectories import plan as plan_of
-from daq.trajectories import start_angles
+from daq.trajectories.planner import plan as plan_of
+from daq.trajectories.planner import start_angles
 from extras.motion.inverse import feedforward
 from model.machine_model.model import base_model
 from tests.extras.motion.motions import RAMP, arm, attempts, judged, machine, plan, rms

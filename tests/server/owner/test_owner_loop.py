@@ -11,7 +11,7 @@ import pytest
 from daq.contracts.errors import ReachError
 from daq.driver import HardwareFaultError, NoSampleError
 from daq.link import LinkState
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from firmware_protocol.commands import StatusFlag
 from server.owner import long_orders
 from server.owner.messages import BEGINS_WITHIN, Answer, Reset, RunProgram

@@ -12,7 +12,7 @@ import pytest
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import Activity
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from server.owner import long_orders
 from server.owner.messages import WAITS_AT_MOST, Answer, ArmReport, MoveGripper, Reset
 from server.problems import ProblemError

@@ -16,7 +16,7 @@ from daq.acquisition.stop_socket import StopAnswer, request_stop, stop_listener
 from daq.contracts.errors import SafetyError
 from daq.contracts.machine import load_machine
 from daq.link import Link
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from daq.safety import State
 from firmware_protocol.commands import ReadStatus, Release, Request, Stop, to_frame
 from firmware_protocol.framing import Frame

@@ -11,7 +11,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from alembic.script import ScriptDirectory
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
@@ -19,8 +18,8 @@ from sqlalchemy import select
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
-from daq.teaching import Program
-from daq.teaching.program import Absolute
+from daq.teaching.program import Absolute, Program
+from extras.lab.archive.archived import Archived, ArchivedStore
 from extras.lab.backup.database import copy_database, head_of_audit, revision_of
 from extras.lab.backup.manifest import MANIFEST, verify
 from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
@@ -29,7 +28,6 @@ from extras.lab.backup.write import back_up
 from extras.lab.notifications.tables import OutboxRow
 from server.access.sessions import Person, SessionStore
 from server.experiments.review import Given, Review
-from server.store.archived import Archived, ArchivedStore
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
@@ -96,11 +94,7 @@ def filled(folder: Path) -> Places:
     job = places.service / "jobs" / "0123456789ab"
     job.mkdir(parents=True)
     (job / "result.json").write_text('{"found": 1}')
-    for name in ("rows.jsonl", "batch.json", "table.csv", "table.parquet", "answers/request.json"):
-        (job / "batch" / name).parent.mkdir(exist_ok=True, parents=True)
-        (job / "batch" / name).write_text('{"of": "a batch"}')
     task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}, "models": {}}
-    task["continues"] = str(places.service / "jobs" / "ba9876543210")
     (job / "request.json").write_text(json.dumps(task))
     (job / "cancel").touch()
     return places
@@ -140,7 +134,6 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
     task = json.loads(after["service/jobs/0123456789ab/request.json"])
     assert task["traces"] == {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}
-    assert task["continues"] == str(places.service / "jobs" / "ba9876543210")
     store = Store(places.url)
     store.migrate()
     assert ExperimentStore(store).count_waiting("ma2000") == 1
@@ -537,7 +530,7 @@ def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: 
     store = Store(places.url)
     store.migrate()
     store.close()
-    assert revision_of(places.database) == ScriptDirectory.from_config(migrations()[VERSION]).get_current_head()
+    assert revision_of(places.database) == max(migrations()[VERSION])
     assert head_of_audit(places.database) == "nothing"
 
 

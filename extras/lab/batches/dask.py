@@ -1,0 +1,150 @@
+"""Workers of a Dask cluster: one that a scheduler has, or one of this computer's own."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+from typing import Any
+from uuid import uuid4
+
+import dask.config
+from distributed import Client, LocalCluster
+from distributed.cfexecutor import ClientExecutor
+from distributed.deploy.cluster import Cluster
+from distributed.scheduler import KilledWorker
+
+from daq.contracts.errors import ReachError
+from daq.executors.local import cores
+from daq.executors.workers import BlamedError, Workers
+from extras.lab.batches.executors import Address
+from extras.lab.batches.program import PACKAGE, Checked, Program, program_here, refuse_other
+
+PATIENCE = 20.0
+"""Time (s) within which a scheduler must answer, and have a worker."""
+LOST = "the connection to Dask's scheduler was lost, and with it the jobs; the same command goes on"
+CONFIGURATION = {"distributed.worker.profile.enabled": False, "distributed.scheduler.work-stealing": False}
+"""Settings of a cluster that is started here: a worker's profiler looks at its threads a hundred times a second, and
+nobody looks at what it finds; no more is given to a worker than it can begin soon, so there is nothing to steal."""
+COUNT_EVERY = 5.0
+"""Time (s) between two counts of the workers, which may come and go."""
+
+
+class DaskWorkers(Workers):
+    """Jobs as tasks of Dask, which computes those of a dead worker again elsewhere, three times at most.
+
+    Args:
+        cluster: what was started for this executor, and ends with it.
+    """
+
+    def __init__(self, client: Client, cluster: Cluster | None = None) -> None:
+        self._client = client
+        self._cluster = cluster
+        self._executor = ClientExecutor(client, pure=False)
+        self._counted = (-COUNT_EVERY, 0)
+        self._lock = threading.Lock()
+
+    def count(self) -> int:
+        """The number of threads of all workers; 1 where there are none now."""
+        with self._lock:
+            when, count = self._counted
+            if time.monotonic() - when >= COUNT_EVERY:
+                try:
+                    count = max(1, sum(self._client.nthreads().values()))
+                except OSError as error:
+                    raise ReachError(LOST) from error
+                self._counted = time.monotonic(), count
+        return count
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
+        """As any executor does."""
+        future: Future[Any] = Future()
+        # Without a key Dask would write the whole job out as text, to name it.
+        given = self._executor.submit(Checked(function, program_here()), *args, key=f"job-{uuid4().hex}", **named)
+        given.add_done_callback(partial(_pass_on, future))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """As any executor does."""
+        self._executor.shutdown(wait=wait and not cancel_futures)
+        self._end()
+
+    def abandon(self) -> None:
+        """Leaves the scheduler, which forgets the jobs; it may be gone itself."""
+        self._end()
+
+    def _end(self) -> None:
+        self._client.close()
+        if self._cluster is not None:
+            self._cluster.close()
+
+
+def _pass_on(future: Future[Any], given: Future[Any]) -> None:
+    """Gives the end of Dask's future to another, with the exceptions of `concurrent.futures`."""
+    if not future.set_running_or_notify_cancel():
+        return
+    if given.cancelled():
+        future.set_exception(ReachError(LOST))
+        return
+    error = given.exception()
+    if isinstance(error, KilledWorker):
+        future.set_exception(BlamedError(str(error)))
+    elif error is not None:
+        future.set_exception(error)
+    else:
+        future.set_result(given.result())
+
+
+def dask_workers(address: Address) -> DaskWorkers:
+    """Connects to a scheduler, or starts a cluster on this computer. Raises ReachError, OtherVersionError."""
+    if address.place:
+        scheme = "tls" if address.kind == "dask+tls" else "tcp"
+        return connected(address.url, f"{scheme}://{address.place}")
+    with dask.config.set(CONFIGURATION):
+        cluster = LocalCluster(
+            n_workers=address.workers or cores(),
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            processes=True,
+        )
+    return connected(address.url, cluster.scheduler_address, cluster)
+
+
+def connected(url: str, scheduler: str, cluster: Cluster | None = None, patience: float = PATIENCE) -> DaskWorkers:
+    """The workers of a scheduler, once there is one of them and all have this program's version.
+
+    Raises ReachError, OtherVersionError.
+    """
+    try:
+        with dask.config.set({"distributed.comm.timeouts.connect": patience}):
+            client = Client(scheduler, timeout=patience, set_as_default=False, name=PACKAGE)
+    except (OSError, ValueError) as error:
+        raise ReachError(f"executor {url}: no scheduler answers at {scheduler}: {_one_line(error)}") from error
+    with contextlib.ExitStack() as ended_on_error:
+        ended_on_error.callback(client.close)
+        if cluster is not None:
+            ended_on_error.callback(cluster.close)
+        try:
+            client.wait_for_workers(1, timeout=patience)
+        except TimeoutError:
+            raise ReachError(f"executor {url}: its scheduler has no worker; start some there") from None
+        require_same_versions(client)
+        ended_on_error.pop_all()
+    return DaskWorkers(client, cluster)
+
+
+def require_same_versions(client: Client) -> None:
+    """Raises OtherVersionError, which names the worker, where one has another version than this program."""
+    versions: Any = client.get_versions(packages=[PACKAGE])
+    for worker, has in versions["workers"].items():
+        packages = has["packages"]
+        python = str(packages["python"]).split(".")[:2]
+        refuse_other(worker, Program(packages[PACKAGE] or "none", ".".join(python)), program_here())
+
+
+def _one_line(error: Exception) -> str:
+    return str(error).partition("\n")[0] or type(error).__name__

@@ -1,0 +1,226 @@
+"""The folder of a batch: what was asked, a line for each trace that is done, whole answers, and the tables."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from daq.contracts import exit_codes
+from daq.contracts.documents import parse_json, read_text
+from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.file_lock import take_lock
+from daq.contracts.frozen import FrozenRecord
+from daq.traces.disk import rename
+from extras.lab.batches.columns import Columns
+from extras.lab.batches.program import program_here
+from extras.lab.batches.study import Answer, Common, Study
+from extras.lab.batches.table import write_csv, write_parquet
+from firmware_protocol.invalid import first_invalid
+
+ASKED, ROWS, ANSWERS, CSV, PARQUET = "batch.json", "rows.jsonl", "answers", "table.csv", "table.parquet"
+_HIDDEN_LOCK = ".lock"
+
+
+class BatchInUseError(DaqError):
+    """Another program computes into this folder."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+class Asked(FrozenRecord):
+    """What all rows of the table share, and what a batch must ask again to go on. `model`, `machine` and `effects` are
+    hashes; `machine` is that of traces that name none, and None where a model has its own."""
+
+    format: int = 1
+    software: str
+    study: Study
+    model: str | None
+    machine: str | None = None
+    effects: tuple[str, ...]
+
+
+class Row(FrozenRecord):
+    """One trace of the table. `about`: what is known of the trace itself."""
+
+    key: str
+    problem: str
+    seconds: float
+    worker: str
+    about: Columns
+    columns: Columns
+
+    @property
+    def cells(self) -> Columns:
+        """The row of the table."""
+        ended: Columns = {"state": "failed" if self.problem else "done", "problem": self.problem or None}
+        return {"trace": self.key, **self.about, **ended, "seconds": round(self.seconds, 3), **self.columns}
+
+
+class BatchFolder:
+    """One batch. A trace has one row at most, the one that was written last."""
+
+    def __init__(self, path: Path, rows: dict[str, Row]) -> None:
+        self.path = path
+        self._rows = rows
+
+    @property
+    def rows(self) -> list[Row]:
+        """The rows, in the order of their keys."""
+        return [self._rows[key] for key in sorted(self._rows)]
+
+    def is_done(self, key: str) -> bool:
+        """Whether a trace was studied with success."""
+        row = self._rows.get(key)
+        return row is not None and not row.problem
+
+    def add(self, answer: Answer, about: Columns) -> Row:
+        """Keeps the answer about a trace, and waits until it is on the disk: the whole answer before the row that says
+        that there is one. Raises SpecError."""
+        row = Row(
+            key=answer.key,
+            problem=answer.problem,
+            seconds=answer.seconds,
+            worker=answer.worker,
+            about=about,
+            columns=answer.columns,
+        )
+        try:
+            if answer.text:
+                _write(self.answer_file(answer.key), answer.text + "\n")
+            with (self.path / ROWS).open("a", encoding="utf-8") as lines:
+                lines.write(row.model_dump_json() + "\n")
+                lines.flush()
+                os.fsync(lines.fileno())
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+        self._rows[answer.key] = row
+        return row
+
+    def answer_file(self, key: str) -> Path:
+        """The file of the whole answer about a trace."""
+        return self.path / ANSWERS / f"{key}.json"
+
+    def write_tables(self) -> tuple[Path, Path | None]:
+        """Writes the tables anew. Returns their files; None for Parquet where `pyarrow` is not installed."""
+        cells = [row.cells for row in self.rows]
+        try:
+            return write_csv(cells, self.path / CSV), write_parquet(cells, self.path / PARQUET)
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+
+
+def asked_of(common: Common) -> Asked:
+    """What a batch asks."""
+    return Asked(
+        software=str(program_here()),
+        study=common.study,
+        model=None if common.model is None else _digest(common.model),
+        machine=_digest(common.machine.model_dump_json()) if common.model is None else None,
+        effects=tuple(_digest(read_text(file, f"effect file {file}")) for file in common.effect_files),
+    )
+
+
+@contextmanager
+def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
+    """The folder, made when it is new, for this program alone within the block.
+
+    Raises SpecError when it holds another batch or cannot be written; BatchInUseError.
+    """
+    try:
+        (path / ANSWERS).mkdir(parents=True, exist_ok=True)
+        (path / ROWS).touch()
+        lock = (path / _HIDDEN_LOCK).open("ab")
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    with lock:
+        try:
+            alone = take_lock(lock)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        if not alone:
+            raise BatchInUseError(f"{path}: another batch computes into it; wait until it has ended")
+        _require_same(path / ASKED, asked)
+        yield BatchFolder(path, _read_rows(path / ROWS))
+
+
+def _require_same(file: Path, asked: Asked) -> None:
+    if not file.exists():
+        try:
+            _write(file, asked.model_dump_json(indent=1) + "\n")
+        except OSError as error:
+            raise _unwritable(file.parent, error) from error
+        return
+    try:
+        before = Asked.model_validate(parse_json(read_text(file, str(file)), str(file)))
+    except ValidationError as error:
+        raise SpecError(f"{file}: not a batch's: {first_invalid(error).message}") from error
+    for name in Asked.model_fields:
+        if getattr(before, name) != getattr(asked, name):
+            raise SpecError(f"{file.parent}: holds a batch with another {_WORDS[name]}; take another folder")
+
+
+_WORDS = {
+    "format": "format of its files",
+    "software": "version of this program",
+    "study": "study, or other options",
+    "model": "model",
+    "machine": "machine for traces that name none",
+    "effects": "effect file",
+}
+
+
+def _read_rows(file: Path) -> dict[str, Row]:
+    """The rows of the file. A line that a crash cut short is taken out: its trace is studied again."""
+    found: dict[str, Row] = {}
+    for line in _whole_lines(file):
+        try:
+            row = Row.model_validate_json(line.decode("utf-8"))
+        except UnicodeDecodeError as error:
+            raise SpecError(f"{file}: a line is not UTF-8 text") from error
+        except ValidationError as error:
+            raise SpecError(f"{file}: a line is no row of a batch: {first_invalid(error).message}") from error
+        found[row.key] = row
+    return found
+
+
+def _whole_lines(file: Path) -> list[bytes]:
+    try:
+        content = file.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            os.truncate(file, whole)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from error
+    # A row may hold other characters at which text is split into lines, such as U+2028.
+    return content[:whole].split(b"\n")[:-1]
+
+
+def _write(file: Path, text: str) -> None:
+    """Writes a file, completely or not at all, and waits until it and its name are on the disk."""
+    part = file.with_name(f".{file.name}.part")
+    with part.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    rename(part, file)
+
+
+def _digest(text: str) -> str:
+    try:
+        data: Any = json.loads(text)
+    except ValueError:
+        data = text
+    return sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _unwritable(path: Path, error: OSError) -> SpecError:
+    return SpecError(f"{path}: cannot be written: {error.strerror or error}")
