@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from ma2000.studies import design as design
     from ma2000.studies import diagnose as diagnose
     from ma2000.studies import validate as validate
-    from ma2000.thesis import reproduce_thesis as reproduce_thesis
     from model.base_parameters.result import BaseParameters as BaseParameters
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
@@ -72,7 +71,6 @@ if TYPE_CHECKING:
     from model.machine_model.model_file import save_model as save_model
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
-    from model.thesis.reproduction import Reproduction as Reproduction
     from model.validation.criterion import Fidelity as Fidelity
 
 _HOME = {
@@ -96,7 +94,6 @@ _HOME = {
     "Model": "model.machine_model.model",
     "PRESETS": "daq.trajectories.presets",
     "Profile": "model.fitting.profile",
-    "Reproduction": "model.thesis.reproduction",
     "Run": "ma2000.running",
     "RunError": "ma2000.running",
     "ServiceError": "daq.client",
@@ -120,7 +117,6 @@ _HOME = {
     "profile": "ma2000.fitting",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
-    "reproduce_thesis": "ma2000.thesis",
     "run": "ma2000.running",
     "save_machine": "ma2000.machine_file",
     "save_model": "model.machine_model.model_file",
@@ -138,7 +134,6 @@ _WITH_MODELS = {
     "DesignOptions",
     "DesignedExperiments",
     "Profile",
-    "Reproduction",
     "Simulation",
     "TorqueFit",
     "base_parameters",
@@ -147,7 +142,6 @@ _WITH_MODELS = {
     "fit",
     "fit_torques",
     "profile",
-    "reproduce_thesis",
     "simulate",
     "validate",
 }

@@ -33,7 +33,7 @@ RUN: Mapping[tuple[str, str], str] = {
 """The test that runs a page's blocks of a language."""
 NOT_RUN: Mapping[tuple[str, str], str] = {
     ("archive.md", "console"): "needs a store; tests/extras/lab/archive/test_service.py gives the same commands",
-    ("thesis.md", "python"): "takes minutes; tests/model/thesis/test_page.py makes the same calls",
+    ("thesis.md", "python"): "takes minutes; tests/extras/thesis/test_page.py makes the same calls",
 }
 """Why a page's blocks of a language are not run. That what they import exists is checked all the same."""
 

@@ -90,10 +90,10 @@ def information_gain(
 
 def gain_of(unknowns: Sequence[Unknown], known: Floats, total: Floats) -> InformationGain:
     """What becomes known between two informations (p, p) in natural sizes."""
-    widths = [2 * INTERVAL * scales(tuple(unknowns)) * np.sqrt(np.diag(inverse(one))) for one in (known, total)]
+    widths = [np.sqrt(np.diag(np.linalg.inv(information))) for information in (known, total)]
     parameters = tuple(
-        ParameterGain(name=u.name, unit=u.unit, before=before, after=after)
-        for u, before, after in zip(unknowns, *widths, strict=True)
+        ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b, after=2 * INTERVAL * s * a)
+        for u, s, b, a in zip(unknowns, scales(tuple(unknowns)), *widths, strict=True)
     )
     return InformationGain(parameters=parameters, nats=log_det(total) - log_det(known))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from model.analysis.torques import TorqueAnalysis
+from extras.thesis.torques import TorqueAnalysis
 from model.blocks import Picture, Section
 from model.reports.figures import COLOURS, baseline, drawn, panels
 

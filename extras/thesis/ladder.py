@@ -11,13 +11,9 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel, Progress, silent
 from daq.contracts.trace import Trace
-from model.fitting.fit import fit
-from model.fitting.options import FitOptions, Prior
-from model.machine_model.model import Model
-from model.simulation.prepared import Options
-from model.thesis.check import Check, Choice
-from model.thesis.published_models import BACK_EMF_SYMBOLS, FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
-from model.thesis.tables import (
+from extras.thesis.check import Check, Choice
+from extras.thesis.published_models import BACK_EMF_SYMBOLS, FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
+from extras.thesis.tables import (
     BASIC,
     DATA_SHEET_BACK_EMF_2,
     LADDER,
@@ -26,6 +22,10 @@ from model.thesis.tables import (
     UNOPTIMISED,
     PublishedModel,
 )
+from model.fitting.fit import fit
+from model.fitting.options import FitOptions, Prior
+from model.machine_model.model import Model
+from model.simulation.prepared import Options
 from model.validation.criterion import Fidelity
 from model.validation.expected_deviation import gaussian_share
 from model.validation.fidelity import validate_by_distortion

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from daq.contracts.frozen import FrozenRecord
-from model.thesis.tables import LADDER, PublishedModel
+from extras.thesis.tables import LADDER, PublishedModel
 from model.validation.criterion import contribution
 from model.validation.expected_deviation import Basis, Convention, deviation_share
 

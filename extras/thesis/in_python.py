@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from daq.contracts.progress import Cancel
 from daq.contracts.trace import Trace
+from extras.thesis import reproduction
+from extras.thesis.ladder import Method
+from extras.thesis.reproduction import Reproduction
 from ma2000.progress import Shown, told
-from model.thesis import reproduction
-from model.thesis.ladder import Method
-from model.thesis.reproduction import Reproduction
 
 
 def reproduce_thesis(

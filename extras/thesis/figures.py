@@ -9,18 +9,18 @@ import numpy as np
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace
-from model.analysis.influence import Influence, influences
-from model.analysis.torques import TorqueAnalysis, largest, torques_of_run
-from model.dynamics.inertial_influence import PARAMETERS, parameter_name, parameters_about_joint
-from model.kinematics.chain import Chain, Joint, Link, inertia_about
-from model.thesis.check import Check
-from model.thesis.published_models import model_of
-from model.thesis.tables import (
+from extras.thesis.check import Check
+from extras.thesis.influence import Influence, influences
+from extras.thesis.published_models import model_of
+from extras.thesis.tables import (
     INFLUENCE_FAST_WAIST,
     INFLUENCE_SLOW_WAIST,
     RODS_INFLUENCE,
     VISCOUS_AND_COULOMB,
 )
+from extras.thesis.torques import TorqueAnalysis, largest, torques_of_run
+from model.dynamics.inertial_influence import PARAMETERS, parameter_name, parameters_about_joint
+from model.kinematics.chain import Chain, Joint, Link, inertia_about
 
 
 class TorqueFigures(FrozenRecord):

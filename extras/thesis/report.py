@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from extras.thesis.control_cases import ControlCase, ControlChapter
+from extras.thesis.ladder import Ladder
+from extras.thesis.reproduction import Reproduction
+from extras.thesis.tables import SYMBOLS
+from extras.thesis.torque_pictures import torque_section
 from model.blocks import Cell, Picture, Points, Report, Section, Table, Text, cells
 from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
-from model.reports.thesis_torques import torque_section
-from model.thesis.control_cases import ControlCase, ControlChapter
-from model.thesis.ladder import Ladder
-from model.thesis.reproduction import Reproduction
-from model.thesis.tables import SYMBOLS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

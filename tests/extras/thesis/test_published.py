@@ -3,12 +3,12 @@
 import pytest
 
 from daq.contracts.machine import load_machine
+from extras.thesis.figures import influence_tables
+from extras.thesis.published_fidelity import basis_of_symbol, recomputed_fidelities
+from extras.thesis.published_models import model_of, unfitted
+from extras.thesis.tables import BASIC, LADDER, SYMBOLS, VISCOUS_AND_COULOMB
 from model import layout as at
 from model.simulation.bodies import rod_arm_body
-from model.thesis.figures import influence_tables
-from model.thesis.published_fidelity import basis_of_symbol, recomputed_fidelities
-from model.thesis.published_models import model_of, unfitted
-from model.thesis.tables import BASIC, LADDER, SYMBOLS, VISCOUS_AND_COULOMB
 
 
 @pytest.mark.parametrize("index", range(4))

@@ -10,11 +10,11 @@ import numpy as np
 
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
+from extras.thesis.check import Check, Choice
+from extras.thesis.closed_loop import ClassicalPid, ControlledMotion, Partitioned, Sinusoid, control
+from extras.thesis.driven_arm import DrivenArm
+from extras.thesis.tables import BASIC_WITH_BACK_EMF, VISCOUS, VISCOUS_AND_COULOMB, PublishedModel
 from model.arrays import Floats
-from model.thesis.check import Check, Choice
-from model.thesis.tables import BASIC_WITH_BACK_EMF, VISCOUS, VISCOUS_AND_COULOMB, PublishedModel
-from model.thesis_control.arm import DrivenArm
-from model.thesis_control.closed_loop import ClassicalPid, ControlledMotion, Partitioned, Sinusoid, control
 
 START = (math.pi, math.pi / 4, 0.0)
 """Start posture, rad: 180°, 45°, 0° (section 8.2.1)."""

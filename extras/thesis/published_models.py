@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from daq.contracts.machine import Machine
+from extras.thesis.tables import DATA_SHEET_BACK_EMF_2, SHARED_BACK_EMF, SYMBOLS, UNOPTIMISED, PublishedModel
 from model.machine_model.model import Model, base_model
-from model.thesis.tables import DATA_SHEET_BACK_EMF_2, SHARED_BACK_EMF, SYMBOLS, UNOPTIMISED, PublishedModel
 
 PARAMETER = {symbol.name: symbol.parameter for symbol in SYMBOLS}
 """Names of parameters in a model, by the symbols of the source."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from extras.thesis.driven_arm import DrivenArm
 from model.dynamics.rod_arm import RodArm
-from model.thesis_control.arm import DrivenArm
 
 
 @dataclass(frozen=True)

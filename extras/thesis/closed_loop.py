@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from extras.thesis import driven_arm as at
+from extras.thesis.driven_arm import DrivenArm, equation_of_motion
 from model.arrays import Floats
 from model.dynamics.compilation import compiled
 from model.dynamics.linear_solve import solve_3
-from model.thesis_control import arm as at
-from model.thesis_control.arm import DrivenArm, equation_of_motion
 
 LONGEST_STEP = 2e-4
 """Longest step of integration, s; half of it changes no position of chapter 8's runs by more than 1e-5 rad (tests)."""

@@ -8,12 +8,12 @@ from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.progress import Cancel, Progress, silent
 from daq.contracts.trace import Trace
-from model.analysis.influence import Influence
-from model.thesis.check import Check, Choice
-from model.thesis.control_cases import ControlChapter, control_chapter
-from model.thesis.figures import TorqueFigures, influence_tables, torque_figures
-from model.thesis.ladder import Ladder, Method, climb_ladder, not_recovered
-from model.thesis.published_fidelity import RecomputedFidelity, recomputed_fidelities
+from extras.thesis.check import Check, Choice
+from extras.thesis.control_cases import ControlChapter, control_chapter
+from extras.thesis.figures import TorqueFigures, influence_tables, torque_figures
+from extras.thesis.influence import Influence
+from extras.thesis.ladder import Ladder, Method, climb_ladder, not_recovered
+from extras.thesis.published_fidelity import RecomputedFidelity, recomputed_fidelities
 
 RECOMPUTED_TOLERANCE = 0.03
 """Largest relative difference at which Σλ² recomputed from the tables counts as the published one."""

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
+from extras.thesis.closed_loop import ClassicalPid, Partitioned, Sinusoid, control
+from extras.thesis.driven_arm import DrivenArm, equation_of_motion
+from extras.thesis.tables import VISCOUS_AND_COULOMB
 from model.dynamics import recursive
-from model.thesis.tables import VISCOUS_AND_COULOMB
-from model.thesis_control.arm import DrivenArm, equation_of_motion
-from model.thesis_control.closed_loop import ClassicalPid, Partitioned, Sinusoid, control
 
 START = (np.pi, np.pi / 4, 0.0)
 STILL = Sinusoid(START, (0.0, 0.0, 0.0), 3.0, (0.0, 0.0, 0.0))

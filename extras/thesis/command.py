@@ -47,8 +47,8 @@ def thesis(
     measured in 1991 are lost.
     """
     from daq_cli.app.progress import shown_progress
-    from model.thesis.reproduction import reproduce_thesis
-    from model.thesis.text import as_text
+    from extras.thesis.reproduction import reproduce_thesis
+    from extras.thesis.text import as_text
 
     traces = read_traces(robot_of(context), folder, trace) if trace else [recorded_ramp(seed, folder)]
     with shown_progress("reproducing") as progress:
@@ -60,8 +60,8 @@ def thesis(
     else:
         print(as_text(found))
     if report is not None:
+        from extras.thesis.report import thesis_report
         from model.reports.page import write_report
-        from model.reports.thesis_report import thesis_report
 
         console().print(f"report: {write_report(thesis_report(found), report)}")
 

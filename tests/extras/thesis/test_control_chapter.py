@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from daq.contracts.progress import CancelledError
-from model.thesis.control_cases import ControlChapter, control_chapter, lags
+from extras.thesis.control_cases import ControlChapter, control_chapter, lags
 
 
 @pytest.fixture(scope="module")

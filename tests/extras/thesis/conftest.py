@@ -3,8 +3,8 @@
 import pytest
 
 from daq.contracts.trace import Trace
-from daq_cli.commands.thesis import recorded_ramp
-from model.thesis.reproduction import Reproduction, reproduce_thesis
+from extras.thesis.command import recorded_ramp
+from extras.thesis.reproduction import Reproduction, reproduce_thesis
 
 DEFAULT_SEED = 1991
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from extras.thesis.torques import TorqueAnalysis, largest, torques_along, torques_of_run
 from model.analysis.sensitivity import sensitivity_curves
-from model.analysis.torques import TorqueAnalysis, largest, torques_along, torques_of_run
 from model.dynamics import recursive
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from model.thesis.ladder import Ladder
-from model.thesis.reproduction import Reproduction
-from model.thesis.tables import SYMBOLS
+from extras.thesis.ladder import Ladder
+from extras.thesis.reproduction import Reproduction
+from extras.thesis.tables import SYMBOLS
 
 
 def as_text(result: Reproduction) -> str:
