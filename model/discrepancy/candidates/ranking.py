@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates.candidate_fit import (
     STRANGE,
@@ -157,11 +156,8 @@ def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> lis
     The closed loop is probed, which stays near the record whatever is missing.
     """
     tried = [p.hypothesis for p in probes if p.hypothesis.tone is None and not effect(p.hypothesis.name).is_flexible]
-    try:
-        begun = current.point.at_expected().on(current.point.observation.with_feedback_share(0.0))
-    except SpecError:
-        return []
-    if not begun.is_finite:
+    begun = current.point.expected_in_closed_loop
+    if begun is None:
         return []
     found: list[Probe] = []
     for one in probe(begun, tried):
