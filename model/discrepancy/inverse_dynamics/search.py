@@ -20,7 +20,6 @@ from model.discrepancy.inverse_dynamics.trial import Start
 from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.inverse_dynamics.drive_timing import timing_unknowns
-from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -241,7 +240,7 @@ def _fit_effect(
     timing = {u.name for u in timing_unknowns(wider)}
     kept = (u for u in now.unknowns if u.name not in free and (not u.nuisance or u.name in timing))
     unknowns = (*kept, *(free_unknown(p) for p in own))
-    balance = TorqueBalance(wider, now.balance.records)
+    balance = now.balance.of_model(wider)
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
     if fitted.criterion > now.criterion:
         null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
