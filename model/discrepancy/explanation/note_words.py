@@ -62,23 +62,9 @@ def _larger_noise(v: Values) -> str:
     )
 
 
-def _names_excluded(_: Values) -> str:
-    return (
-        "a group has fewer names than the fitted traces leave: the held-out ones, fitted to in turn, exclude the others"
-    )
-
-
 def _no_experiment_left(v: Values) -> str:
     return (
         f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
-    )
-
-
-def _not_exchanged(v: Values) -> str:
-    why = v.get("why", "they are too short for the cutoff that they bear")
-    return (
-        "held-out traces were a check alone, and were not fitted to in turn, which would show whether they lead to the "
-        f"same answer: {why}"
     )
 
 
@@ -155,13 +141,6 @@ def _times(value: float, stated: float) -> str:
     return ", next to nothing" if value < 0.005 * stated else f", {value / stated:.2g} times as much"
 
 
-def _suspicion_dropped(v: Values) -> str:
-    return (
-        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f}, but the held-out traces, fitted "
-        "to in turn, neither show it nor raise a suspicion: it is not suspected"
-    )
-
-
 def _taken_out_again(v: Values) -> str:
     return f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: the others explain it"
 
@@ -196,21 +175,6 @@ def _torque_left(v: Values) -> str:
     )
 
 
-def _traces_contradict(v: Values) -> str:
-    effects = " and ".join(effect_on(one["effect"], one["joints"]) for one in v["effects"])
-    return (
-        f"{effects} would explain the traces that were given to be fitted to, but not those held out, which are fitted "
-        "to here: what is missing is something else, which none of the effects that were tried describes"
-    )
-
-
-def _traces_exchanged(_: Values) -> str:
-    return (
-        "the traces that were given to be fitted to show nothing plain that has a name: this is what those held out "
-        "show, which are fitted to here, while the others are held out in turn"
-    )
-
-
 def _unfinished_record(v: Values) -> str:
     called = v.get("file") or f"trace {v['trace']}"
     return f"{called} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are were used"
@@ -226,9 +190,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
     "larger-noise": _larger_noise,
-    "names-excluded": _names_excluded,
     "no-experiment-left": _no_experiment_left,
-    "not-exchanged": _not_exchanged,
     "not-looked-for": _not_looked_for,
     "not-separable": _not_separable,
     "nothing-held-out": _nothing_held_out,
@@ -238,12 +200,9 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "shakes-above-cutoff": _shakes_above_cutoff,
     "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
-    "suspicion-dropped": _suspicion_dropped,
     "taken-out-again": _taken_out_again,
     "tolerances-fitted-first": _tolerances_fitted_first,
     "tolerance-source": _tolerance_source,
     "torque-left": _torque_left,
-    "traces-contradict": _traces_contradict,
-    "traces-exchanged": _traces_exchanged,
     "unfinished-record": _unfinished_record,
 }

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
-
-import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, part_of
@@ -19,9 +15,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.left_over import FRICTION
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.resolution import REPEATING
-from model.discrepancy.inverse_dynamics.search import Fitted
-from model.discrepancy.inverse_dynamics.workflow import LEAVES_MORE, TorqueWorkflow
+from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.effects.library import find_named_effect
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import SHORTEST, recorded_motions
@@ -56,29 +50,6 @@ class Look:
         fitted, checked = ([t.record.trace_id for t in some] for some in (traces, held))
         robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
         return self.workflow.answer(fitted, checked, self.cutoff).model_copy(update={"robot_seconds": robot})
-
-    def speaks_for(self, step: Step) -> bool:
-        """Whether these records speak for the effect of a step, though they do not let it be named: by their motion, or
-        since they leave more beside it."""
-        own = names_of(step)
-        refused = (s for s in self.workflow.found.steps if s.refusal is not None and s.refusal.kind == LEAVES_MORE)
-        if any(own & names_of(s) and meet(step.joints, s.joints) for s in refused):
-            return True
-        same = (f for f in self.workflow.beyond_motion if f.effect in own and meet(step.joints, f.joints))
-        return any(f.effect != REPEATING or self._repeats_alike(step, f) for f in same)
-
-    def _repeats_alike(self, step: Step, found: Fitted) -> bool:
-        """Whether a disturbance repeats as often as that of a step, as far as the shortest of these records tells."""
-        resolved = 1.0 / min(float(np.ptp(t.time)) for t in (*self.records.traces, *self.records.held_out))
-        rates = {v.value for v in step.parameters.values() if v.part == "frequency" and v.value is not None}
-        own = (found.fit.values[p.name] for p in found.parameters if p.part == "frequency")
-        return any(abs(one - other) < resolved for one in own for other in rates)
-
-    def withdraw(self, steps: Collection[Step]) -> Diagnosis:
-        """Takes steps back, and what is suspected, because other records do not show them. Returns the new answer; that
-        of this look is not to be used any more."""
-        self.workflow.withdraw_unconfirmed({(step.effect, step.joints) for step in steps})
-        return replace(self).answer
 
 
 def first_finding(records: Records, progress: Progress) -> Look:
@@ -161,18 +132,13 @@ def names_of(step: Step) -> set[str]:
     return {name for name in (step.effect, *(member.effect for member in step.group)) if name is not None}
 
 
-def meet(joints: Sequence[int], others: Sequence[int]) -> bool:
-    """Whether there is a joint in both; an effect without joints is of the whole machine."""
-    return not joints or not others or bool(set(joints) & set(others))
-
-
 def _jumps(name: str) -> bool:
     return name in JUMPING or find_named_effect(name).shared_name.family == FRICTION
 
 
 @dataclass(frozen=True)
 class Records:
-    """What a diagnosis is of: traces to fit to, and others that are held out. most: no cutoff is above it, Hz."""
+    """What a diagnosis is of: traces to fit to, and others that are held out."""
 
     model: Model
     traces: tuple[Trace, ...]
@@ -180,7 +146,6 @@ class Records:
     options: TorqueOptions
     controller: JudgedController
     cancel: Cancel
-    most: float = math.inf
 
     def bears(self, cutoff: float) -> bool:
         """Whether every record lasts long enough for a cutoff (Hz)."""
@@ -192,13 +157,7 @@ class Records:
 
         Raises SpecError where nothing moves beyond the noise of its readings.
         """
-        return self.options.cutoff or min(self.most, choose_cutoff(self.traces, self.model.machine))
-
-    def exchanged(self) -> Records:
-        """The same with fitted and held-out traces exchanged, below no higher cutoff: what stands above it in these was
-        not looked at in those. What the traces to fit to prove of the controller stays: the proof is the record's,
-        whatever is fitted."""
-        return replace(self, traces=self.held_out, held_out=self.traces, most=self.highest_cutoff)
+        return self.options.cutoff or choose_cutoff(self.traces, self.model.machine)
 
     def below(self, cutoff: float, progress: Progress) -> Look:
         """What torques below a cutoff (Hz) show.

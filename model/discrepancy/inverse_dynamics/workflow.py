@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from daq.contracts.progress import Cancel, Progress, stop_if
@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
-from model.discrepancy.inverse_dynamics.resolution import is_beyond_motion, is_resolved, sizes_at_bounds
+from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -40,8 +40,6 @@ LEAVES_MORE: RefusalKind = "leaves-more-than-noise"
 """Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
 SUPERFLUOUS: RefusalKind = "superfluous"
 """Kind of refusal of an effect that nothing needs any more."""
-ONE_WAY: RefusalKind = "found-one-way"
-"""Kind of refusal of an effect that the held-out records do not show when they are fitted to in turn."""
 BEGUN_WITH = 2
 """Refused effects with which a pair is begun, at most."""
 
@@ -62,8 +60,6 @@ class TorqueWorkflow:
     ended: list[Fitted] = field(default_factory=list)
     """Candidates of a step whose sizes ended there only when the whole model was fitted with them."""
     suspicion: Suspicion | None = None
-    beyond_motion: tuple[Fitted, ...] = ()
-    """Candidates of the last step with enough evidence that the recorded motion does not let be named."""
 
     def __post_init__(self) -> None:
         self.refitter = Refitter(self.model, self.case)
@@ -108,17 +104,7 @@ class TorqueWorkflow:
         )
         return answer_of(outcome, traces, held_out, cutoff)
 
-    def withdraw_unconfirmed(self, effects: Collection[tuple[str | None, tuple[int, ...]]]) -> None:
-        """Takes effects on joints back which the held-out records do not show when they are fitted to in turn; and what
-        is suspected. The ranking and the sizes at bounds were of the model with these effects."""
-        self.suspicion = None
-        for step in [s for s in self.found.adopted if (s.effect, s.joints) in effects]:
-            self.found = self._refuse(self.refitter.remove(self.found, step), self.found, step, ONE_WAY)
-            self.tried, self.at_bounds, self.beyond_motion = (), [], ()
-        self.found = describe_in_order(self.refitter, self.found)
-
     def _take_steps(self) -> None:
-        self.beyond_motion = ()
         for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn
             if len(self.found.adopted) >= self.case.options.most_steps:
                 break
@@ -132,7 +118,6 @@ class TorqueWorkflow:
                 self.tried = list_tried(self.refitter.standing(self.found), findings)
                 self.suspicion = suspect(self.refitter.standing(self.found), findings)
                 self.at_bounds = self._on_sizes_at_bounds(findings)
-                self.beyond_motion = self._beyond_motion(findings)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
@@ -177,12 +162,6 @@ class TorqueWorkflow:
         enough = [f for f in (*self.ended, *found.unresolved) if f.evidence >= self.case.options.least_evidence]
         best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
         return [_size_at_bound(f) for f in best.values()]
-
-    def _beyond_motion(self, found: Findings) -> tuple[Fitted, ...]:
-        """What would have been enough evidence of all records, had the motion shown more of it."""
-        least = self.case.options.least_evidence
-        enough = (f for f in found.unresolved if min(f.evidence, f.told) > 0 and f.evidence + f.told >= least)
-        return tuple(f for f in enough if is_beyond_motion(f, self.case))
 
     def _adopt(self, found: Found, findings: Findings) -> Found:
         """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
@@ -307,7 +286,7 @@ class TorqueWorkflow:
                 steps[index] = withdrawn(step, wrong)
                 self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
             # they were of the model with these effects
-            self.suspicion, self.tried, self.at_bounds, self.beyond_motion = None, (), [], ()
+            self.suspicion, self.tried, self.at_bounds = None, (), []
 
 
 def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:
