@@ -11,8 +11,8 @@ from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
-from model.discrepancy.inverse_dynamics.looks import Records, first_finding
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
+from model.discrepancy.inverse_dynamics.records import Records
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model
@@ -42,7 +42,7 @@ def diagnose_torques(
     controller = judge_controller(model, traces)
     _refuse_unseen(chosen, controller.settled)
     records = Records(model, tuple(traces), tuple(held_out), chosen, controller, cancel or Never())
-    found = first_finding(records, progress).answer
+    found = records.answer(progress)
     return with_sentences(found.model_copy(update={"seconds": time.perf_counter() - begun}))
 
 
