@@ -49,7 +49,6 @@ NoteKind = Literal[
     "positions-of-links",
     "resting-left-out",
     "shakes-above-cutoff",
-    "size-at-bound",
     "stated-numbers-moved",
     "taken-out-again",
     "tolerances-fitted-first",

@@ -9,7 +9,7 @@ from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.grounds import Note, NoteKind
 from model.discrepancy.numbers import plain
-from model.effects.names import effect_name, effect_on
+from model.effects.names import effect_name
 
 Values = Mapping[str, Any]
 
@@ -105,14 +105,6 @@ def _shakes_above_cutoff(v: Values) -> str:
     )
 
 
-def _size_at_bound(v: Values) -> str:
-    return (
-        f"{effect_on(v['effect'], v['joints'])} would explain more (evidence {v['evidence']:.0f}), but only with "
-        f"{v['name']} at the end of what it may be, {_rounded(v['value'], v['unit'])}: no machine has that, so that it "
-        "is not named, and something like it may be missing"
-    )
-
-
 def _stated_numbers_moved(v: Values) -> str:
     numbers = v["numbers"]
     listed = ", ".join(
@@ -198,7 +190,6 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "positions-of-links": _positions_of_links,
     "resting-left-out": _resting_left_out,
     "shakes-above-cutoff": _shakes_above_cutoff,
-    "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
     "taken-out-again": _taken_out_again,
     "tolerances-fitted-first": _tolerances_fitted_first,

@@ -32,7 +32,6 @@ from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import withdrawn
 from model.machine_model.model import Model
-from model.machine_model.parameter import Parameter
 
 REVISIONS = 2
 """Times that all effects are looked for once more, at most: again where the first time has changed one."""
@@ -55,10 +54,6 @@ class TorqueWorkflow:
     cancel: Cancel
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
-    at_bounds: list[Note] = field(default_factory=list)
-    """Effects that would have been named, had their sizes not ended where no machine is."""
-    ended: list[Fitted] = field(default_factory=list)
-    """Candidates of a step whose sizes ended there only when the whole model was fitted with them."""
     suspicion: Suspicion | None = None
 
     def __post_init__(self) -> None:
@@ -100,7 +95,7 @@ class TorqueWorkflow:
             stated=self.found.stated,
             tried=self.tried,
             suspicion=self.suspicion,
-            notes=(*self.notes, *self.at_bounds),
+            notes=tuple(self.notes),
         )
         return answer_of(outcome, traces, held_out, cutoff)
 
@@ -110,14 +105,13 @@ class TorqueWorkflow:
                 break
             before = self.found
             self._report(0.1, "what is missing")
-            findings, self.ended = self._search(before), []
+            findings = self._search(before)
             self.found = self._adopt(before, findings)
             if not _has_more(self.found, before):
                 self.found = self._adopt_pair(before, self.found, findings)
             if not _has_more(self.found, before):
                 self.tried = list_tried(self.refitter.standing(self.found), findings)
                 self.suspicion = suspect(self.refitter.standing(self.found), findings)
-                self.at_bounds = self._on_sizes_at_bounds(findings)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
@@ -157,12 +151,6 @@ class TorqueWorkflow:
             *others,
         ]
 
-    def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
-        """What would have been enough evidence to be named, had its size not ended where no machine is."""
-        enough = [f for f in (*self.ended, *found.unresolved) if f.evidence >= self.case.options.least_evidence]
-        best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
-        return [_size_at_bound(f) for f in best.values()]
-
     def _adopt(self, found: Found, findings: Findings) -> Found:
         """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
         refused: list[Fitted] = []
@@ -178,9 +166,7 @@ class TorqueWorkflow:
             taken = None
             if judgement.refusal is None:
                 taken = self.refitter.take(found, chosen)
-                fitted = replace(chosen, fit=taken.now)
-                if sizes_at_bounds(fitted):
-                    self.ended.append(fitted)
+                if sizes_at_bounds(replace(chosen, fit=taken.now)):
                     continue
             rivals = [*refused, *_no_rivals(found, chosen, passed_over)]
             steps.append(record_step(standing, findings, judgement, rivals))
@@ -286,7 +272,7 @@ class TorqueWorkflow:
                 steps[index] = withdrawn(step, wrong)
                 self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
             # they were of the model with these effects
-            self.suspicion, self.tried, self.at_bounds = None, (), []
+            self.suspicion, self.tried = None, ()
 
 
 def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:
@@ -304,18 +290,3 @@ def _has_more(after: Found, before: Found) -> bool:
 
 def _leaves_structure(step: Step) -> bool:
     return step.refusal is not None and step.refusal.kind == LEAVES_MORE
-
-
-def _own_bounds(found: Fitted) -> list[Parameter]:
-    """Sizes of a candidate that ended where no machine is, and not merely where the records say nothing more."""
-    known = found.model.by_name
-    return [p for p in sizes_at_bounds(found) if (p.low, p.high) == (known[p.name].low, known[p.name].high)]
-
-
-def _size_at_bound(found: Fitted) -> Note:
-    """The first size of a candidate that ended at its bound."""
-    p = _own_bounds(found)[0]
-    values = {"effect": found.effect, "joints": list(found.joints), "evidence": found.evidence}
-    return Note(
-        kind="size-at-bound", values={**values, "name": p.part, "value": found.fit.values[p.name], "unit": p.unit}
-    )
