@@ -12,7 +12,6 @@ from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, bends_with_speed, remaining_shapes
 from model.discrepancy.inverse_dynamics.priors import prior_distance
-from model.discrepancy.inverse_dynamics.resolution import ends_at_bound
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.effects.library import find_named_effect
 from model.machine_model.record_verdict import FAR_OFF
@@ -67,8 +66,7 @@ def _noises_left(standing: Standing) -> Floats:
 
 
 def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
-    """Index of the first step that the residual contradicts, or whose size has ended where no machine is; None where
-    there is none.
+    """Index of the first step that the residual contradicts; None where there is none.
 
     Args:
         lowered: names of numbers that the file states and that steps have lowered.
@@ -78,8 +76,6 @@ def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
     for index, step in enumerate(standing.steps):
         joints = left & set(step.joints) if step.adopted else ()
         lowers = bool(lowered & set(step.parameters))
-        if step.adopted and _ended(standing, step):
-            return index
         if any(
             lowers
             or _bends(standing.steps, step, j, shapes)
@@ -97,12 +93,6 @@ def _starved(now: BalanceFit) -> set[int]:
     stated = [u.as_stated for u in friction if u.low >= 0.0 and u.as_stated.expected > 0.0]
     far = [u for u in stated if prior_distance(u, now.values[u.name])[0] <= -FAR_OFF]
     return {joint for u in far for joint in u.parameter.joints}
-
-
-def _ended(standing: Standing, step: Step) -> bool:
-    """Whether a size of a step is at the end of what it may be, now that all others are fitted with it."""
-    known, values = standing.model.by_name, standing.now.values
-    return any(ends_at_bound(known[name], values[name]) for name in step.parameters if name in known)
 
 
 def rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:

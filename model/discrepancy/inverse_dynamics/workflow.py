@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
-from model.discrepancy.inverse_dynamics.resolution import is_resolved, sizes_at_bounds
+from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -163,15 +163,10 @@ class TorqueWorkflow:
             if judgement is None:
                 passed_over.append(chosen)
                 continue
-            taken = None
-            if judgement.refusal is None:
-                taken = self.refitter.take(found, chosen)
-                if sizes_at_bounds(replace(chosen, fit=taken.now)):
-                    continue
             rivals = [*refused, *_no_rivals(found, chosen, passed_over)]
             steps.append(record_step(standing, findings, judgement, rivals))
-            if taken is not None:
-                return replace(taken, steps=tuple(steps))
+            if judgement.refusal is None:
+                return replace(self.refitter.take(found, chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
 
