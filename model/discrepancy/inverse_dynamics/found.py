@@ -29,15 +29,13 @@ class Found:
     """A model with the effects found so far, and its fit.
 
     added: parameters that the diagnosis has added, or whose priors it has lifted. stated: those of them that the file
-    states, as it states them. lowered: names of those that ended lower than stated, friction only: a law that is
-    missing may do that as well. steps: those that were tried, adopted or not.
+    states, as it states them. steps: those that were tried, adopted or not.
     """
 
     model: Model
     now: BalanceFit
     added: Mapping[str, Parameter]
     stated: Mapping[str, Parameter]
-    lowered: frozenset[str]
     steps: tuple[Step, ...] = ()
 
     @property
@@ -63,7 +61,7 @@ class Refitter:
 
     def begin(self) -> Found:
         """The model as it was given, with its numbers fitted."""
-        return Found(self.given, self._fit(self.given, {}, {}), {}, {}, frozenset())
+        return Found(self.given, self._fit(self.given, {}, {}), {}, {})
 
     def standing(self, found: Found) -> Standing:
         """What the next step is judged against."""
@@ -72,8 +70,6 @@ class Refitter:
     def take(self, found: Found, chosen: Fitted) -> Found:
         """Adds a candidate to the model and fits that; the step is the caller's to add."""
         values = chosen.fit.values
-        friction = bool(chosen.stated) and all(p.effect is not None for p in chosen.stated)
-        falls = friction and all(values[p.name] < p.value for p in chosen.stated)
         added = {**found.added, **{p.name: p for p in chosen.parameters}}
         model = chosen.model.with_values(chosen.fit.model_values)
         return replace(
@@ -82,7 +78,6 @@ class Refitter:
             now=self._fit(model, values, added),
             added=added,
             stated={**found.stated, **{p.name: p for p in chosen.stated}},
-            lowered=found.lowered | {p.name for p in chosen.stated if falls},
         )
 
     def remove(self, found: Found, step: Step, held: Mapping[str, float] = NOTHING) -> Found:
@@ -98,7 +93,6 @@ class Refitter:
             now=now,
             added=added,
             stated={name: p for name, p in found.stated.items() if name not in own},
-            lowered=found.lowered - own,
         )
 
     def _without(self, model: Model, step: Step) -> Model:

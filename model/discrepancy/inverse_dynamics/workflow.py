@@ -15,7 +15,7 @@ from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
+from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
@@ -30,7 +30,6 @@ from model.discrepancy.inverse_dynamics.search import (
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
-from model.discrepancy.verdict import withdrawn
 from model.machine_model.model import Model
 
 REVISIONS = 2
@@ -71,7 +70,6 @@ class TorqueWorkflow:
             if not self._revise():
                 break
             self._take_steps()
-        self._withdraw_wrong_laws()
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
             for number, step in enumerate(self.found.steps, start=1)
@@ -253,21 +251,6 @@ class TorqueWorkflow:
         """Takes an effect out and tells why its step does not hold."""
         gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=kind)})
         return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
-
-    def _withdraw_wrong_laws(self) -> None:
-        """Take back effects that the residual contradicts, and all effects after them: friction that was lowered far
-        below what the file states where something is still missing, viscous friction whose own residual bends with
-        speed, and friction in whose place a stated one came out far lower."""
-        while (first := first_contradicted(self.refitter.standing(self.found), self.found.lowered)) is not None:
-            wrong = self.found.steps[first].joints
-            for index, step in enumerate(self.found.steps[first:], start=first):
-                if not step.adopted:
-                    continue
-                steps = list(self.found.steps)
-                steps[index] = withdrawn(step, wrong)
-                self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
-            # they were of the model with these effects
-            self.suspicion, self.tried = None, ()
 
 
 def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:

@@ -16,11 +16,9 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.left_over import _starved
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.starts import narrowed
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
-from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 
@@ -54,17 +52,6 @@ def test_friction_that_fades_beyond_the_recorded_speeds_is_coulomb_friction() ->
     (step,) = (s for s in found.steps if s.adopted)
     assert (step.effect, step.group) == ("coulomb_friction", ()), found.summary
     assert "stribeck_friction" not in {c.effect for c in step.candidates if c.refitted}
-
-
-@pytest.mark.parametrize(("torque", "starved"), [(0.1, {1}), (0.4, set()), (9.0, set())])
-def test_a_friction_far_below_what_is_stated_is_starved_by_another(torque: float, starved: set[int]) -> None:
-    """Quadratic drag was told as Stribeck friction, with a fifth of the Coulomb friction that the file states."""
-    model = base_model(rigs.bench_machine()).with_effect("coulomb_friction", (1,))
-    rub = Unknown(model.parameter("joint1.coulomb_friction.torque"), start=0.5, low=0.0, expected=0.5, deviation=0.1)
-    (mass, *_) = (p for p in model.parameters if p.effect is None)
-    other = Unknown(mass, start=1.0, low=0.0, expected=1.0, deviation=0.01)
-    now: Any = SimpleNamespace(unknowns=(rub, other), values={rub.name: torque, other.name: 0.1})
-    assert _starved(now) == starved
 
 
 def test_a_share_of_held_out_variance_is_of_the_joints_that_an_effect_changes() -> None:
