@@ -15,7 +15,6 @@ from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
@@ -34,12 +33,8 @@ from model.machine_model.model import Model
 
 REVISIONS = 2
 """Times that all effects are looked for once more, at most: again where the first time has changed one."""
-LEAVES_MORE: RefusalKind = "leaves-more-than-noise"
-"""Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
 SUPERFLUOUS: RefusalKind = "superfluous"
 """Kind of refusal of an effect that nothing needs any more."""
-BEGUN_WITH = 2
-"""Refused effects with which a pair is begun, at most."""
 
 
 @dataclass
@@ -106,8 +101,6 @@ class TorqueWorkflow:
             findings = self._search(before)
             self.found = self._adopt(before, findings)
             if not _has_more(self.found, before):
-                self.found = self._adopt_pair(before, self.found, findings)
-            if not _has_more(self.found, before):
                 self.tried = list_tried(self.refitter.standing(self.found), findings)
                 self.suspicion = suspect(self.refitter.standing(self.found), findings)
                 break
@@ -167,32 +160,6 @@ class TorqueWorkflow:
                 return replace(self.refitter.take(found, chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
-
-    def _adopt_pair(self, before: Found, after: Found, findings: Findings) -> Found:
-        """Adds two effects of a joint, each of which takes too little of what is no noise while both leave little more
-        than noise. Where there are none, returns what the step left that adopted nothing.
-
-        Args:
-            before, after: before that step, and with what it refused. findings: of that step.
-        """
-        if len(before.adopted) + 2 > self.case.options.most_steps:
-            return after
-        refusals = {(s.effect, s.joints): s for s in after.steps[len(before.steps) :] if _leaves_structure(s)}
-        for first in [f for f in findings.fitted if (f.effect, f.joints) in refusals][:BEGUN_WITH]:
-            half = self.refitter.take(before, first)
-            beside = self._search(half, first.joints)
-            for second in beside.fitted[:CHANCES]:
-                if not set(first.joints) & set(second.joints):
-                    continue
-                judgement = judge(self.refitter.standing(before), second, ())
-                if judgement is None or judgement.refusal is not None or judgement.noises_left > FAR_ABOVE_NOISE:
-                    continue
-                begun = refusals[first.effect, first.joints]
-                taken = begun.model_copy(update={"adopted": True, "refusal": None})
-                added = record_step(self.refitter.standing(half), beside, judgement, ())
-                steps = (*(s for s in after.steps if s is not begun), taken, added)
-                return replace(self.refitter.take(half, second), steps=steps)
-        return after
 
     def _revise(self) -> bool:
         """Look for every effect once more with all others in place: those found first were held against their rivals
@@ -264,7 +231,3 @@ def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> l
 
 def _has_more(after: Found, before: Found) -> bool:
     return len(after.adopted) > len(before.adopted)
-
-
-def _leaves_structure(step: Step) -> bool:
-    return step.refusal is not None and step.refusal.kind == LEAVES_MORE

@@ -44,18 +44,8 @@ def slide(effects: tuple[str, ...], **hidden: float) -> Diagnosis:
 @pytest.mark.slow
 def test_effects_of_which_each_takes_a_third_are_named_together() -> None:
     hidden = {"coulomb": 6.0, "hum": 8.5, "spring": 120.0}
-    alone = slide(("coulomb_friction",), **hidden)
-    assert [s.refusal.kind for s in alone.steps if s.refusal] == ["leaves-more-than-noise"], alone.summary
     found = slide(("coulomb_friction", "periodic_disturbance", "spring_torque"), **hidden)
     assert adopted(found) == {(n, (1,)) for n in ("coulomb_friction", "periodic_disturbance", "spring_torque")}
-
-
-def test_a_pair_is_not_taken_where_one_step_is_left() -> None:
-    training, held_out = (rigs.slide_trace(s, {"coulomb": 6.0, "hum": 8.5, "spring": 120.0}) for s in (1, 2))
-    names = ("coulomb_friction", "periodic_disturbance", "spring_torque")
-    options = TorqueOptions(effects=names, least_evidence=10.0, most_steps=1)
-    found = diagnose_torques(base_model(rigs.slide_machine()), [training], [held_out], options)
-    assert len(adopted(found)) <= 1, found.summary
 
 
 def test_an_effect_with_several_sizes_a_joint_is_split_by_joint() -> None:
