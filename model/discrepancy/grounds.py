@@ -87,7 +87,6 @@ RefusalKind = Literal[
     "error-grows",
     "error-rises",
     "falls-too-little",
-    "leaves-more-than-noise",
     "only-resembles",
     "superfluous",
     "worse-than-given",

@@ -172,11 +172,6 @@ def refusal_words(refusal: Refusal) -> str:
             if abs(n["share"]) >= LEAST_SHOWN:
                 change = f"falls by only {n['share']:.1%}" if n["share"] > 0.0 else f"grows by {-n['share']:.1%}"
             words = f"on records not fitted to, the mean square {change}"
-        case "leaves-more-than-noise":
-            words = (
-                f"it takes {n['share']:.0%} of the mean square on records not fitted to, and leaves "
-                f"{n['noises']:.0f} times the noise: of what something else makes, any law takes a part"
-            )
         case "only-resembles":
             words = (
                 "it only resembles what is missing: with all that was found, "

@@ -14,7 +14,6 @@ from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
-from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
@@ -29,10 +28,6 @@ CHANCES = 3
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
-NO_PART = 0.4
-"""Least share of a residual far above noise that an effect must take: on sound rigs those that are not there take up to
-35 %, and friction of a real motor, beside something else, 46 %. Any law takes a little of another one, and the
-evidence then counts the rest as noise."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 LEAD = 4.0
@@ -44,12 +39,10 @@ other method."""
 class Judgement:
     """What was made of a candidate that has the evidence it needs.
 
-    noises_left: least residual that it leaves on a joint of its own, in noise floors. refusal: why it is not taken;
-    None where it is.
+    refusal: why it is not taken; None where it is.
     """
 
     comparison: Comparison
-    noises_left: float
     refusal: Refusal | None
 
     @property
@@ -75,8 +68,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     comparison = compare(standing, chosen)
     if comparison is None:
         return None
-    noises = _noises_left(standing, comparison)
-    return Judgement(comparison, noises, _refusal(standing, comparison, noises, takes_most=most))
+    return Judgement(comparison, _refusal(standing, comparison, takes_most=most))
 
 
 def needed_evidence(standing: Standing, chosen: Fitted, *, takes_most: bool) -> float:
@@ -130,30 +122,19 @@ def explains_most(standing: Standing, chosen: Fitted) -> bool:
     )
 
 
-def _refusal(standing: Standing, comparison: Comparison, noises: float, *, takes_most: bool) -> Refusal | None:
+def _refusal(standing: Standing, comparison: Comparison, *, takes_most: bool) -> Refusal | None:
     """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
     for another machine than the file describes. An effect that is there brings stated numbers back; one that explains
     most of what is left is there, whatever it does to them."""
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
-    if noises > NO_NOISE and comparison.removed < NO_PART:
-        return Refusal(kind="leaves-more-than-noise", numbers={"share": comparison.removed, "noises": noises})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})
     if tolerances(standing.model)[1] != "stated" or takes_most:
         return None
     farthest = _farthest_newly_off(standing, chosen)
     return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
-
-
-def _noises_left(standing: Standing, comparison: Comparison) -> float:
-    """Least residual that an effect leaves on a joint of its own, in noise floors; 0 for one of the whole machine, and
-    where nothing is known of its joints."""
-    own = np.array([j in comparison.chosen.joints for j in standing.model.machine.modelled_joints])
-    left = np.sqrt(comparison.fitted_after[own]) / standing.case.noise[own]
-    known = left[np.isfinite(left)]
-    return float(known.min()) if known.size else 0.0
 
 
 def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:

@@ -52,17 +52,6 @@ def test_most_of_a_residual_far_above_noise_is_named_on_less_evidence() -> None:
     assert slide(large[0], None, asked).steps == (), "on no other record has it been seen"
 
 
-def test_a_small_part_of_what_something_else_makes_is_no_effect() -> None:
-    """A hum of 16 N, which may not be named here: friction of 6 N takes a third, with all the evidence."""
-    found = slide(*traces(coulomb=6.0, hum=16.0), TorqueOptions(effects=FRICTION, least_evidence=4.0))
-    assert [(s.effect, s.adopted) for s in found.steps] == [("coulomb_friction", False)], found.summary
-    assert found.steps[0].refusal is not None
-    assert found.steps[0].refusal.kind == "leaves-more-than-noise"
-    assert found.steps[0].refusal.numbers["noises"] > 5.0
-    assert found.steps[0].refusal.numbers["share"] < 0.4
-    assert "any law takes a part" in refusal_words(found.steps[0].refusal)
-
-
 @pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])
 def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
     """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
