@@ -11,25 +11,6 @@ from model.discrepancy.inverse_dynamics.estimates import signal_errors
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
-from model.machine_model.model import Model
-
-
-def has_own_shape(step: Step) -> bool:
-    """Whether an effect acts on several joints with more than a size on each: it may stand for simpler effects that
-    differ from joint to joint, as a bent sensor does for one that is shifted and one of another scale."""
-    return len(step.joints) > 1 and len(step.parameters) > len(step.joints)
-
-
-def split_step(model: Model, step: Step, joint: int) -> tuple[Step, Step]:
-    """The part of a step that is of one of its joints, and the rest."""
-    own = {name for name in step.parameters if model.parameter(name).joints == (joint,)}
-    part = {name: value for name, value in step.parameters.items() if name in own}
-    rest = {name: value for name, value in step.parameters.items() if name not in own}
-    others = tuple(j for j in step.joints if j != joint)
-    return (
-        step.model_copy(update={"joints": (joint,), "parameters": part}),
-        step.model_copy(update={"joints": others, "parameters": rest}),
-    )
 
 
 def describe_in_order(refitter: Refitter, found: Found) -> Found:

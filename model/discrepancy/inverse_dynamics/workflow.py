@@ -16,7 +16,7 @@ from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
-from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
+from model.discrepancy.inverse_dynamics.revision import describe_in_order
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
     Fitted,
@@ -170,10 +170,6 @@ class TorqueWorkflow:
             if step is not None:
                 self._report(0.9, "whether another effect explains it better")
                 self.found = self._look_again(self.found, step)
-        for step in [s for s in self.found.adopted if has_own_shape(s)]:
-            for joint in step.joints:
-                self._report(0.9, "whether another effect explains it better")
-                self.found = self._look_again_on(self.found, step.effect, joint)
         return {(s.effect, s.joints) for s in self.found.adopted} != set(before)
 
     def _look_again(self, found: Found, step: Step) -> Found:
@@ -190,19 +186,6 @@ class TorqueWorkflow:
         if all(f.evidence + f.told >= SUSPECTED for f in mine):
             return found
         return self._refuse(without, found, step, SUPERFLUOUS)
-
-    def _look_again_on(self, found: Found, effect: str | None, joint: int) -> Found:
-        """Replaces an effect on one of its joints by another effect, where that explains the joint better."""
-        step = next((s for s in found.adopted if s.effect == effect and joint in s.joints and len(s.joints) > 1), None)
-        if step is None:
-            return found
-        part, rest = split_step(found.model, step, joint)
-        others = tuple(rest if s is step else s for s in found.steps)
-        without = replace(self.refitter.remove(found, part), steps=others)
-        again = self._adopt(without, self._search(without, (joint,), found))
-        if not _has_more(again, without) or again.steps[-1].effect == effect:
-            return found
-        return self._look_again(replace(again, steps=(*others, again.steps[-1])), rest)
 
     def _prune(self, latest: int) -> None:
         """Take out effects of earlier steps that the latest one has made superfluous."""
