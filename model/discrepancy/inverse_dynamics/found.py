@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import MappingProxyType
 
 from model.discrepancy.diagnosis import Step
 from model.discrepancy.inverse_dynamics.case import TorqueCase
@@ -19,9 +18,6 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import load_posterior
-
-NOTHING: Mapping[str, float] = MappingProxyType({})
-"""No number is held."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +76,13 @@ class Refitter:
             stated={**found.stated, **{p.name: p for p in chosen.stated}},
         )
 
-    def remove(self, found: Found, step: Step, held: Mapping[str, float] = NOTHING) -> Found:
-        """Takes the effect of a step out and fits the rest; numbers of the file that it had named are tolerances again,
-        but for those that are `held` at a value. The step stays in the list."""
+    def remove(self, found: Found, step: Step) -> Found:
+        """Takes the effect of a step out and fits the rest; numbers of the file that it had named are tolerances again.
+        The step stays in the list."""
         own = set(step.parameters)
         added = {name: p for name, p in found.added.items() if name not in own}
         model = self._without(found.model, step)
-        now = self._fit(model, found.now.values, added, held)
+        now = self._fit(model, found.now.values, added)
         return replace(
             found,
             model=model.with_values(now.model_values),
@@ -104,20 +100,13 @@ class Refitter:
             return model
         return model.without_effect(step.effect, joints or None)
 
-    def _fit(
-        self,
-        model: Model,
-        begin: Mapping[str, float],
-        added: Mapping[str, Parameter],
-        held: Mapping[str, float] = NOTHING,
-    ) -> BalanceFit:
-        """The model fitted, with the parameters that the diagnosis has `added` without priors, and without those that
-        are `held`."""
+    def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
+        """The model fitted, with the parameters that the diagnosis has `added` without priors."""
         records, names = self.case.records, frozenset(added)
         before = tolerances(self.given, sizes=recorded_sizes(self.given, records), fitted=self.known_before)[0]
         own = [u for u in before if u.name not in names]
         known = {u.name for u in own}
         sizes = {**recorded_sizes(model, records), **added}
         found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
-        unknowns = [u for u in (*own, *found, *timing_unknowns(model)) if u.name not in held]
-        return fit(TorqueBalance(model.with_values(held), records), unknowns, begin, self.case.data)
+        unknowns = [*own, *found, *timing_unknowns(model)]
+        return fit(TorqueBalance(model, records), unknowns, begin, self.case.data)

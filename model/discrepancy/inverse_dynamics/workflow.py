@@ -16,7 +16,6 @@ from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
-from model.discrepancy.inverse_dynamics.revision import describe_in_order
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
     Fitted,
@@ -31,8 +30,6 @@ from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.machine_model.model import Model
 
-REVISIONS = 2
-"""Times that all effects are looked for once more, at most: again where the first time has changed one."""
 SUPERFLUOUS: RefusalKind = "superfluous"
 """Kind of refusal of an effect that nothing needs any more."""
 
@@ -59,19 +56,13 @@ class TorqueWorkflow:
         self.notes.append(Note(kind="tolerance-source", values=source))
 
     def run(self) -> None:
-        """Take steps until nothing more is significant or holds, then look for every effect once more."""
+        """Take steps until nothing more is significant or holds."""
         self._take_steps()
-        for _ in range(REVISIONS):
-            if not self._revise():
-                break
-            self._take_steps()
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
             for number, step in enumerate(self.found.steps, start=1)
             if step.refusal is not None and step.refusal.kind == SUPERFLUOUS
         ]
-        if len(self.found.adopted) > 1:
-            self.found = describe_in_order(self.refitter, self.found)
 
     def answer(self, traces: Sequence[str], held_out: Sequence[str], cutoff: float) -> Diagnosis:
         """The whole answer, except for its sentences and the times that it took.
@@ -112,18 +103,11 @@ class TorqueWorkflow:
         whole, done = self.case.options.most_steps, len(self.found.steps)
         self.progress(min(0.99, (done + fraction) / (whole + 1)), f"step {done + 1}: {text}")
 
-    def _search(self, found: Found, joints: tuple[int, ...] = (), before: Found | None = None) -> Findings:
-        """What a step finds, without what the records do not resolve, the most probable by all records first.
-
-        Args:
-            joints: to look on; empty for all that may be looked on. before: what was found before an effect was taken
-                out.
-        """
-        options = self.case.options.model_copy(update={"joints": joints} if joints else {})
-        case, also_from = replace(self.case, options=options), None if before is None else before.now.values
-        findings = search(found.model, found.now, case, self._report, self.cancel, also_from)
+    def _search(self, found: Found) -> Findings:
+        """What a step finds, without what the records do not resolve, the most probable by all records first."""
+        findings = search(found.model, found.now, self.case, self._report, self.cancel)
         fitted = prefer_fewer_joints(sorted(self._with_held_out(found, findings.fitted), key=order_by_odds))
-        fitted = prefer_shorter_laws(fitted, found.now, options.least_margin)
+        fitted = prefer_shorter_laws(fitted, found.now, self.case.options.least_margin)
         resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
             findings,
@@ -160,32 +144,6 @@ class TorqueWorkflow:
                 return replace(self.refitter.take(found, chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
-
-    def _revise(self) -> bool:
-        """Look for every effect once more with all others in place: those found first were held against their rivals
-        while others were missing. Whether another effect or joint is named."""
-        before = [(s.effect, s.joints) for s in self.found.adopted]
-        for key in before if len(before) > 1 else []:
-            step = next((s for s in self.found.adopted if (s.effect, s.joints) == key), None)
-            if step is not None:
-                self._report(0.9, "whether another effect explains it better")
-                self.found = self._look_again(self.found, step)
-        return {(s.effect, s.joints) for s in self.found.adopted} != set(before)
-
-    def _look_again(self, found: Found, step: Step) -> Found:
-        """Replaces an effect by what explains best what it explained: itself, or another effect. Takes it out where
-        nothing needs it any more."""
-        place = next(k for k, s in enumerate(found.steps) if s is step)
-        others = (*found.steps[:place], *found.steps[place + 1 :])
-        without = replace(self.refitter.remove(found, step), steps=others)
-        findings = self._search(without, step.joints, found)
-        again = self._adopt(without, findings)
-        if _has_more(again, without):
-            return replace(again, steps=(*others[:place], again.steps[-1], *others[place:]))
-        mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
-        if all(f.evidence + f.told >= SUSPECTED for f in mine):
-            return found
-        return self._refuse(without, found, step, SUPERFLUOUS)
 
     def _prune(self, latest: int) -> None:
         """Take out effects of earlier steps that the latest one has made superfluous."""
