@@ -10,7 +10,6 @@ import numpy as np
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
@@ -58,7 +57,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     Args:
         refused: candidates of the same step that were not taken before it.
     """
-    if chosen.evidence <= 0 and not stands_for_far_number(standing.now, chosen):
+    if chosen.evidence <= 0:
         return None
     most = explains_most(standing, chosen)
     if chosen.evidence + chosen.told < needed_evidence(standing, chosen, takes_most=most):
@@ -75,16 +74,13 @@ def needed_evidence(standing: Standing, chosen: Fitted, *, takes_most: bool) -> 
     """Evidence from which a candidate is named. takes_most: whether it takes most of what is left.
 
     How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
-    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough. An effect
-    without which a number would be far from its file needs a fall of −2 log posterior of 16, the square of `FAR_OFF`.
+    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
     """
     options = standing.case.options
     least = options.least_evidence
     if takes_most:
         least = min(least, SUSPECTED)
     least -= chosen.relief * max(least - SUSPECTED, 0.0)
-    if stands_for_far_number(standing.now, chosen):
-        least = min(least, FAR_OFF**2 - chosen.cost)
     return least + options.echo * _collected(standing, chosen.joints)
 
 

@@ -11,10 +11,9 @@ from model.discrepancy.grounds import Note, Refusal, RefusalKind
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
+from model.discrepancy.inverse_dynamics.judging import CHANCES, judge
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -118,7 +117,7 @@ class TorqueWorkflow:
     def _with_held_out(self, found: Found, candidates: Sequence[Fitted]) -> list[Fitted]:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
         held = self.case.held_out
-        asked = [c for c in candidates if held and (c.evidence > 0 or stands_for_far_number(found.now, c))]
+        asked = [c for c in candidates if held and c.evidence > 0]
         told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
         others = [c for c in candidates if not any(c is one for one in asked)]
         return [
@@ -138,7 +137,7 @@ class TorqueWorkflow:
             if judgement is None:
                 passed_over.append(chosen)
                 continue
-            rivals = [*refused, *_no_rivals(found, chosen, passed_over)]
+            rivals = [*refused, *passed_over]
             steps.append(record_step(standing, findings, judgement, rivals))
             if judgement.refusal is None:
                 return replace(self.refitter.take(found, chosen), steps=tuple(steps))
@@ -159,15 +158,6 @@ class TorqueWorkflow:
         """Takes an effect out and tells why its step does not hold."""
         gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=kind)})
         return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
-
-
-def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:
-    """Those of the candidates that were passed over which are no rivals of the one that is chosen: all of them, but
-    where it is named on less evidence than other effects need, for a number far from its file. Then what is more
-    probable than it is its rival."""
-    if chosen.evidence + chosen.told >= SUSPECTED or not stands_for_far_number(found.now, chosen):
-        return list(passed_over)
-    return [f for f in passed_over if f.log_odds < chosen.log_odds]
 
 
 def _has_more(after: Found, before: Found) -> bool:
